@@ -1,4 +1,4 @@
-"""What a verdict is for, in the lines after the answer: whose aircraft, at which speed, in which weather and world."""
+"""State what a verdict applies to: aircraft, speed, weather and world, in the lines after the answer."""
 
 import math
 from contextlib import suppress
@@ -19,13 +19,13 @@ from world.scenario import Scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT, FlightTable, Navigation
 from world.wind import Turbulence
 
-_NAV = {
+_NAVIGATION_TEXTS = {
     "perfect": "exact",
     "rtk": "with RTK's error (0.05 m on each axis)",
     "gnss": "with GNSS's error (1.5 m on each axis)",
 }
 AirspeedSource = Literal["scenario", "parameters", "aircraft", "flight"]
-_WHOSE_AIRSPEED: dict[AirspeedSource, str] = {
+_AIRSPEED_SOURCE_TEXTS: dict[AirspeedSource, str] = {
     "scenario": "as stated",
     "parameters": "by the autopilot's parameters",
     "aircraft": "its cruise speed",
@@ -35,7 +35,7 @@ _WHOSE_AIRSPEED: dict[AirspeedSource, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Conditions(DocumentConfig):
-    """What a verdict or a plan is for; of an imported flight as far as its log tells."""
+    """Conditions of a verdict or a plan; for an imported flight as far as its log states them."""
 
     aircraft: str
     """Its name or folder; empty for an imported flight whose aircraft nobody named."""
@@ -66,10 +66,10 @@ class Conditions(DocumentConfig):
 
 
 def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot: Autopilot) -> Conditions:
-    """What a plan made in a scenario is for.  aircraft: its name or folder.  airspeed: m/s."""
+    """Return the conditions of a plan made in a scenario.  aircraft: its name or folder.  airspeed: m/s."""
     table, wind, terrain = scenario.flight, scenario.wind, scenario.terrain
     mass = None
-    # A log's aircraft need not be on this machine.
+    # The aircraft of a log may not be on this machine.
     with suppress(FlightError):
         mass = find_again(aircraft, table.aircraft).mass
     return Conditions(
@@ -92,7 +92,7 @@ def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot:
 
 
 def _autopilot_source(table: FlightTable) -> str:
-    """Return a clause that names the file which another autopilot than the default was taken from; "" for none."""
+    """Return a clause naming the file from which a non-default autopilot was taken; "" for none."""
     if table.autopilot_from is None or table.steering.autopilot == DEFAULT_AUTOPILOT:
         return ""
     return f"; taken from {table.autopilot_from}, for nobody named an autopilot"
@@ -105,7 +105,7 @@ def _source_of_airspeed(scenario: Scenario, autopilot: Autopilot) -> AirspeedSou
 
 
 def setup_conditions(setup: FlightSetup) -> Conditions:
-    """What the verdict of a flight, or of a mission that is not flown, is for."""
+    """Return the conditions of the verdict of a flight, or of a mission that is not flown."""
     found = conditions_of(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
     found = replace(found, navigation=setup.nav, zones=len(airspace_of(setup).zones))
     source = setup.source
@@ -125,22 +125,24 @@ def setup_conditions(setup: FlightSetup) -> Conditions:
 
 
 def condition_lines(conditions: Conditions) -> list[str]:
-    """The aircraft and its speed, and whether anybody named it; the weather, navigation and ground."""
+    """Return lines on the aircraft and its speed, and on weather, navigation and ground."""
     return [_aircraft_line(conditions), _world_line(conditions)]
 
 
 def autopilot_line(conditions: Conditions, *, flown: bool) -> str:
-    """Who flew, or for whom it is judged without a flight."""
+    """Return a line on the autopilot that flew, or for which a mission is judged without a flight."""
     return f"{'Flown by' if flown else 'Autopilot'}: {conditions.autopilot}"
 
 
 def flown_lines(conditions: Conditions) -> list[str]:
-    """All of it for what was flown: aircraft, weather and world, and who flew."""
+    """Return all lines on a flight: aircraft, weather and world, and autopilot."""
     return [*condition_lines(conditions), autopilot_line(conditions, flown=True)]
 
 
 def _aircraft_line(made: Conditions) -> str:
-    speed = f"{made.airspeed_mps:.3g} m/s {made.airspeed_kind} airspeed ({_WHOSE_AIRSPEED[made.airspeed_source]})"
+    speed = (
+        f"{made.airspeed_mps:.3g} m/s {made.airspeed_kind} airspeed ({_AIRSPEED_SOURCE_TEXTS[made.airspeed_source]})"
+    )
     if not made.aircraft:
         return f"Aircraft: nobody named one (--aircraft names yours), so none of its limits are judged; {speed}"
     mass = "" if made.mass_kg is None else f", {made.mass_kg:.3g} kg"
@@ -159,24 +161,24 @@ def _world_line(made: Conditions) -> str:
     turbulence = ""
     if made.turbulence is not None:
         turbulence = ", no turbulence" if made.turbulence == "none" else f", {made.turbulence} turbulence"
-    navigation = "" if made.navigation is None else f"; navigation {_NAV[made.navigation]}"
+    navigation = "" if made.navigation is None else f"; navigation {_NAVIGATION_TEXTS[made.navigation]}"
     ground = "no terrain" if made.terrain is None else f"terrain {made.terrain}, heights above {made.height_datum}"
     zones = "" if not made.zones else "; 1 zone" if made.zones == 1 else f"; {made.zones:,} zones"
     return f"Conditions: {blows}{turbulence}{navigation}; {ground}{zones}"
 
 
-# Legs count as beside each other where their courses differ, or are opposite, by no more than this, and where at least
-# half of the shorter one lies beside the longer.
-_PARALLEL = math.radians(15.0)
-# m.  Legs closer to each other are one line.
-_SAME_LINE = 1.0
+# Legs are side by side if their courses are parallel or opposite within this angle, and at least half of the shorter
+# leg is alongside the longer.
+_PARALLEL_ANGLE_RAD = math.radians(15.0)
+# Legs closer to each other than this are one line, m.
+_SAME_LINE_DISTANCE_M = 1.0
 
 
 def corridor_line(setup: FlightSetup) -> str:
-    """How wide a corridor is that nobody stated, what it is made of, and that it is wider than the gap between legs.
+    """Return a line on the width and origin of an unstated corridor.
 
-    A flight that keeps to one so wide may have flown beside its lines all along.  "" where it is stated, or where how
-    far a survey's lines were kept to is judged line by line.
+    Warns if it is wider than the gap between legs.  A flight within so wide a corridor may have been off its lines all
+    along.  "" if the corridor is stated, or if a survey's cross-track errors are judged line by line.
     """
     half, radius = setup.corridor, setup.autopilot.acceptance_radius or 0.0
     if setup.scenario.limits.corridor_m is not None or surveys_of(setup):
@@ -196,9 +198,11 @@ def corridor_line(setup: FlightSetup) -> str:
 
 
 def least_gap(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
-    """The least distance (m) between a leg and the next but one where they lie side by side, and the first's number.
+    """Return the least distance (m) between a leg and the next but one, and the first leg's number.
 
-    waypoints: (w, 3) m.  None where no two legs do.
+    Only legs that are side by side are compared.
+
+    waypoints: (w, 3) m.  None if no two legs are side by side.
 
     >>> lines = np.array([[0, 0, 0], [0, 900, 0], [40, 900, 0], [40, 0, 0]], dtype=float)
     >>> least_gap(lines)
@@ -214,11 +218,11 @@ def least_gap(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
         if run <= 0.0 or length <= 0.0:
             continue
         along = one / run
-        if abs(float(along @ other)) / length < math.cos(_PARALLEL):
+        if abs(float(along @ other)) / length < math.cos(_PARALLEL_ANGLE_RAD):
             continue
         reach = sorted((float((back - start) @ along), float((on - start) @ along)))
         if min(run, reach[1]) - max(0.0, reach[0]) >= 0.5 * min(run, length):
             middle = 0.5 * (back + on) - start
             found.append((abs(float(along[0] * middle[1] - along[1] * middle[0])), k))
     # A line that is flown twice is no survey.
-    return min((one for one in found if one[0] >= _SAME_LINE), default=None)
+    return min((one for one in found if one[0] >= _SAME_LINE_DISTANCE_M), default=None)

@@ -1,4 +1,4 @@
-"""The data classes of ``verdict.json``: a verdict with the words for people, of which its JSON schema is made.
+"""Define the data classes of ``verdict.json``: a verdict with its texts, for its JSON schema.
 
 `logs.verdict.verdict.Verdict.document` fills them.
 """

@@ -1,4 +1,4 @@
-"""A failed finding as a headline names it: the rule, the place, and the numbers or the reason in brief."""
+"""Write a failed finding for a headline: the rule, the place, and the numbers or the reason in brief."""
 
 from collections.abc import Callable
 
@@ -36,7 +36,7 @@ def name_shortfall(noun: str, item: Finding) -> str:
 
 
 def name_excess(noun: str, item: Finding) -> str:
-    """Compare the worse of planned and flown value with the limit, or name the reason if neither is beyond it."""
+    """Compare the worse of planned and flown value with the limit, or name the reason if both are within."""
     values = [value for value in (item.flown, item.planned) if value is not None]
     worst = max(values, key=abs, default=None)
     if item.limit is None or worst is None or abs(worst) <= abs(item.limit):

@@ -1,4 +1,4 @@
-"""A verdict in the order in which it is shown: by rule, the failed findings first, and the findings that are left open.
+"""Order a verdict for display: by rule, the failed findings first, and the undecided findings.
 
 Terminal, report page, notebook, studio and JUnit read a `Presentation`, which `logs.verdict.verdict.Verdict.present`
 makes.  It holds data; `logs.verdict.wording` makes words of places and suggestions.
@@ -68,7 +68,7 @@ class Presentation:
         return left_open(self.findings)
 
     def worth_listing(self, most: int) -> list[tuple[int, Finding]]:
-        """List findings with their numbers: those that failed or are left open, then the closest to its limit by rule.
+        """List findings with their numbers: failed or undecided ones, then the closest to its limit by rule.
 
         most: number of failed and open findings at most.
         """

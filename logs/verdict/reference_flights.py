@@ -1,6 +1,6 @@
-"""The answers of reference flights as text: an attachment of a recorded flight's log, written and read.
+"""Write and read the answers of reference flights as text, an attachment of a recorded flight's log.
 
-A log's verdict is worked out again from its rows.  Reference flights are not in those rows, so their answers are kept.
+A log's verdict is computed again from its rows.  Reference flights are not in those rows, so their answers are stored.
 """
 
 import json
@@ -77,7 +77,7 @@ def reference_flights_json(reference: ReferenceFlights) -> str:
 
 
 def parse_reference_flights(text: str | bytes, source: str) -> ReferenceFlights:
-    """Read the answers of a text.  Raises LogError, in one line, for what does not fit; source names it.
+    """Read the answers from a text.  Raises LogError, in one line, for an invalid text; source names it.
 
     >>> parse_reference_flights('{"schema": "planfly.beside/1", "airframe": null, "deciding": null}', "a.mcap")
     ReferenceFlights(airframe=None, deciding=None)

@@ -1,7 +1,7 @@
-"""A rule of the verdict: how it judges on each level, what it needs of a log, its tolerances.
+"""Define a rule of the verdict: how it judges on each level, what it needs of a log, its tolerances.
 
-Each file in `logs/verdict/rules/` makes its own `Rule`; `logs.verdict.rules.registry.RULES` lists them.  What judges
-goes by that list; what shows a verdict reads `logs.verdict.rule_words.RULE_WORDS`.
+Each file in `logs/verdict/rules/` makes its own `Rule`; `logs.verdict.rules.registry.RULES` lists them.  Code that
+judges uses that list; code that shows a verdict reads `logs.verdict.rule_words.RULE_WORDS`.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,39 +17,39 @@ from logs.verdict.places import Suggestion
 
 
 class Judge(Protocol):
-    """Judges the planned path (``geometric``), or the flown track beside it.
+    """Callable that judges the planned path (``geometric``), or the flown track.
 
-    aligned: None where nothing was flown, and for the planned path.
+    aligned: None if nothing was flown, and for the planned path.
     """
 
     def __call__(
         self, requirements: RouteRequirements, aligned: AlignedTrack | None, /, *, geometric: bool = False
     ) -> list[Finding]:
-        """Its findings, in the order of the route."""
+        """Return its findings, in the order of the route."""
 
 
-# Of a mission's items alone, whoever flies them.
+# Judges a mission's items alone, for any autopilot.
 ItemsJudge = Callable[[FlightSetup], list[Finding]]
-# Of how a flight ended and whether its record has its end.
+# Judges how a flight ended and whether its record is complete.
 EndJudge = Callable[[RouteRequirements, AlignedTrack | None, str, bool], list[Finding]]
-# Of all stretches of an imported flight together, and whether planfly's own log of it has its end.
+# Judges all stretches of an imported flight together, and whether planfly's own log of it is complete.
 ImportedEndJudge = Callable[[FlightSetup, Sequence[FlownLegs], bool], Finding]
 # Replaces findings of other rules by its own, after all have judged.
 Merge = Callable[[RouteRequirements, AlignedTrack | None, Sequence[Finding]], tuple[Finding, ...]]
-# What would make a failed finding pass, the smallest change first.
+# Suggests changes that would make a failed finding pass, the smallest change first.
 Suggest = Callable[[RouteRequirements, AlignedTrack | None, Finding], tuple[Suggestion, ...]]
 
 
 @dataclass(frozen=True, slots=True)
 class LogNeeds:
-    """What the log of an imported flight has to hold for a rule to judge it, beside times and places.
+    """Data that an imported log needs for a rule to judge it, in addition to times and positions.
 
-    quantities: each without which the rule is not judged.
-    planned_heights: the plan states heights.
+    quantities: quantities without which the rule is not judged.
+    planned_heights: the plan states altitudes.
     aircraft: the aircraft is known, unless the scenario sets the limit.
-    full_leg: the leg was flown to its end; otherwise only what fails counts.
+    full_leg: the leg was flown to its end; otherwise only failures are reported.
     no_gap: the log has no gap at the waypoint; a leg with a gap is never passed.
-    listed: named as not judged where the rule finds nothing for want of `quantities`.
+    listed: reported as not judged if the rule finds nothing because `quantities` are missing.
     """
 
     quantities: tuple[Quantity, ...] = ()
@@ -64,15 +64,15 @@ class LogNeeds:
 class Rule:
     """A rule of the verdict.
 
-    name: of its words in `logs.verdict.rule_words.RULE_WORDS`.
-    tolerances: names of the constants of `logs.verdict.tolerances` that it and its measures judge with.
+    name: name of its words in `logs.verdict.rule_words.RULE_WORDS`.
+    tolerances: names of the constants in `logs.verdict.tolerances` that it and its measures use.
 
-    How it judges, each None where it does not:
-    judge: planned path and flown track.  judge_items, judge_end, judge_imported_end, merge: as their types say.
-    An imported flight is judged by `judge`, stretch by stretch, as far as the log holds what ``log`` asks for.
-    suggest: what would make a failed finding pass.
-    whole: whether it judges the flight as one, and says nothing of a leg, a corner, a threat or a zone.
-    of_route: whether it says the same of a flight as of its planned path, and so is asked once for both.
+    Judging functions, each None if the rule has none:
+    judge: planned path and flown track.  judge_items, judge_end, judge_imported_end, merge: see their types.
+    An imported flight is judged by `judge`, stretch by stretch, as far as the log meets ``log``.
+    suggest: suggests changes that make a failed finding pass.
+    whole: True if it judges the flight as a whole, not a leg, a corner, a threat or a zone.
+    of_route: True if it gives the same result for a flight as for its planned path, so that it runs once for both.
     """
 
     name: str

@@ -1,7 +1,7 @@
-"""The smallest change of a plan that would make a failed finding pass: a gentler slope, a longer leg, a lower speed.
+"""Suggest the smallest change that makes a finding pass: gentler slope, longer leg, lower speed.
 
-Each function takes the route's requirements, the aligned track (None where nothing was flown) and the failed finding;
-a rule names the one that suggests for it.  All suggestions are alternatives, the smallest relative change first.
+Each function takes the route's requirements, the aligned track (None if nothing was flown) and the failed finding; a
+rule names the function that suggests for it.  All suggestions are alternatives, the smallest relative change first.
 """
 
 import math
@@ -49,23 +49,24 @@ Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
-# Which way past a zone a path would have to go: the least shift of its legs there that ends the violation.
+# The side on which a path should pass a zone: the least shift of its legs there that ends the violation.
 
-# Shifts of a path: their name, the coordinate, and its sign.
-_LEVEL: tuple[tuple[Quantity, str, float], ...] = (
+# Horizontal shifts of a path: their name, the coordinate, and its sign.
+_HORIZONTAL_SHIFTS: tuple[tuple[Quantity, str, float], ...] = (
     ("north", "north", 1.0),
     ("east", "east", 1.0),
     ("south", "north", -1.0),
     ("west", "east", -1.0),
 )
-_UPRIGHT: tuple[tuple[Quantity, str, float], ...] = (("height", "up", 1.0), ("descent", "up", -1.0))
+# Vertical shifts of a path, in the same form.
+_VERTICAL_SHIFTS: tuple[tuple[Quantity, str, float], ...] = (("height", "up", 1.0), ("descent", "up", -1.0))
 
 
 def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
-    """Pass a zone further to one side, or higher or lower; the least change first.
+    """Suggest passing a zone further to one side, or higher or lower; the least change first.
 
-    item: the finding of the zone that is violated.  All of the legs on which it is are shifted: of the planned path
-    where that violates it, and by as much more as the flight went deeper; of the flight where only that does.
+    item: the finding of the violated zone.  All legs of the violation are shifted: of the planned path if that violates
+    the zone, by as much more as the flight went deeper; of the flight if only the flight violates it.
     """
     z, facts = item.place.index, {fact.what: fact.value for fact in item.facts}
     if z is None or "entry leg" not in facts:
@@ -79,7 +80,7 @@ def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, ite
         moves, deeper = planned_moves(requirements, first, last), max(0.0, flown - planned)
     near = moves[(moves["leg"] >= first) & (moves["leg"] <= last)]
     found = []
-    for ways in (_LEVEL, _UPRIGHT):
+    for ways in (_HORIZONTAL_SHIFTS, _VERTICAL_SHIFTS):
         best: tuple[float, Change] | None = None
         for what, axis, sign in ways:
             shift = _least_shift(near, record, terrain, axis, sign, math.inf if best is None else best[0])
@@ -93,10 +94,11 @@ def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, ite
 def _least_shift(
     moves: Records, record: ZoneRecords, terrain: Terrain | None, axis: str, sign: float, most: float
 ) -> float | None:
-    """The least shift (m) one way that ends a violation; None where it is more than ``most``, or none was found.
+    """Return the least shift (m) in one direction that ends a violation, or None.
 
-    A path that is so deep beyond a limit does not come back from it by a smaller step: going on in steps of that depth
-    leaves no smaller shift out.  A ground that rises faster than the step may be passed over.
+    None if it is above ``most``, or was not found.  A path at some depth beyond a limit needs a shift of at least that
+    depth, so shifting by the depth at each step misses no smaller shift.  Ground that rises faster than the step may be
+    missed.
     """
     shift, shifted = 0.0, np.array(moves)
     for _ in range(ZONE_TRIES):
@@ -116,20 +118,21 @@ def _least_shift(
 _Sized = tuple[float, Suggestion]
 
 
-# A change to more than ten times what is planned is no advice: a leg of 84 km instead of 326 m.
-_LARGEST_CHANGE = 9.0
+# Largest relative change that is suggested: more than ten times the plan is no advice (a leg of 84 km instead of 326
+# m).
+_MAX_RELATIVE_CHANGE = 9.0
 
 
 def _smallest_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
-    """Alternatives by the relative size of their changes; of equal ones the one listed first, and none too large."""
-    helpful = [sized for sized in alternatives if sized[0] <= _LARGEST_CHANGE]
+    """Sort alternatives by the relative size of their changes, stably, and drop those that are too large."""
+    helpful = [sized for sized in alternatives if sized[0] <= _MAX_RELATIVE_CHANGE]
     return tuple(suggestion for _, suggestion in sorted(helpful, key=lambda sized: sized[0]))
 
 
 def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
-    """A gentler slope, a longer leg or another speed for one leg; the least relative change first.
+    """Suggest a gentler slope, a longer leg or another speed for one leg; the least relative change first.
 
-    Where the aircraft is not known well enough, a flight that would tell.
+    If the aircraft is not known well enough, suggest a flight that measures its ability.
     """
     leg = item.place.index
     if leg is None:
@@ -142,7 +145,7 @@ def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, i
     rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
     run = float(requirements.runs[leg])
     if planned <= limit and item.flown is not None:
-        # The geometry passes and the flight did not: what it managed is its limit.
+        # The geometry passes and the flight failed: the slope that was flown is the limit.
         limit = min(limit, abs(math.radians(item.flown)))
     allowed = limit - BUFFER_ANGLE
     if allowed <= 0.0 or planned <= allowed:
@@ -157,14 +160,14 @@ def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, i
     if speed is not None:
         now = float(requirements.setup.route.airspeed[leg])
         alternatives.append((abs(speed - now) / now, (Change("airspeed", place, now, speed, "m/s"),)))
-    # One that goes straight up has no length to compare with.
-    relative = longer / run - 1.0 if run >= ON_THE_SPOT else _LARGEST_CHANGE
+    # A leg that goes straight up has no length to compare with.
+    relative = longer / run - 1.0 if run >= ON_THE_SPOT else _MAX_RELATIVE_CHANGE
     alternatives.append((relative, (Change("length", place, run, float(math.ceil(longer)), "m"),)))
     return _smallest_first(alternatives)
 
 
 def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
-    """Gentler legs on either side of a fly-by arc that is too steep where they are not."""
+    """Suggest gentler legs on either side of a fly-by arc that is too steep while the legs are not."""
     steep = steep_arc(requirements, leg)
     if steep is None:
         return ()
@@ -172,7 +175,7 @@ def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion,
     changes = []
     for k in (leg, leg + 1):
         rise = share * float(requirements.points[k + 1, 2] - requirements.points[k, 2])
-        # A leg that goes the other way makes the arc flatter, and stays.
+        # A leg of opposite slope makes the arc flatter, and is kept.
         if rise * steep.tangent > 0.0:
             wanted = math.copysign(math.floor(abs(rise)), rise)
             changes.append(Change("rise", requirements.leg(k), None, wanted, "m"))
@@ -180,7 +183,7 @@ def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion,
 
 
 def ease_turn(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
-    """A gentler turn, longer legs or a lower speed for one waypoint; the least relative change first."""
+    """Suggest a gentler turn, longer legs or a lower speed; the least relative change first."""
     i = item.place.index
     if i is None:
         return ()
@@ -204,7 +207,7 @@ def ease_turn(requirements: RouteRequirements, _aligned: AlignedTrack | None, it
 
 
 def _longer_legs(requirements: RouteRequirements, i: int) -> list[_Sized]:
-    """Both legs at a waypoint long enough for its turn beside its neighbours; none where they are."""
+    """Suggest both legs at a waypoint long enough for its turn and its neighbours; empty if they are."""
     before = requirements.before[i] + requirements.after[i - 1] + requirements.reversal[i - 1] + BUFFER_LENGTH
     after = requirements.after[i] + requirements.before[i + 1] + requirements.reversal[i] + BUFFER_LENGTH
     changes = []
@@ -218,10 +221,10 @@ def _longer_legs(requirements: RouteRequirements, i: int) -> list[_Sized]:
 
 
 def _gentler_turn(requirements: RouteRequirements, i: int, allowed: float) -> float:
-    """Largest turn in tenths of a degree, up to ``allowed`` (rad), that passes with all that follows turned along.
+    """Return the largest turn in tenths of a degree, up to ``allowed`` (rad), that passes; 0 if none does.
 
-    In wind the next turns change with their courses, and with them the length available to this one.  0 where none
-    was found.
+    All that follows is turned with it.  In wind the next turns change with their courses, and so does the length
+    available to this turn.
     """
     first, last = max(0, i - 2), min(len(requirements.points), i + 3)
     route = requirements.route
@@ -252,15 +255,15 @@ def _gentler_turn(requirements: RouteRequirements, i: int, allowed: float) -> fl
     return 0.0
 
 
-def _true(requirements: RouteRequirements, leg: int) -> float:
-    """True airspeed by the airspeed that is commanded on a leg."""
+def _true_airspeed_ratio(requirements: RouteRequirements, leg: int) -> float:
+    """Return the ratio of true airspeed to the commanded airspeed on a leg."""
     return float(requirements.route.airspeed[leg] / requirements.setup.route.airspeed[leg])
 
 
-def _speeds(requirements: RouteRequirements, amsl: float, now: float, factor: float) -> list[float]:
-    """Speeds to command for level flight at this height in the envelope, the nearest to ``now`` first.
+def _level_speeds(requirements: RouteRequirements, amsl: float, now: float, factor: float) -> list[float]:
+    """Return speeds to command for level flight at an altitude, the nearest to ``now`` first.
 
-    factor: true airspeed by the one commanded.
+    factor: ratio of true airspeed to commanded airspeed.
     """
     envelope = requirements.setup.envelope
     low, high = envelope.level_speeds(amsl)
@@ -271,11 +274,11 @@ def _speeds(requirements: RouteRequirements, amsl: float, now: float, factor: fl
 
 
 def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> float | None:
-    """Airspeed nearest to the commanded one at which the aircraft can hold a slope on a leg, or None."""
+    """Return the airspeed nearest to the command at which the aircraft can hold a slope on a leg, or None."""
     course, side = float(requirements.courses[leg]), 0 if requirements.slopes[leg] >= 0.0 else 1
     heights = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
-    factor = _true(requirements, leg)
-    for speed in _speeds(requirements, max(heights), float(requirements.setup.route.airspeed[leg]), factor):
+    factor = _true_airspeed_ratio(requirements, leg)
+    for speed in _level_speeds(requirements, max(heights), float(requirements.setup.route.airspeed[leg]), factor):
         table = requirements.limits.performance(speed * factor)
         if min(aircraft_slopes(table, course, up)[side] for up in heights) >= slope:
             return speed
@@ -283,13 +286,13 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
 
 
 def _turn_speed(requirements: RouteRequirements, i: int) -> float | None:
-    """Highest lower airspeed at which the turn at a waypoint fits its legs beside its neighbours, or None."""
+    """Return the highest lower airspeed at which the turn at a waypoint fits its legs, or None."""
     now = float(max(requirements.setup.route.airspeed[i - 1 : i + 1]))
     available = min(
         available_lengths(requirements.runs, requirements.before, requirements.after, requirements.reversal, i)
     )
-    factor = _true(requirements, i)
-    speeds = _speeds(requirements, float(requirements.points[i, 2]), now, factor)
+    factor = _true_airspeed_ratio(requirements, i)
+    speeds = _level_speeds(requirements, float(requirements.points[i, 2]), now, factor)
     for speed in sorted((v for v in speeds if v < now), reverse=True):
         table = requirements.limits.performance(speed * factor)
         radius = turn_radius_between(
@@ -301,13 +304,13 @@ def _turn_speed(requirements: RouteRequirements, i: int) -> float | None:
     return None
 
 
-def _whole(metres: float) -> float:
-    """Whole metres, as they are asked for."""
+def _whole_metres(metres: float) -> float:
+    """Return whole metres for a suggestion."""
     return float(round(metres))
 
 
 def pass_threat(requirements: RouteRequirements, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
-    """Pass a missile's sphere further away."""
+    """Suggest passing a missile's sphere further away."""
     m = item.place.index
     if m is None or item.place.kind != "missile":
         return ()
@@ -317,45 +320,45 @@ def pass_threat(requirements: RouteRequirements, aligned: AlignedTrack | None, i
     nearest = path_spheres(requirements.path.points, requirements.path.times, *spheres).closest[0]
     if aligned is not None and len(aligned.track) > 1:
         nearest = min(nearest, path_spheres(aligned.track.position, aligned.track.time, *spheres).closest[0])
-    away = _whole(threats.kill_radius[m] - nearest + BUFFER_LENGTH)
+    away = _whole_metres(threats.kill_radius[m] - nearest + BUFFER_LENGTH)
     return ((Change("distance", item.place, None, away, "m"),),)
 
 
 def fly_higher(
     _requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
 ) -> tuple[Suggestion, ...]:
-    """Fly a leg higher above the ground."""
+    """Suggest flying a leg higher above the ground."""
     if item.limit is None or item.margin is None:
         return ()
     short = -item.margin + BUFFER_LENGTH
     if item.planned is not None:
-        # A flight that ended early did not get to the lowest place.
+        # A flight that ended early did not reach the lowest place.
         short = max(short, item.limit - item.planned + BUFFER_LENGTH)
-    return ((Change("height", item.place, None, _whole(short), "m"),),) if short > BUFFER_LENGTH else ()
+    return ((Change("height", item.place, None, _whole_metres(short), "m"),),) if short > BUFFER_LENGTH else ()
 
 
 def fly_lower(_requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
-    """Fly a leg lower above the ground."""
+    """Suggest flying a leg lower above the ground."""
     heights = [height for height in (item.planned, item.flown) if height is not None]
     if item.place.kind != "leg" or item.limit is None or not heights or not max(heights) > item.limit:
         return ()
-    high = _whole(max(heights) - item.limit + BUFFER_LENGTH)
+    high = _whole_metres(max(heights) - item.limit + BUFFER_LENGTH)
     return ((Change("descent", item.place, None, high, "m"),),)
 
 
 def stay_inside(
     _requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
 ) -> tuple[Suggestion, ...]:
-    """Bring the path further inside the area."""
+    """Suggest bringing the path further inside the area."""
     if item.margin is None or not item.margin < 0.0:
         return ()
-    return ((Change("inset", FLIGHT, None, _whole(-item.margin + BUFFER_LENGTH), "m"),),)
+    return ((Change("inset", FLIGHT, None, _whole_metres(-item.margin + BUFFER_LENGTH), "m"),),)
 
 
 def use_less_energy(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
 ) -> tuple[Suggestion, ...]:
-    """A shorter flight, or a larger battery or tank."""
+    """Suggest a shorter flight, or a larger battery or tank."""
     used = item.planned if item.flown is None else item.flown
     if used is None or item.limit is None or item.margin is None or used <= item.limit:
         return ()
@@ -368,19 +371,22 @@ def use_less_energy(
 
 
 def fly_faster(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
-    """A higher airspeed, above the stall."""
+    """Suggest a higher airspeed, above the stall."""
     if item.limit is None:
         return ()
     leg = int(np.argmin(requirements.route.airspeed))
     now = float(requirements.setup.route.airspeed[leg])
-    wanted = math.ceil(10.0 * item.limit * (1.0 + BUFFER_SPEED) / _true(requirements, leg)) / 10.0
+    wanted = math.ceil(10.0 * item.limit * (1.0 + BUFFER_SPEED) / _true_airspeed_ratio(requirements, leg)) / 10.0
     return ((Change("airspeed", item.place, now, wanted, "m/s"),),) if wanted > now else ()
 
 
 def fly_level_speed(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
 ) -> tuple[Suggestion, ...]:
-    """An airspeed of level flight at the leg's height; one that is sure, where the aircraft's fastest is not known."""
+    """Suggest an airspeed of level flight at the leg's altitude.
+
+    A certain one if the maximum is uncertain.
+    """
     leg = item.place.index
     if leg is None or item.limit is None or item.margin is None:
         return ()
@@ -388,7 +394,7 @@ def fly_level_speed(
     up = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
     envelope = requirements.setup.envelope
     known = envelope.surely() if item.check == UNKNOWN_AIRCRAFT else envelope
-    low, high = (speed / _true(requirements, leg) for speed in known.level_speeds(up))
+    low, high = (speed / _true_airspeed_ratio(requirements, leg) for speed in known.level_speeds(up))
     if low <= commanded <= high:
         return ()
     low = math.ceil(10.0 * low * (1.0 + BUFFER_SPEED)) / 10.0

@@ -1,4 +1,4 @@
-"""Places, changes and disagreements in words.  Nothing of ours reads these words back."""
+"""Describe places, changes and disagreements in words that no code of planfly reads back."""
 
 import math
 
@@ -6,14 +6,14 @@ from logs.verdict.places import Change, DecidingParameter, Disagreement, Place, 
 from logs.verdict.tolerances import ON_THE_SPOT
 from world.threats import threat_label
 
-# How a unit stands after a number.
+# Text of a unit after a number.
 UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs", "%": " %"}
-# Longest statement of a headline, characters.
-_LONGEST = 80
+# Greatest length of a statement in a headline, characters.
+_MAX_STATEMENT_LENGTH = 80
 
 
 def place_text(place: Place) -> str:
-    """Name a place as a person does.
+    """Return the name of a place as a person says it.
 
     >>> [place_text(place) for place in (Place("waypoint", 3, item=4), Place("missile", 0, name="Alfa"), Place("plan"))]
     ['waypoint 3 (item 4)', 'Alfa (missile)', 'plan']
@@ -40,7 +40,7 @@ def place_text(place: Place) -> str:
 
 
 def place_text_within(place: Place) -> str:
-    """A place with words after it: what says which leg it is stands between commas.
+    """Return a place for use within a sentence: the item of a leg is set between commas.
 
     >>> place_text_within(Place("leg", 7, to_item=9))
     'leg 7, to item 9,'
@@ -49,7 +49,7 @@ def place_text_within(place: Place) -> str:
 
 
 def threat_text(place: Place) -> str:
-    """What the threat of a missile or a radar is called.
+    """Return the name of the threat of a missile or a radar.
 
     >>> threat_text(Place("missile", 0, name="Alfa")), threat_text(Place("missile", 2))
     ('Alfa', 'threat 3')
@@ -58,7 +58,7 @@ def threat_text(place: Place) -> str:
 
 
 def change_text(change: Change) -> str:
-    """One change as an instruction.
+    """Return one change as an instruction.
 
     >>> change_text(Change("length", Place("leg", 1), 300.0, 400.0, "m"))
     'make leg 1 400 m long instead of 300 m'
@@ -95,11 +95,11 @@ def change_text(change: Change) -> str:
             return f"bring the path {wanted:.0f} m further inside"
         case "distance":
             return f"pass {threat_text(change.place)} {wanted:.0f} m further away"
-    return _beside_the_path(change)
+    return _other_change_text(change)
 
 
-def _beside_the_path(change: Change) -> str:
-    """A change of anything but the path."""
+def _other_change_text(change: Change) -> str:
+    """Return a change of anything but the path as an instruction."""
     wanted = change.wanted
     match change.what:
         case "duration":
@@ -131,7 +131,7 @@ def _length(change: Change) -> str:
 
 
 def suggestion_text(suggestion: Suggestion) -> str:
-    """Changes to make together, as one instruction.
+    """Return changes to make together, as one instruction.
 
     >>> longer = [Change("length", Place("leg", k), 150.0, 260.0, "m") for k in (1, 2)]
     >>> suggestion_text(tuple(longer))
@@ -143,7 +143,7 @@ def suggestion_text(suggestion: Suggestion) -> str:
 
 
 def suggestions_text(suggestions: tuple[Suggestion, ...]) -> str:
-    """Alternatives, as one instruction; "" for none.
+    """Return alternatives, as one instruction; "" for none.
 
     >>> slower = Change("airspeed", Place("leg", 1), 25.0, 20.5, "m/s")
     >>> suggestions_text(((Change("length", Place("leg", 1), 300.0, 400.0, "m"),), (slower,)))
@@ -157,7 +157,7 @@ _BY_LEVEL = {"geometry": "by geometry", "airframe": "with planfly's guidance", "
 
 
 def disagreement_text(one: Disagreement) -> str:
-    """That another level and the verdict judge a place differently.
+    """Return the statement that another level and the verdict judge a place differently.
 
     >>> disagreement_text(Disagreement("speed", Place("leg", 0), "geometry", there=True, here=False))
     'speed at leg 0 passes by geometry and fails in flight'
@@ -168,7 +168,7 @@ def disagreement_text(one: Disagreement) -> str:
 
 
 def deciding_text(deciding: DecidingParameter) -> str:
-    """Which parameter decides, what its value does, and which would pass.
+    """Return which parameter decides, the effect of its value, and the value that would pass.
 
     >>> deciding_text(DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.2))
     'TECS_HDEM_TCONST 3 puts it 8 m low on leg 4; 1.2 would pass'
@@ -183,9 +183,9 @@ def deciding_text(deciding: DecidingParameter) -> str:
 
 
 def gentle_launch_text(found: float, trigger: tuple[float, str]) -> str:
-    """That a launch pushes too little to start the motor.
+    """Return the statement that a launch accelerates too little to start the motor.
 
-    found: m/s^2.  trigger: m/s^2 that starts it, and the parameter that says so.
+    found: m/s^2.  trigger: m/s^2 that starts the motor, and the parameter with that value.
 
     >>> gentle_launch_text(8.33, (15.0, "TKOFF_THR_MINACC"))
     'the launch accelerates at 8.3 m/s², less than TKOFF_THR_MINACC 15'
@@ -194,16 +194,16 @@ def gentle_launch_text(found: float, trigger: tuple[float, str]) -> str:
 
 
 def shortened(text: str) -> str:
-    """A statement cut to the length that a headline takes.
+    """Return a statement cut to the greatest length in a headline.
 
     >>> shortened("bank 80° at 3.0 s"), len(shortened("m" * 200))
     ('bank 80° at 3.0 s', 80)
     """
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+    return text if len(text) <= _MAX_STATEMENT_LENGTH else text[: _MAX_STATEMENT_LENGTH - 3] + "..."
 
 
 def quantity_text(value: float, unit: str) -> str:
-    """A value with its unit, to three figures and without a power of ten: a tank of fuel holds 1140000 Wh.
+    """Return a value with its unit, to three figures and without a power of ten: a tank holds 1140000 Wh.
 
     >>> quantity_text(11.87, "deg"), quantity_text(1_140_000.0, "Wh")
     ('11.9°', '1140000 Wh')

@@ -1,1 +1,1 @@
-"""Judging an imported flight, and comparing it with the model."""
+"""Judgement of an imported flight, and its comparison with the model."""

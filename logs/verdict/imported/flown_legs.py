@@ -1,4 +1,4 @@
-"""Which legs of a route each stretch of a flight was flown on: an imported log may hold a part of them, or none."""
+"""Find the legs of a route that each stretch of a flight flew; an imported log may hold only some."""
 
 from dataclasses import dataclass, replace
 
@@ -25,12 +25,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class FlownLegs:
-    """The legs of one stretch.
+    """Legs of one stretch.
 
-    stretch: when, and how it ended.
-    first, last: waypoints that were flown between.
-    partial: whether the last of them was not reached.
-    requirements, aligned: of the route between them alone, and the rows flown on it.
+    stretch: its times, and how it ended.
+    first, last: waypoints between which it was flown.
+    partial: True if the last of them was not reached.
+    requirements, aligned: for the route between them alone, and the rows flown on it.
     """
 
     stretch: MissionStretch
@@ -42,10 +42,11 @@ class FlownLegs:
 
 
 def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> FlownLegs | None:
-    """Find the legs of a stretch; None where it met no waypoint but at most one, or has fewer than two rows.
+    """Find the legs of a stretch, or None if there are none.
 
-    A flight begins with the first waypoint that it passed: what was flown to get there is no leg.  It ends with the
-    last that it passed, or on the leg from there, which was then flown in part.
+    There are none if it reached at most one waypoint, or has fewer than two rows.  A flight begins with the first
+    waypoint that it passed: the path to that waypoint is no leg.  It ends with the last waypoint that it passed, or on
+    the leg from there, which was then flown in part.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -69,7 +70,7 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
     until = last + 1 if partial else last
     if until <= first:
         return None
-    # Rows before the first waypoint are of no leg, and rows after the route's end are none of it.
+    # Rows before the first waypoint, and rows after the route's end, belong to no leg.
     stop = None if partial or last < ended else int(aligned.rows[last]) + 2
     flown = aligned.track.rows(int(aligned.rows[first]), stop if stop is not None else len(aligned.track))
     part = route_requirements(replace(setup, route=part_of_route(setup.route, first, until)))
@@ -81,13 +82,13 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
 
 
 def gaps_between(legs: FlownLegs, start: float, end: float) -> list[Gap]:
-    """Pauses of the log between two times, s."""
+    """Return the pauses of the log between two times, s."""
     source = legs.requirements.setup.source
     return [] if source is None else [gap for gap in source.gaps if gap.start < end and gap.end > start]
 
 
 def stretch_end_text(stretch: MissionStretch) -> str:
-    """How a stretch ended, in words."""
+    """Return how a stretch ended, in words."""
     if stretch.ended == "mode":
         return f"{stretch.mode} was left for {stretch.next_mode} at {stretch.end:.1f} s"
     if stretch.ended == "landed":
@@ -98,9 +99,9 @@ def stretch_end_text(stretch: MissionStretch) -> str:
 def _earliest_lap(
     setup: FlightSetup, rows: Track, aligned: AlignedTrack, met: NDArray[np.intp]
 ) -> tuple[AlignedTrack, NDArray[np.intp]]:
-    """Rows laid beside the first laps of a route that comes by the same items again, if they do for the flight.
+    """Align rows with the first laps of a route that repeats its items, if those laps explain the flight.
 
-    One that ended on the way was as near to the waypoints of any later lap.
+    A flight that ended within a lap was as near to the waypoints of any later lap.
     """
     items, last = setup.route.items, int(met[-1])
     if len(met) == last - met[0] + 1:
@@ -111,20 +112,23 @@ def _earliest_lap(
         requirements = route_requirements(replace(setup, route=part_of_route(setup.route, 0, end)))
         laid = align_track(requirements, rows)
         found = met if laid is None else met_waypoints(requirements, laid)
-        # Each item once: a place that was passed once is near to its waypoints of all laps.
+        # Include each item once: a place that was passed once is near its waypoints in all laps.
         if laid is not None and len(np.unique(items[found])) >= len(np.unique(items[met])):
             return laid, found
     return aligned, met
 
 
 def between(track: Track, start: float, end: float) -> Track:
-    """Rows of a track from one time to another, s."""
+    """Return the rows of a track from one time to another, s."""
     low, high = np.searchsorted(track.time, [start, end + 1e-6])
     return track.rows(int(low), int(high))
 
 
 def met_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDArray[np.intp]:
-    """Waypoints that a flight passed near enough to be told by, in order; one that it began or ended beside is not."""
+    """Return the waypoints that the track passes closely enough to identify, in order.
+
+    Waypoints at the very start or end of the track are not included.
+    """
     edge = np.maximum(requirements.fly_by_offset + ARRIVED, requirements.setup.corridor)
     inside = (aligned.rows > 0) & (aligned.rows < len(aligned.track) - 1)
     near = np.where(inside, aligned.distance < CAPTURE_RADIUS, aligned.distance <= edge)
@@ -132,19 +136,19 @@ def met_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDA
 
 
 # ----------------------------------------------------------------------
-# Is this the plan that was flown at all?  One line that says why not, in place of a fault for every leg of it.
+# Check that the flight followed this plan at all: one line that gives the reason, instead of a fault for every leg.
 
-# Waypoints that are named in the order they were passed.
-_NAMED = 6
+# Number of waypoints that are named in the order in which they were passed.
+_MAX_NAMED = 6
 
 
 @dataclass(frozen=True, slots=True)
 class PlanMismatch:
-    """Why a flight was not flown by a plan.
+    """Reason why a flight did not follow a plan.
 
-    kind: "place" where it came near none of the plan's waypoints, "order" where it passed them in another order.
+    kind: "place" if it came near none of the plan's waypoints, "order" if it passed them in another order.
     distance: m, to the nearest waypoint, for "place".
-    order: items of the waypoints as they were passed, the first of them, for "order".
+    order: items of the first waypoints in the order in which they were passed, for "order".
     """
 
     kind: str
@@ -153,7 +157,7 @@ class PlanMismatch:
 
     @property
     def text(self) -> str:
-        """In words."""
+        """Reason in words."""
         if self.kind == "place":
             far = f"{self.distance / 1000.0:.1f} km" if self.distance >= 1000.0 else f"{self.distance:.0f} m"
             return f"another place: the flight comes no nearer than {far} to any of its waypoints"
@@ -161,7 +165,7 @@ class PlanMismatch:
 
 
 def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
-    """Whether the stretches of a flight that followed a mission followed another one than the setup's; None if not.
+    """Return why the mission stretches of a flight followed another mission than the setup's, or None.
 
     >>> from dataclasses import replace
     >>> from flight.simulation.setup import ImportedLog, MissionStretch
@@ -194,17 +198,17 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
         if aligned is not None:
             low = np.maximum(0, aligned.rows - 1)
             off = np.hypot(*(aligned.track.position[aligned.rows, :2] - points[:, :2]).T)
-            # The row that is nearest may be half a step from the waypoint.
+            # The nearest row may be half a step from the waypoint.
             step = np.hypot(*(aligned.track.position[aligned.rows, :2] - aligned.track.position[low, :2]).T)
             in_order |= off <= near + step
     if (in_order & passed).sum() >= IN_ORDER * passed.sum():
         return None
     order = [int(k) for k in np.argsort(when, kind="stable") if passed[k]]
-    return PlanMismatch("order", order=tuple(int(setup.route.items[k]) for k in order[:_NAMED]))
+    return PlanMismatch("order", order=tuple(int(setup.route.items[k]) for k in order[:_MAX_NAMED]))
 
 
 def _closest(points: Floats, flown: list[Track]) -> tuple[Floats, Floats]:
-    """Least horizontal distance of each waypoint (w,) from the flight, m, and when that was, s."""
+    """Return the least horizontal distance of each waypoint (w,) from the flight, m, and its time, s."""
     nearest, when = np.full(len(points), np.inf), np.zeros(len(points))
     for rows in flown:
         for k, point in enumerate(points):

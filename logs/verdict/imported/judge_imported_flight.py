@@ -1,7 +1,7 @@
-"""Judging an imported flight: the stretches that followed the mission, by the same rules, as far as its log goes.
+"""Judge an imported flight: its stretches that followed the mission, as far as its log permits.
 
-A log may lack what a rule needs, have pauses, and end before the flight does.  What cannot be known from it is not
-judged and says why; what it shows to be wrong is wrong all the same.
+The rules are the same as for planfly's own flights.  A log may lack what a rule needs, have pauses, and end before the
+flight does.  What it cannot show is not judged, with the reason; a violation that it shows is a violation all the same.
 """
 
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ from logs.verdict.tolerances import LONGEST_UNSEEN
 from logs.verdict.verdict import Verdict
 
 # ----------------------------------------------------------------------
-# The lines of a verdict on an imported flight: the answer, what was judged and what not, and what the log is.
+# The lines of a verdict on an imported flight: the answer, what was judged and what was not, and facts about the log.
 
 _DATUM_TEXTS: dict[VerticalDatum, str] = {
     "amsl": "above mean sea level, as the log has it",
@@ -41,8 +41,8 @@ _DATUM_TEXTS: dict[VerticalDatum, str] = {
     "pressure": "by pressure, above the level of 1013.25 hPa",
     "unstated": "above what the log does not say",
 }
-# Jumps of the clock whose times are listed.
-_LISTED = 4
+# Largest number of clock jumps whose times are listed.
+_MAX_LISTED_JUMPS = 4
 
 
 def imported_lines(
@@ -52,7 +52,7 @@ def imported_lines(
     flown: Sequence[FlownLegs],
     conditions: Conditions,
 ) -> tuple[str, ...]:
-    """Lines of the summary, the headline first."""
+    """Return the lines of the summary, the headline first."""
     source = setup.source
     if source is None:
         return (own.headline,)
@@ -78,7 +78,7 @@ def imported_lines(
 def _judged_lines(source: ImportedLog, flown: Sequence[FlownLegs], numbers: Sequence[int]) -> list[str]:
     """Return a line for each stretch that is judged, with its time and the numbers of its legs.
 
-    numbers: of each leg of the route, as `flight.mission.route.Route.leg_numbers`.
+    numbers: number of each leg of the route, as in `flight.mission.route.Route.leg_numbers`.
     """
     if not source.stretches:
         return ["Judged: nothing, for no stretch followed the mission"]
@@ -99,7 +99,7 @@ def _judged_lines(source: ImportedLog, flown: Sequence[FlownLegs], numbers: Sequ
 
 
 def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
-    """Which rules were not judged, and why, one line each; on which legs, where others were."""
+    """Return a line for each rule that was not judged, with the reason and, if partial, the numbers."""
     lines = []
     for rule in RULE_WORDS.values():
         mine = [item for item in findings if item.rule == rule.name]
@@ -112,7 +112,7 @@ def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
 
 
 def heights_text(source: ImportedLog) -> str:
-    """Which height was taken, its datum, and how far off the others were at the start.
+    """Return which height was used, its datum, and how far off the others were at the start.
 
     >>> from flight.simulation.setup import HeightOffset, Heights
     >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
@@ -124,7 +124,7 @@ def heights_text(source: ImportedLog) -> str:
 
 
 def rows_text(faults: RowFaults, gaps: int) -> str:
-    """What was wrong with a log's rows, in words.
+    """Return the faults of a log's rows, in words.
 
     >>> rows_text(RowFaults(doubled=2, clock_jumps=(12.5,)), 1)
     '1 gap, 2 doubled, 1 jump of the clock (at 12.5 s)'
@@ -141,17 +141,17 @@ def rows_text(faults: RowFaults, gaps: int) -> str:
     words = [f"{count} {name}" for count, name in counted if count]
     if faults.clock_jumps:
         count = len(faults.clock_jumps)
-        times = ", ".join(f"{time:.1f} s" for time in faults.clock_jumps[:_LISTED])
+        times = ", ".join(f"{time:.1f} s" for time in faults.clock_jumps[:_MAX_LISTED_JUMPS])
         words.append(f"{count} {'jump' if count == 1 else 'jumps'} of the clock (at {times})")
     return ", ".join(words) or "in order, without gaps"
 
 
-# Runs of items that a line lists.
-_RUNS = 6
+# Largest number of runs of items that a line lists.
+_MAX_RUNS = 6
 
 
 def missing_text(missing: MissingItems) -> str:
-    """Which part of a mission is not judged, and which of its items are not in the log, in words.
+    """Return which part of a mission is not judged, and which of its items the log lacks, in words.
 
     >>> missing_text(MissingItems(tuple(range(7, 14)), total=14, first=1, last=6, end=13))
     'not judged beyond item 6: items 7 to 13 of 14 are not in the log or left out'
@@ -166,9 +166,9 @@ def missing_text(missing: MissingItems) -> str:
             runs[-1] = [runs[-1][0], number]
         else:
             runs.append([number])
-    words = [" to ".join(map(str, run)) for run in runs[:_RUNS]]
-    if len(runs) > _RUNS:
-        words.append(f"{len(missing.numbers) - sum(run[-1] - run[0] + 1 for run in runs[:_RUNS])} more")
+    words = [" to ".join(map(str, run)) for run in runs[:_MAX_RUNS]]
+    if len(runs) > _MAX_RUNS:
+        words.append(f"{len(missing.numbers) - sum(run[-1] - run[0] + 1 for run in runs[:_MAX_RUNS])} more")
     listed = " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
     before = f"before item {missing.first}" if missing.first > 1 else ""
     beyond = f"beyond item {missing.last}" if missing.last and missing.beyond else ""
@@ -180,7 +180,7 @@ def missing_text(missing: MissingItems) -> str:
 
 
 def damage_text(damage: Damage) -> str:
-    """What of a file could not be read, in words.
+    """Return which parts of a file could not be read, in words.
 
     >>> damage_text(Damage(places=2, size=40, cut=True))
     '2 places in the file (40 bytes) cannot be read; it ends within a message'
@@ -202,8 +202,8 @@ def _when(source: ImportedLog) -> str:
     return f", its time 0 is {datetime.fromtimestamp(source.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
-# What each quantity is called where a log lacks it.
-_CALLED: dict[Quantity, str] = {
+# Name of each quantity in a message about a log without it.
+_LABELS: dict[Quantity, str] = {
     "heights": "height",
     "airspeed": "airspeed",
     "attitude": "attitude",
@@ -212,7 +212,7 @@ _CALLED: dict[Quantity, str] = {
     "throttle": "throttle",
     "velocity": "velocity",
 }
-# Columns of the track that hold a quantity.
+# Track columns of quantities.
 _COLUMNS: dict[Quantity, str] = {"airspeed": "airspeed", "attitude": "attitude", "battery": "energy"}
 _DATUMS = {
     "ellipsoid": "the log's heights are above the ellipsoid, the plan's above mean sea level",
@@ -225,17 +225,19 @@ _UNNAMED = "the aircraft is not named (--aircraft)"
 def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: bool) -> Verdict:
     """Judge the stretches of a flight that followed its mission: level "flown".
 
-    setup: with the source of the flight.  log_complete: planfly's own log of it has its end.
+    setup: with the source of the flight.  log_complete: True if planfly's own log of it has its end.
     """
     source = setup.source
     if source is None:
         raise ValueError("a flight without a source was not imported")
     flown = [legs for stretch in source.stretches if (legs := flown_legs(setup, track, stretch)) is not None]
-    findings = _merged([_of_stretch(setup, legs) for legs in flown])
+    findings = _merge_findings([_stretch_findings(setup, legs) for legs in flown])
     ends = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
     findings = (*findings, *(judge(setup, flown, log_complete) for judge in ends))
     failed = any(item.ok is False for item in findings)
-    unjudged = "; ".join(filter(None, [_not_in_log(findings, source.missing), _unseen(flown), _not_known(findings)]))
+    unjudged = "; ".join(
+        filter(None, [_missing_part_text(findings, source.missing), _unseen_text(flown), _uncertainty_text(findings)])
+    )
     flyable = bool(flown) and not failed and not unjudged
     complete = not unjudged and all(item.ok is True for item in findings if item.rule == "completion")
     answer = [headline(findings, flyable).replace("flyable", "flown as planned", 1)] if failed or not unjudged else []
@@ -259,16 +261,16 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     )
 
 
-def _not_in_log(findings: Sequence[Finding], missing: MissingItems | None) -> str:
-    """Which part of the mission is not in the log, be it items or flight, in words; "" for none."""
+def _missing_part_text(findings: Sequence[Finding], missing: MissingItems | None) -> str:
+    """Return which part of the mission, items or flight, is not in the log, in words; "" for none."""
     if missing is not None:
         return missing_text(missing)
     parts = [item.reason for item in findings if item.rule == "completion" and item.ok is None]
     return f"not judged from end to end: {parts[0]}" if parts else ""
 
 
-def _unseen(flown: Sequence[FlownLegs]) -> str:
-    """When the log pauses for so long that nobody knows where the aircraft was, in words; "" for never."""
+def _unseen_text(flown: Sequence[FlownLegs]) -> str:
+    """Return when the log pauses for too long to know where the aircraft was, in words; "" for never."""
     long = []
     for legs in flown:
         time = legs.aligned.track.time
@@ -281,49 +283,49 @@ def _unseen(flown: Sequence[FlownLegs]) -> str:
 
 
 def _judged_times(legs: FlownLegs) -> tuple[float, float]:
-    """From when to when a stretch was flown on its legs, s."""
+    """Return start and end of a stretch's flight on its legs, s."""
     time = legs.aligned.track.time
     return float(time[0]), float(time[-1])
 
 
-def _not_known(findings: Sequence[Finding]) -> str:
-    """What the aircraft is not known well enough for, in words; "" for nothing."""
+def _uncertainty_text(findings: Sequence[Finding]) -> str:
+    """Return what is undecided because of uncertainty about the aircraft, in words; "" for nothing."""
     text = undecided_text(findings)
     return f"not judged in full: {text}" if text else ""
 
 
-def _of_stretch(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
-    """Findings of one stretch, at the places of the whole route."""
+def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
+    """Return the findings of one stretch, at the places of the whole route."""
     out = []
     for item in track_findings(legs.requirements, legs.aligned):
-        judged = _within_gaps(_as_far_as_held(setup, legs, item), legs)
+        judged = _within_gaps(_without_missing_data(setup, legs, item), legs)
         if legs.partial:
-            judged = _in_part(judged, legs)
-        out.append(_shifted(judged, legs.first, setup))
-    return [*out, *_lacking(setup, {item.rule for item in out})]
+            judged = _partly_flown(judged, legs)
+        out.append(_at_route_place(judged, legs.first, setup))
+    return [*out, *_findings_without_data(setup, {item.rule for item in out})]
 
 
-def _lacking(setup: FlightSetup, found: set[str]) -> list[Finding]:
-    """Rules that found nothing because the log lacks what they need, of those that are listed all the same."""
+def _findings_without_data(setup: FlightSetup, found: set[str]) -> list[Finding]:
+    """Return findings for listed rules that found nothing because the log lacks what they need."""
     out = []
     for rule in RULES.values():
         lacking = [one for one in rule.log.quantities if setup.source is not None and one not in setup.source.holds]
         margin = RULE_WORDS[rule.name].margin
         if rule.log.listed and margin is not None and lacking and rule.name not in found:
-            why = f"the log holds no {_CALLED[lacking[0]]}"
+            why = f"the log holds no {_LABELS[lacking[0]]}"
             out.append(make_finding(rule.name, FLIGHT, ok=None, reason=why, source="aircraft", unit=margin.unit))
     return out
 
 
-def _as_far_as_held(setup: FlightSetup, legs: FlownLegs, item: Finding) -> Finding:
-    """A finding, or that the log does not hold what it needs."""
+def _without_missing_data(setup: FlightSetup, legs: FlownLegs, item: Finding) -> Finding:
+    """Return a finding, or mark it as not judged if the log lacks what it needs."""
     source = setup.source
     if source is None:
         return item
     reason, needs = "", RULES[item.rule].log
     for quantity in needs.quantities:
         if quantity not in source.holds:
-            reason = f"the log holds no {_CALLED[quantity]}"
+            reason = f"the log holds no {_LABELS[quantity]}"
             break
         if quantity == "heights":
             stated = source.plan_heights or not needs.planned_heights
@@ -340,24 +342,24 @@ def _as_far_as_held(setup: FlightSetup, legs: FlownLegs, item: Finding) -> Findi
 
 
 def _missing(legs: FlownLegs, quantity: Quantity) -> str:
-    """When a stretch has no values of a quantity that the log holds elsewhere, in words; "" where it has them all."""
+    """Return when a stretch lacks values of a quantity that the log has elsewhere, in words; "" for never."""
     values = getattr(legs.aligned.track, _COLUMNS[quantity])
     bad = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
     if not bad.any():
         return ""
     time = legs.aligned.track.time[bad]
-    return f"the log holds no {_CALLED[quantity]} at {int(bad.sum())} rows from {time[0]:.1f} s to {time[-1]:.1f} s"
+    return f"the log holds no {_LABELS[quantity]} at {int(bad.sum())} rows from {time[0]:.1f} s to {time[-1]:.1f} s"
 
 
 def _unjudged(item: Finding, why: str, *, measured: bool = False) -> Finding:
-    """A finding that says why it is none; measured: what was measured stays beside it."""
+    """Return a finding marked as not judged, with the reason; measured: keep what was measured."""
     reason = f"{why}; {item.reason}" if measured else why
     facts = item.facts if measured else ()
     return replace(item, ok=None, reason=reason, brief=why, placed=False, margin=None, facts=facts, suggestions=())
 
 
 def _within_gaps(item: Finding, legs: FlownLegs) -> Finding:
-    """A finding that passed says nothing of a pause in its leg."""
+    """Mark a passed finding as not judged if the log has a pause in its leg."""
     if item.ok is not True or item.place.index is None or item.place.kind not in ("leg", "waypoint"):
         return item
     track, rows = legs.aligned.track, legs.aligned.rows
@@ -371,8 +373,8 @@ def _within_gaps(item: Finding, legs: FlownLegs) -> Finding:
     return item
 
 
-def _in_part(item: Finding, legs: FlownLegs) -> Finding:
-    """The last waypoint was not reached: it is not judged, and what of the leg before it passed is its first part."""
+def _partly_flown(item: Finding, legs: FlownLegs) -> Finding:
+    """Mark the unreached last waypoint as not judged, and findings on the leg before it as partial."""
     leg, waypoint = legs.requirements.legs - 1, legs.requirements.legs
     unreached = item.place.kind == "waypoint" and item.place.index == waypoint
     of_leg = item.place.kind == "leg" and item.place.index == leg
@@ -383,8 +385,8 @@ def _in_part(item: Finding, legs: FlownLegs) -> Finding:
     return item
 
 
-def _shifted(item: Finding, first: int, setup: FlightSetup) -> Finding:
-    """A finding at its place on the whole route."""
+def _at_route_place(item: Finding, first: int, setup: FlightSetup) -> Finding:
+    """Return a finding at its place on the whole route."""
     place = item.place
     if not first or place.index is None or place.kind not in ("leg", "waypoint"):
         return item
@@ -392,32 +394,32 @@ def _shifted(item: Finding, first: int, setup: FlightSetup) -> Finding:
     return replace(item, place=replace(place, index=index))
 
 
-def _merged(stretches: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
-    """Findings of all stretches, one a rule, place and check: what failed counts before what passed."""
+def _merge_findings(stretches: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
+    """Merge the findings of all stretches: one per rule, place and check, a failure before a pass."""
     found: dict[tuple[str, Place, str], Finding] = {}
     for findings in stretches:
         for item in findings:
             key = (item.rule, item.place, item.check)
             known = found.get(key)
-            if known is None or _weight(item) > _weight(known):
+            if known is None or _precedence(item) > _precedence(known):
                 found[key] = item
     rules = list(dict.fromkeys(item.rule for item in found.values()))
     return tuple(item for rule in rules for item in found.values() if item.rule == rule)
 
 
-def _weight(item: Finding) -> int:
+def _precedence(item: Finding) -> int:
     return {False: 2, True: 1, None: 0}[item.ok]
 
 
 def _leg_ends(setup: FlightSetup, flown: Sequence[FlownLegs]) -> tuple[float, ...]:
-    """When each leg but the last ended, s, inf from the first that no stretch came to; rising."""
+    """Return the end of each leg but the last, s, inf from the first leg that no stretch reached; rising."""
     ends = np.full(len(setup.route.waypoints), np.inf)
     for legs in flown:
         times = legs.aligned.track.time[legs.aligned.rows]
         passed = legs.last if legs.partial else legs.last + 1
         ends[legs.first : passed] = np.minimum(ends[legs.first : passed], times[: passed - legs.first])
     if flown:
-        # Waypoints before the first that was met were behind the aircraft by then.
+        # The aircraft was past all waypoints before the first one that was met.
         ends[: flown[0].first] = ends[flown[0].first]
     rising = np.maximum.accumulate(ends)
     return tuple(rising[1:-1].tolist())

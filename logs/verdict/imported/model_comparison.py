@@ -1,4 +1,4 @@
-"""An imported flight and the model's flight of the same mission, side by side: leg by leg, turn by turn."""
+"""Compare an imported flight with the model's flight of the same mission: leg by leg, turn by turn."""
 
 import math
 from collections.abc import Sequence
@@ -17,16 +17,16 @@ from world.errors import LogError
 
 Floats = NDArray[np.float64]
 
-# m.  Spacing along a leg of the places at which the flights are compared.
+# Spacing along a leg of the places at which the flights are compared, m.
 STEP = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """A flight along its route, at n places; NaN where it was not.
+    """Flight along its route, at n places; NaN where it was not flown.
 
     cross_track, height_error: m, right of and above the legs.  ground_speed: m/s.  bank: rad.
-    energy: Wh used since the first of them.
+    energy: Wh used since the first place.
     """
 
     cross_track: Floats
@@ -38,9 +38,9 @@ class Profile:
 
 @dataclass(frozen=True, slots=True)
 class LegPair:
-    """One leg as flown and as simulated, each a pair of numbers; NaN where one has none.
+    """One leg as flown and as simulated, each a pair of numbers; NaN if a flight has none.
 
-    leg: of the whole route.  cross_track, height_error: m, the farthest from the leg, signed.
+    leg: index in the whole route.  cross_track, height_error: m, the farthest from the leg, signed.
     ground_speed: m/s, mean.  bank: deg, the largest.  energy: Wh.
     """
 
@@ -56,7 +56,7 @@ class LegPair:
 class TurnPair:
     """One turn as flown and as simulated.
 
-    waypoint: of the whole route.  turn: deg.  overshoot: m.  bank: deg, the largest.  passed: m, nearest to it.
+    waypoint: index in the whole route.  turn: deg.  overshoot: m.  bank: deg, the largest.  passed: m, nearest to it.
     """
 
     waypoint: int
@@ -68,7 +68,7 @@ class TurnPair:
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """How far apart the flights are in one quantity: median and 95 % of the differences' sizes, in ``unit``."""
+    """Difference between the flights in one quantity: median and 95th percentile of its size, in ``unit``."""
 
     name: str
     unit: str
@@ -78,15 +78,15 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Reflight:
-    """Both flights.
+    """Imported flight and simulated flight side by side.
 
-    stretch: of the imported flight that is compared.
-    setup: of the simulated one.  simulated: its rows.  ended: how it ended.
+    stretch: the part of the imported flight that is compared.
+    setup: of the simulated flight.  simulated: its rows.  ended: how it ended.
     distance: (n,) m along the route's legs at which they are compared.
     ends: (legs,) m along the route at which each leg ends.
     flown, model: profiles.
     first: number of the first leg in the whole route.
-    stands_in: the aircraft of the log is not known, and another's model flew.
+    stands_in: True if the log's aircraft is unknown, and another aircraft's model flew.
     """
 
     stretch: MissionStretch
@@ -107,9 +107,9 @@ class Reflight:
 def compare_with_model(
     setup: FlightSetup, flown: FlownLegs, simulated: Track, ended: str, *, stands_in: bool = False
 ) -> Reflight:
-    """Hold a model's flight of a route against the imported flight on it.
+    """Compare a model's flight of a route with the imported flight on it.
 
-    setup: of the model's flight.  Raises LogError where the model's flight has too few rows.
+    setup: of the model's flight.  Raises LogError if the model's flight has too few rows.
 
     >>> from flight.simulation.setup import MissionStretch
     >>> from logs.recording.example_log import example_log
@@ -165,7 +165,7 @@ def _profile(requirements: RouteRequirements, aligned: AlignedTrack, places: Seq
             continue
         rows = aligned.leg_rows(leg)
         along, across = along_across(requirements, leg, track.position[rows])
-        # Where a flight goes back, as on a circle, the first time counts.
+        # If a flight goes back, as on a loiter, the first pass applies.
         forward = np.concatenate([[True], along[1:] > np.maximum.accumulate(along)[:-1]])
         line = requirements.points[leg, 2] + along * math.tan(requirements.slopes[leg])
         off = track.position[rows, 2] - line

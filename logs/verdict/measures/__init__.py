@@ -1,1 +1,1 @@
-"""What rules measure with: route requirements, the track laid along its path, turns and slopes."""
+"""Measurements for rules: route requirements, the track aligned with its route, turns and slopes."""

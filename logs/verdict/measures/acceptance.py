@@ -1,4 +1,4 @@
-"""How near to a waypoint counts as having reached it, and how far from the legs a flight may go."""
+"""Judge when a waypoint is reached, and how far from the legs a flight may go."""
 
 import math
 from dataclasses import dataclass, replace
@@ -33,12 +33,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """What counts as having reached a waypoint.
+    """Condition for having reached a waypoint.
 
     radius: m.
-    source: "mission" for a stated acceptance radius, "autopilot" for that of the autopilot, "fly-over", or "fly-by
-    path" for how near the path itself passes.
-    tolerance: by how much the radius may be missed, m: navigation's error, and what gusts move an aircraft.
+    source: "mission" for a stated acceptance radius, "autopilot" for the autopilot's acceptance radius, "fly-over", or
+        "fly-by path" for the distance at which the path itself passes.
+    tolerance: distance by which the radius may be missed, m: navigation error, and displacement by gusts.
     """
 
     radius: float
@@ -47,10 +47,11 @@ class Reach:
 
 
 def reach(requirements: RouteRequirements, i: int) -> Reach:
-    """What counts as having reached waypoint i: the mission's own radius, else that of whoever flies.
+    """Return the condition for having reached waypoint i.
 
-    ArduPlane turns to the next leg at WP_RADIUS from a right angle or a sharper corner and at a share of it from a
-    gentler one, and at the mission's end, and where a return to launch begins, at all of it.
+    The mission's own radius applies, otherwise the autopilot's radius.  ArduPlane turns to the next leg at WP_RADIUS
+    for a right angle or a sharper corner and at a fraction of it for a gentler corner.  At the mission's end, and where
+    a return to launch begins, it uses all of WP_RADIUS.
     """
     setup, own = requirements.setup, float(requirements.fly_by_offset[i]) + PASS
     stated = float(setup.route.acceptance[i])
@@ -65,12 +66,12 @@ def reach(requirements: RouteRequirements, i: int) -> Reach:
 
 
 def position_error(setup: FlightSetup) -> float:
-    """How far (m) the aircraft may be from where its autopilot takes it to be: three standard deviations of an axis."""
+    """Return the distance (m) by which the navigation may be off: three sigmas of one axis."""
     return NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
 
 
 def corner_depths(requirements: RouteRequirements) -> Floats:
-    """How far from the legs the turn at each waypoint leads by itself, (w,) m.
+    """Return the distance from the legs to which the turn at each waypoint leads by itself, (w,) m.
 
     A fly-by arc passes R (1 - cos(turn / 2)) inside the legs.  A fly-over waypoint is passed on the course of the leg
     before it, and the arc from there swings R (1 - cos(turn)) beyond the next leg.
@@ -81,11 +82,11 @@ def corner_depths(requirements: RouteRequirements) -> Floats:
 
 
 def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
-    """Half width of the corridor along a leg, m, and whose it is.
+    """Return the half width of the corridor along a leg, m, and the source of that width.
 
-    A corridor that the scenario does not state is wide enough for the turns at the leg's ends, as they are planned; and
-    at a loiter for all of its circle and a turn back beside it, where whoever flies joins and leaves that about its
-    middle.
+    A corridor that the scenario does not state is wide enough for the planned turns at the leg's ends.  At a loiter
+    that the autopilot joins and leaves by its center, the corridor includes the whole loiter and a turn back next to
+    it.
     """
     half = requirements.setup.corridor
     if requirements.setup.scenario.limits.corridor_m is not None:
@@ -95,7 +96,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
     source = requirements.setup.source
     radius_is_known = source is None or source.aircraft_known
     if radius_is_known and not requirements.setup.autopilot.follows_path:
-        # The autopilot may turn as late as at the waypoint.  Without a named aircraft the turn radius is a guess.
+        # The autopilot may turn as late as at the waypoint.  Without a named aircraft the turn radius is an estimate.
         radius = np.where(requirements.setup.route.arcs[ends] == 0.0, requirements.radius[ends], 0.0)
         swings = np.where(np.isfinite(radius), radius, 0.0) * (1.0 - np.cos(requirements.turns[ends]))
         depths = np.maximum(depths, FLY_OVER_SWING_RATIO * swings)
@@ -103,7 +104,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
     if requirements.setup.autopilot.loiter_rules.at_middle:
         arcs, tightest = requirements.setup.route.arcs[ends], requirements.tightest[ends]
         back = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
-        # A circle too tight for the bank leads as far as the bank limit makes it swing, whatever its radius.
+        # A loiter too tight for the bank is as wide as the bank limit makes the aircraft swing, whatever its radius.
         wide = float(arcs.max())
         across = wide + (SWING * back if wide < back else wide + back) + PASS
         if arcs.any() and across > max(turning, half):
@@ -114,7 +115,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
 
 
 def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
-    """The greatest horizontal distance of some points from the nearest of some legs, m, and the row of that point.
+    """Return the greatest horizontal distance of points from their nearest leg, m, and that point's row.
 
     points: (n, 3).  legs: (k + 1, 3), the ends of k legs in a row.
 
@@ -133,17 +134,16 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 
 
 # ----------------------------------------------------------------------
-# Corners and steps that no aircraft has to fly as they are drawn, because the way without them is as good as the same.
+# Corners and steps that no aircraft has to fly as drawn, because a path without them is practically the same.
 #
-# A sidestep of a few metres has two right angles and no room for either; the straight way past it is within metres of
+# A sidestep of a few metres has two right angles and no room for either; the straight path past it is within metres of
 # both.  A step of a few metres in a level path is a cliff; a climb that begins a little early is within its height.
 
 
 def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
-    """How near (m) a flyable way passes a corner that is none itself; None where there is no such way.
+    """Return how near (m) a flyable path without the corner passes the waypoint, or None without one.
 
-    The way leaves out the waypoint and up to `KINK_WAYPOINTS` - 1 of its neighbours, passes each of them within
-    `KINK_SHARE` of the corridor, and has room for the turns at its own ends.
+    The path leaves out the waypoint and up to `KINK_WAYPOINTS` - 1 of its neighbours, passes each of them within
     """
     most, circles = KINK_SHARE * requirements.setup.corridor, requirements.setup.route.arcs > 0.0
     for count in range(1, KINK_WAYPOINTS + 1):
@@ -158,10 +158,10 @@ def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
 
 
 def _has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
-    """Whether the route without the waypoints first..last has room for the turns where it leaves them out."""
-    # Two waypoints beyond the ends of the gap: what their turns take of the legs counts.
+    """Return True if the route without the waypoints first..last has room for the turns at the gap."""
+    # Include two waypoints beyond the ends of the gap: their turns use part of the legs.
     start, stop = max(0, first - 4), min(len(requirements.points), last + 5)
-    near = _part(requirements.setup.route, np.r_[start:first, last + 1 : stop])
+    near = _reduced_route(requirements.setup.route, np.r_[start:first, last + 1 : stop])
     made = turn_requirements(near, performance_tables(near, requirements.limits))
     for new, old in ((first - 1 - start, first - 1), (first - start, last + 1)):
         if not 0 < old < requirements.legs:
@@ -172,16 +172,20 @@ def _has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
     return True
 
 
-def _part(route: Route, kept: NDArray[np.int64]) -> Route:
-    """A route of some of its waypoints, each leg at the speed of the old one that begins where it does."""
+def _reduced_route(route: Route, kept: NDArray[np.int64]) -> Route:
+    """Return the route reduced to some waypoints.
+
+    Each leg has the speed of the old leg that begins at the same waypoint.
+    """
     names = ("waypoints", "acceptance", "fly_over", "items", "arcs", "above_ground")
     return replace(route, airspeed=route.airspeed[kept[:-1]], **{name: getattr(route, name)[kept] for name in names})
 
 
 def step(requirements: RouteRequirements, leg: int) -> float | None:
-    """Height (m, positive) of the step that a leg beyond its slope limit is part of; None for one higher than `STEP`.
+    """Return the height (m, positive) of the step that a leg is part of, or None above `STEP`.
 
-    All that is too steep on the whole, with this leg in it, is one step: a staircase is as high as its stairs together.
+    The leg is beyond its slope limit.  A sequence of legs that is too steep overall, including this leg, is one step:
+    the height of a staircase is the total height of its stairs.
     """
     limit, _ = slope_limit(requirements, leg)
     sign = 1.0 if requirements.slopes[leg] >= 0.0 else -1.0

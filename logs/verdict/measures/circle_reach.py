@@ -1,8 +1,8 @@
-"""What lies within reach of a circle that is flown wider than it is drawn.
+"""Find hazards within reach of a loiter that is flown wider than drawn.
 
-An autopilot that flies at a circle's middle and around it as wide as it can is, on a circle too tight for its bank,
-anywhere within `SWING` radii of the bank limit from the middle: how it comes to the circle decides where.  A line
-drawn around the middle says nothing of what stands beside it.
+An autopilot that steers to the loiter's center and then orbits it as wide as it can may be anywhere within `SWING`
+radii of the bank limit from the center if the loiter is too tight for its bank; the direction of arrival decides where.
+A circle drawn around the center says nothing about the hazards next to it.
 """
 
 import math
@@ -23,16 +23,20 @@ from world.threats import threat_label
 
 Floats = NDArray[np.float64]
 
-# Rings that a disc is looked at along: one in a step of the ground's raster, so many at the least and at the most.
-_MIN_RINGS, _MAX_RINGS = 24, 120
-# Heights between which a spiral climbs are looked at in steps of this, m, at most so many of them.
-_STEP, _LEVELS = 20.0, 12
+# Least number of rings along which a disc is checked; between the limits there is one per step of the terrain raster.
+_MIN_RINGS = 24
+# Greatest number of rings along which a disc is checked.
+_MAX_RINGS = 120
+# Altitude step in which a climbing spiral is checked, m.
+_STEP_M = 20.0
+# Greatest number of altitudes at which a climbing spiral is checked.
+_MAX_LEVELS = 12
 
 
 def within_reach(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
-    """What a flight within a distance of a place could come too near to, in words; empty for nothing.
+    """Return the hazards that a flight within a distance of a place could come too close to, in words.
 
-    middle: (2,) east and north, m.  low, high: its least and greatest height, m AMSL.  reach: m.
+    middle: (2,) east and north, m.  low, high: its least and greatest altitude, m AMSL.  reach: m.
     """
     return [
         *_ground(requirements, middle, low, high, reach),
@@ -43,9 +47,9 @@ def within_reach(requirements: RouteRequirements, middle: Floats, low: float, hi
 
 
 def beside_end(requirements: RouteRequirements) -> tuple[float, list[str]] | None:
-    """How far (m) the circles about a mission's end may get, and what they could come too near to, in words.
+    """Return the reach (m) of the loiter at a mission's end and the hazards within it, in words.
 
-    None where the autopilot does not circle there, and where the mission goes further.
+    None if the autopilot does not loiter there, or if the mission continues.
     """
     setup, rules = requirements.setup, requirements.setup.autopilot.loiter_rules
     if not rules.ends_in_circle or not goes_no_further(setup.route, setup.mission):
@@ -63,17 +67,17 @@ def _ground(requirements: RouteRequirements, middle: Floats, low: float, high: f
     if ground is None:
         return []
     rings = _rings(middle, reach, ground.spacing)
-    above, _ = path_clearance(ground.heights, ground.to_pixel.record, _at(rings, low))
+    above, _ = path_clearance(ground.heights, ground.to_pixel.record, _points_at(rings, low))
     found = []
-    # What leaves the known terrain is NaN.
+    # Points outside the known terrain are NaN.
     if np.isnan(above).any():
         found.append("the terrain is not known")
     least = float(np.nanmin(above, initial=math.inf))
     if least < requirements.limits.min_clearance - CLEARANCE_TOLERANCE:
         found.append(f"the ground is {least:.0f} m below")
     if limits.max_height_m is not None:
-        # The greatest height above ground is the least of the same world upside down.
-        under, _ = path_clearance(-ground.heights, ground.to_pixel.record, _at(rings, -high))
+        # The greatest height above ground is the least height above ground of the same world upside down.
+        under, _ = path_clearance(-ground.heights, ground.to_pixel.record, _points_at(rings, -high))
         most = -float(np.nanmin(under, initial=math.inf))
         if most > limits.max_height_m + HEIGHT_TOLERANCE:
             found.append(f"the ground is {most:.0f} m below, over the {limits.max_height_m:.0f} m allowed")
@@ -99,9 +103,9 @@ def _zones(requirements: RouteRequirements, middle: Floats, low: float, high: fl
         return []
     terrain = requirements.setup.scenario.terrain
     rings, found = _rings(middle, reach, 0.0), set[int]()
-    levels = 1 if high - low < ROUNDING else min(_LEVELS, 2 + int((high - low) / _STEP))
+    levels = 1 if high - low < ROUNDING else min(_MAX_LEVELS, 2 + int((high - low) / _STEP_M))
     for up in np.linspace(low, high, levels):
-        visits = path_zones(_moves(_at(rings, float(up))), airspace.records, terrain)
+        visits = path_zones(_moves(_points_at(rings, float(up))), airspace.records, terrain)
         found |= {z for z in range(len(airspace.zones)) if visits[z].depth > ROUNDING or visits[z].unknown}
     return [f"{airspace.zones[z].kind} zone {airspace.zones[z].name or z} is not kept" for z in sorted(found)]
 
@@ -115,20 +119,20 @@ def _edges(requirements: RouteRequirements, middle: Floats, reach: float) -> lis
 
 
 def _rings(middle: Floats, reach: float, spacing: float) -> Floats:
-    """Points (n, 2) m along rings about a middle out to its reach, a raster's spacing apart."""
+    """Return points (n, 2) m on rings about a center out to the reach, about a raster step apart."""
     count = min(_MAX_RINGS, max(_MIN_RINGS, math.ceil(reach / spacing) if spacing > 0.0 else _MIN_RINGS))
-    # A polygon outside its circle leaves nothing between the last ring and the reach.
+    # A polygon circumscribed about its circle leaves no gap between the last ring and the reach.
     last = Cylinder(float(middle[0]), float(middle[1]), reach / math.cos(math.pi / CIRCLE_CORNERS))
     return np.linspace(middle, zone_rings(Zone("", "exclusion", last))[0], count + 1).reshape(-1, 2)
 
 
-def _at(places: Floats, up: float) -> Floats:
-    """Places (n, 2) at one height, (n, 3) m."""
+def _points_at(places: Floats, up: float) -> Floats:
+    """Return places (n, 2) at one altitude as points (n, 3) m."""
     return np.column_stack([places, np.full(len(places), up)])
 
 
 def _moves(points: Floats) -> Records:
-    """Straight moves from each of n points to the next, of a second each, (n - 1,) of `MOVE`."""
+    """Return straight moves of one second each from each of n points to the next, (n - 1,) of `MOVE`."""
     step = np.diff(points, axis=0)
     run = np.hypot(step[:, 0], step[:, 1])
     moves: Records = np.zeros(len(step), MOVE)

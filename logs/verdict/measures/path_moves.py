@@ -1,7 +1,7 @@
-"""A path as moves: straight pieces and arcs of one curvature each, with heights that are a parabola over the way.
+"""Represent a path as moves: straight pieces and arcs whose altitude is a parabola over the run.
 
-The planned path's moves are its pieces themselves, not chords of them; a flown track's are the straight ways from row
-to row.  What judges moves judges both.
+The moves of a planned path are its pieces themselves, not chords of them; the moves of a flown track are the straight
+lines from row to row.  Code that judges moves judges both.
 """
 
 import math
@@ -20,9 +20,9 @@ Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
 
 
-# A move.  east, north, up: m, of its beginning.  course_east, course_north: the unit vector of its course there, both 0
-# of a move straight up or down.  length: m, horizontal.  curvature: 1/m, positive to the right.  climb, bend: m; at the
-# share f of a move the height is up + climb * f + bend * f * f.  time, lasts: s.  leg: of the route.
+# A move.  east, north, up: m, of its start.  course_east, course_north: unit vector of its course there, both 0 for a
+# vertical move.  length: m, horizontal.  curvature: 1/m, positive to the right.  climb, bend: m; at the fraction f of a
+# move the altitude is up + climb * f + bend * f * f.  time, lasts: s.  leg: of the route.
 MOVE = record_dtype(
     "east",
     "north",
@@ -41,7 +41,7 @@ MOVE = record_dtype(
 
 @inner
 def move_point(move: Record, share: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """East, north and up (m) at a share of a move."""
+    """Return east, north and up (m) at a fraction of a move."""
     run = share * move.length
     ahead, aside = run, 0.0
     if move.curvature != 0.0:
@@ -55,9 +55,11 @@ def move_point(move: Record, share: float) -> tuple[float, float, float]:  # pra
 
 
 def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | None = None) -> Records:
-    """Moves of a route's fly-by path, passed at each leg's ground speed, or its airspeed where there is none.
+    """Return the moves of a route's fly-by path, flown at each leg's ground speed.
 
-    first, last: legs of which they are wanted, default all.
+    Without a ground speed the airspeed is used.
+
+    first, last: range of legs to return, all by default.
     """
     speeds = np.where(np.isfinite(requirements.ground_speed), requirements.ground_speed, requirements.route.airspeed)
     moves = path_moves(requirements.setup.path, speeds, first, requirements.legs - 1 if last is None else last)
@@ -65,9 +67,9 @@ def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | N
 
 
 def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -> Records:
-    """Moves of the pieces of a fly-by path on some legs; their times count from the first of them.
+    """Return the moves of a fly-by path's pieces on some legs; times start at 0 at the first of them.
 
-    speeds: (legs,) m/s, at which it is passed.
+    speeds: (legs,) m/s, at which the path is flown.
     """
     nodes = path.nodes
     breaks = np.concatenate([nodes["distance"] - nodes["half_length"], nodes["distance"] + nodes["half_length"]])
@@ -81,7 +83,7 @@ def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -
         cuts = np.unique(np.concatenate([[start], inner, changes, [end]]))
         for first, last in pairwise(cuts.tolist()):
             middle, half = 0.5 * (first + last), 0.5 * (last - first)
-            # Taken at its middle: at its ends another parabola, or another leg, may begin.
+            # Evaluated at the piece's midpoint: at its ends another parabola, or another leg, may begin.
             height, slope, bend = profile(nodes, middle)
             east, north = arc_point(piece, first - start)
             course = piece.course + piece.curvature * (first - start)
@@ -98,9 +100,10 @@ def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -
 
 
 def flown_moves(aligned: AlignedTrack, first: int = 0, last: int | None = None) -> Records:
-    """Moves of a flown track, one from each row to the next; first, last: legs of which they are wanted, default all.
+    """Return the moves of a flown track, one from each row to the next.
 
-    What came before the first leg belongs to it, and what came after the last to that.
+    first, last: range of legs, all by default.  Rows before the first leg belong to the first leg, and rows after the
+    last leg to the last.
     """
     legs = len(aligned.rows) - 1
     last = legs - 1 if last is None else last
@@ -112,7 +115,7 @@ def flown_moves(aligned: AlignedTrack, first: int = 0, last: int | None = None) 
 
 
 def straight_moves(points: Floats, time: Floats) -> Records:
-    """Moves from each point to the next, all of leg 0.  points: (n, 3) m.  time: (n,) s.
+    """Return the moves from each point to the next, all on leg 0.  points: (n, 3) m.  time: (n,) s.
 
     >>> moves = straight_moves(np.array([[0.0, 0.0, 50.0], [30.0, 40.0, 60.0]]), np.array([0.0, 2.0]))
     >>> float(moves[0].length), float(moves[0].course_east), float(moves[0].climb), float(moves[0].lasts)
@@ -131,12 +134,12 @@ def straight_moves(points: Floats, time: Floats) -> Records:
 
 
 # ----------------------------------------------------------------------
-# Consecutive moves of a path in blocks, compiled: what a block keeps clear of, none of its moves has to be asked.
+# Blocks of consecutive moves, compiled: if a block stays clear of something, its moves need not be checked.
 
 
-# Consecutive moves: their box on the map, their least and greatest height, and the steepest ground below them, m per m.
+# Bounding box of a block on the map, its least and greatest altitude, and the steepest ground below it, m per m.
 BLOCK = record_dtype("west", "east", "south", "north", "low", "high", "steepest")
-# Moves of a block.
+# Number of moves in a block.
 BLOCK_MOVES = 64
 
 
@@ -144,7 +147,7 @@ BLOCK_MOVES = 64
 def move_blocks(
     moves: Records, heights: Heights, to_pixel: PolyMapRecord, pitch: float, above_ground: bool
 ) -> Records:  # pragma: no cover - compiled
-    """(b,) of `BLOCK`; the ground is looked at where a zone counts from it."""
+    """Return blocks, (b,) of `BLOCK`; the ground is read only if a zone limit is given above ground."""
     blocks = np.zeros((moves.shape[0] + BLOCK_MOVES - 1) // BLOCK_MOVES, BLOCK)
     for b in range(blocks.shape[0]):
         block = blocks[b]
@@ -153,7 +156,7 @@ def move_blocks(
         for k in range(b * BLOCK_MOVES, min(moves.shape[0], (b + 1) * BLOCK_MOVES)):
             move = moves[k]
             east, north, up = move_point(move, 0.5)
-            # No point of a move is further from its middle than half its length.
+            # No point of a move is further from its midpoint than half its length.
             half = 0.5 * move.length
             lift = 0.5 * abs(move.climb) + 1.25 * abs(move.bend)
             block.west, block.east = min(block.west, east - half), max(block.east, east + half)
@@ -168,11 +171,14 @@ def move_blocks(
 def _steepest(
     block: Record, heights: Heights, to_pixel: PolyMapRecord, pitch: float
 ) -> float:  # pragma: no cover - compiled
-    """Steepest slope that the bilinear ground can have under a block, m per m; NaN adds nothing."""
+    """Return the steepest slope that the bilinear ground can have under a block, m per m.
+
+    NaN adds nothing.
+    """
     rows, cols = heights.shape
     west, south = polymap(to_pixel, block.west, block.south)
     east, north = polymap(to_pixel, block.east, block.north)
-    # The map's axes may be turned against the raster's: both diagonals' ends.
+    # The map's axes may be rotated against the raster's axes: use the ends of both diagonals.
     left, upper = polymap(to_pixel, block.west, block.north)
     right, lower = polymap(to_pixel, block.east, block.south)
     first_col, last_col = min(west, east, left, right), max(west, east, left, right)
@@ -185,8 +191,8 @@ def _steepest(
             over = max(abs(heights[i, j + 1] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i + 1, j]))
             down = max(abs(heights[i + 1, j] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i, j + 1]))
             steep = over * over + down * down
-            # NaN compares as less.
+            # A comparison with NaN is false.
             if steep > steepest:
                 steepest = steep
-    # A hair more, for what single precision rounds.
+    # Slightly more, for the rounding of single precision.
     return math.sqrt(steepest) / pitch * (1.0 + 1e-6)

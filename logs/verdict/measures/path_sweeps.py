@@ -1,7 +1,7 @@
-"""Passes along a whole path, compiled: height above ground, and time and exposure inside spheres.
+"""Sweep along a whole path, compiled: height above ground, and time and exposure inside spheres.
 
-A path is points (n, 3) m with a time (s) each: a flown track's rows, or a route's waypoints with the times that
-they would be passed at.  Both are judged by the same code, exact on each straight segment.
+A path is points (n, 3) m with a time (s) each: the rows of a flown track, or the waypoints of a route with the times at
+which they would be passed.  The same code judges both, exactly on each straight segment.
 """
 
 import math
@@ -20,16 +20,16 @@ from world.terrain import Heights, Terrain, segment_clearance
 Floats = NDArray[np.float64]
 
 
-# Segments that share one bounding box.
-_BLOCK = 256
-# Segments joined to one where a sphere's centre is `FAR` from a block of them.
-_JOINED = 16
+# Number of segments that share one bounding box.
+_BLOCK_SEGMENTS = 256
+# Number of segments joined to one if a sphere's center is `FAR` from a block of them.
+_JOINED_SEGMENTS = 16
 
 
 def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Smallest height above ground on each segment and the fraction of it where that is, (n - 1,) each.
+    """Return the smallest height above ground on each segment and its fraction there, (n - 1,) each.
 
-    NaN where a segment leaves the raster or its data.
+    NaN if a segment leaves the raster or its data.
     """
     low, at = _path_clearance(read_only(heights), to_pixel, read_only(np.ascontiguousarray(points)))
     return low, at
@@ -47,13 +47,13 @@ def _path_clearance(
 
 
 class SphereVisits(NamedTuple):
-    """How a path meets each of m spheres, (m,) each.
+    """Visits of a path to m spheres, (m,) each.
 
     inside: s.
     exposure: s, the integral over that time of (scale/d)^4.
-    closest: m to the centre at the least; inf for no sphere.
+    closest: m, least distance to the center; inf for a sphere of radius 0.
     closest_time: s.
-    entry_time: s, of the first entry; NaN where it never enters.
+    entry_time: s, of the first entry; NaN if the path never enters.
     """
 
     inside: Floats
@@ -72,7 +72,7 @@ class _Boxes(NamedTuple):
 
 
 def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
-    """How a path meets each of m spheres.  A radius of 0 is no sphere.
+    """Return the visits of a path to m spheres.  A radius of 0 means no sphere.
 
     points: (n, 3) m.  time: (n,) s.  centres: (m, 3) m.  radii, scales: (m,) m.
 
@@ -111,17 +111,17 @@ def _path_spheres(
                 _closest(points, time, block, centres[m], m, out)
             if low <= radii[m]:
                 whole = high <= radii[m] and low > FAR * boxes.diagonal[block]
-                _inside(points, time, block, _JOINED if whole else 1, centres[m], radii[m], scales[m], m, out)
+                _inside(points, time, block, _JOINED_SEGMENTS if whole else 1, centres[m], radii[m], scales[m], m, out)
     return out
 
 
 @inner
 def _boxes(points: Floats) -> _Boxes:  # pragma: no cover - compiled
     segments = max(0, points.shape[0] - 1)
-    count = -(-segments // _BLOCK)
+    count = -(-segments // _BLOCK_SEGMENTS)
     out = _Boxes(np.empty((count, 3)), np.empty((count, 3)), np.empty(count))
     for block in range(count):
-        first, last = block * _BLOCK, min(segments, (block + 1) * _BLOCK)
+        first, last = block * _BLOCK_SEGMENTS, min(segments, (block + 1) * _BLOCK_SEGMENTS)
         diagonal2 = 0.0
         for axis in range(3):
             low, high = math.inf, -math.inf
@@ -135,7 +135,7 @@ def _boxes(points: Floats) -> _Boxes:  # pragma: no cover - compiled
 
 @inner
 def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Least and greatest distance of a block's box from a point."""
+    """Return the least and the greatest distance of a block's box from a point."""
     low2 = 0.0
     high2 = 0.0
     for axis in range(3):
@@ -151,8 +151,8 @@ def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, fl
 def _closest(
     points: Floats, time: Floats, block: int, centre: Floats, m: int, out: SphereVisits
 ) -> None:  # pragma: no cover - compiled
-    """Bring the closest distance to sphere m and its time up to date with one block."""
-    for k in range(block * _BLOCK, min(points.shape[0] - 1, (block + 1) * _BLOCK)):
+    """Update the closest distance to sphere m and its time with one block."""
+    for k in range(block * _BLOCK_SEGMENTS, min(points.shape[0] - 1, (block + 1) * _BLOCK_SEGMENTS)):
         length2 = 0.0
         along = 0.0
         for axis in range(3):
@@ -179,8 +179,8 @@ def _inside(
     out: SphereVisits,
 ) -> None:  # pragma: no cover - compiled
     """Add one block's time and exposure inside sphere m."""
-    last = min(points.shape[0] - 1, (block + 1) * _BLOCK)
-    k = block * _BLOCK
+    last = min(points.shape[0] - 1, (block + 1) * _BLOCK_SEGMENTS)
+    k = block * _BLOCK_SEGMENTS
     while k < last:
         end = min(last, k + step)
         share, mean = segment_exposure(points[k], points[end], centre, radius, scale)
@@ -195,14 +195,17 @@ def _inside(
 
 
 # ----------------------------------------------------------------------
-# What a flown track meets on its way: the ground under each of its segments, and the spheres it passes through.
+# The encounters of a flown track: the ground under each of its segments, and the spheres it passes through.
 #
-# The formulas are the world's; here they are only run along a track, exactly per segment, at any sampling rate.
+# The formulas come from the `world` package; here they are only run along a track, exactly per segment, at any rate.
 
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """One stay inside a sphere: from, to (s); closest: m from its centre; whole: left again before the track's end."""
+    """One stay inside a sphere.
+
+    start, end: s.  closest: m from its center.  whole: True if it was left again before the track's end.
+    """
 
     start: float
     end: float
@@ -212,15 +215,15 @@ class Passage:
 
 
 def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floats]:
-    """Smallest height above ground on each segment of a track, m, and the fraction of it where that is.
+    """Return the smallest height above ground on each segment of a track, m, and its fraction there.
 
-    position: (t, 3).  Returns (t - 1,) twice; NaN where the segment leaves the terrain's data or is not a number.
+    position: (t, 3).  Returns (t - 1,) twice; NaN if the segment leaves the terrain's data or is not a number.
     """
     return _clearances(terrain.heights, terrain.to_pixel.record, read_only(np.ascontiguousarray(position)))
 
 
 def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> list[Passage]:
-    """Stays of a track inside a sphere, in order.
+    """Return the stays of a track inside a sphere, in order.
 
     time: (t,) s.  position: (t, 3).  centre: (3,).  A point on the surface is inside.
     """
@@ -244,7 +247,7 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
 
 
 def _far(position: Floats, centre: Floats, radius: float) -> bool:
-    """Whether the box around the track stays outside the sphere's box."""
+    """Return True if the box around the track stays outside the sphere's box."""
     good = position[np.isfinite(position).all(axis=1)]
     if not len(good):
         return True

@@ -1,4 +1,4 @@
-"""How much of a survey's photo line was flown as photos need it, and how much its photos overlap."""
+"""Measure how much of a photo line was flown as photos need it, and how much its photos overlap."""
 
 import math
 from collections.abc import Sequence
@@ -29,17 +29,17 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class LineMeasure:
-    """One photo line as flown; all shares are of its length, and make 1 together.
+    """One photo line as flown; all shares are shares of its length, and add up to 1.
 
     length: m.
-    good: share that can be used.  Of the rest, by what it lacks first:
-    away: not flown along, or too far beside the line.  banked, high, dark: along the line, but banked too much; then
-    too far off its height over ground; then without the camera.
-    late, early: m from its begin to the first good place, and from the last good place to its end.
-    aside: greatest distance from the line where it was flown along, m; off: greatest height off, m, above positive.
-    photos, missed: as planned, and those of them that were not taken; 0 where the way between photos is not stated.
-    allowed_aside: m.  allowed_off: least height off that is allowed anywhere along it, m.
-    lost: stretches that cannot be used, each from and to, m from its begin.
+    good: share that can be used.  The rest is divided by the first requirement that it fails:
+    away: not flown along, or too far to the side of the line.  banked, high, dark: along the line, but banked too much;
+        then too far off its height above ground; then without the camera.
+    late, early: m from the line's start to the first good place, and from the last good place to its end.
+    aside: greatest distance from the line where it was flown along, m; off: greatest height error, m, above positive.
+    photos, missed: number planned, and how many of them were not taken; 0 if the distance between photos is not stated.
+    allowed_aside: m.  allowed_off: least height error that is allowed anywhere along the line, m.
+    lost: stretches that cannot be used, each from and to, m from the line's start.
     """
 
     length: float
@@ -60,17 +60,17 @@ class LineMeasure:
 
 
 def allowed_aside(requirements: RouteRequirements, survey: Survey) -> float:
-    """How far beside its line a photo may be taken, m."""
+    """Return how far to the side of its line a photo may be taken, m."""
     return PHOTO_ASIDE * survey.spacing + position_error(requirements.setup)
 
 
 @dataclass(frozen=True, slots=True)
 class _Rows:
-    """The rows on which a line may have been flown.
+    """Rows on which a line may have been flown.
 
-    position: (n, 3) m.  along, across: of the line, m.  ahead: whether each flies along it.
-    off, allowed: m off the planned height over ground, and how far it may be.
-    needed: what a photo needs, by what is lost without it.
+    position: (n, 3) m.  along, across: relative to the line, m.  ahead: True for each row that flies along it.
+    off, allowed: m, error from the planned height above ground, and its tolerance.
+    needed: requirements of a photo, by the name of the loss if they are not met.
     """
 
     axis: LineAxis
@@ -93,7 +93,7 @@ def _rows(requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey
     along, across, course = axis.of(position)
     turned = np.abs(np.angle(np.exp(1j * (aligned.course[window] - course))))
     ahead = turned <= PHOTO_COURSE
-    off, allowed = _heights_off(requirements, axis, position, along)
+    off, allowed = _height_errors(requirements, axis, position, along)
     needed = {
         "away": np.abs(across) <= allowed_aside(requirements, survey),
         "banked": np.abs(aligned.track.attitude[window, ROLL]) <= PHOTO_BANK,
@@ -106,7 +106,7 @@ def _rows(requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey
 def measure_line(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> LineMeasure | None:
-    """Measure a photo line on a flown track; None where no row was flown between its neighbours."""
+    """Measure a photo line on a flown track; return None if no row was flown between its neighbours."""
     rows = _rows(requirements, aligned, survey, line)
     if rows is None:
         return None
@@ -138,28 +138,31 @@ def measure_line(
 
 
 def _stretches(cells: Flags, step: float) -> tuple[tuple[float, float], ...]:
-    """Runs of cells that are set, each from and to, m."""
+    """Return runs of cells that are set, each from and to, m."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], cells.astype(int), [0]]))) * step
     return tuple((float(low), float(high)) for low, high in zip(edges[::2], edges[1::2], strict=True))
 
 
 def _window(requirements: RouteRequirements, aligned: AlignedTrack, line: PhotoLine) -> slice:
-    """Rows from the waypoint before the line's straight run to the one behind it."""
+    """Return the rows from the waypoint before the line's straight run to the waypoint after it."""
     first, last = max(0, line.begins - 1), min(requirements.legs, line.ends + 1)
     return slice(int(aligned.rows[first]), int(aligned.rows[last]) + 1)
 
 
-def _heights_off(
+def _height_errors(
     requirements: RouteRequirements, axis: LineAxis, position: Floats, along: Floats
 ) -> tuple[Floats, Floats]:
-    """By how much each row is off the planned height over ground, m, and by how much it may be."""
+    """Return each row's error from the planned height above ground, m, and its tolerance."""
     asked = over_ground(requirements, axis.at(along))
     allowed = np.maximum(MIN_PHOTO_HEIGHT, PHOTO_HEIGHT * asked)
     return over_ground(requirements, position) - asked, allowed
 
 
 def over_ground(requirements: RouteRequirements, places: Floats) -> Floats:
-    """Heights (n,) m of places (n, 3) above the ground; without terrain above home, or the route's lowest waypoint."""
+    """Return heights (n,) m of places (n, 3) above ground.
+
+    Without terrain, above home or the route's lowest waypoint.
+    """
     ground, home = requirements.setup.scenario.terrain, requirements.setup.mission.home
     if ground is not None:
         heights: Floats = places[:, 2] - ground.height(places[:, 0], places[:, 1])
@@ -170,15 +173,16 @@ def over_ground(requirements: RouteRequirements, places: Floats) -> Floats:
 def _camera_on(
     requirements: RouteRequirements, line: PhotoLine, position: Floats, along: Floats, ahead: Flags, length: float
 ) -> Flags:
-    """Whether the camera is on at each row: from where the line's first waypoint counts as reached to its last's.
+    """Return True for each row with the camera on.
 
-    Of a mission that does not switch its camera there it always is.  ahead: whether each row flies along the line.
+    It is on from reaching the line's first waypoint to reaching its last.  The camera is always on if the mission does
+    not switch it there.  ahead: True for each row that flies along the line.
     """
     follows, rows = requirements.setup.autopilot.follows_path, np.arange(len(along))
 
     def reached(waypoint: int, from_along: float, after: int = 0) -> int:
         away = np.hypot(*(position[:, :2] - requirements.points[waypoint, :2]).T)
-        # Who follows a path is at a waypoint where the path passes it.
+        # An autopilot that follows a path is at a waypoint where the path passes it.
         near = 0.0 if follows else reach(requirements, waypoint).radius
         there = np.flatnonzero(((away <= near) | (along >= from_along)) & ahead & (rows >= after))
         return int(there[0]) if there.size else len(along)
@@ -189,7 +193,7 @@ def _camera_on(
 
 
 def _cells(along: Floats, state: Flags, length: float) -> Flags:
-    """Which steps of a line lie between two rows in a state."""
+    """Return True for each step of a line that lies between two rows in a state."""
     count = max(1, math.ceil(length / PHOTO_STEP))
     both = state[:-1] & state[1:] & (np.diff(along) > 0.0)
     edges = np.clip(along / length * count, 0.0, count)
@@ -201,7 +205,7 @@ def _cells(along: Floats, state: Flags, length: float) -> Flags:
 
 
 def _photos(line: PhotoLine, taken: Flags, length: float) -> tuple[int, int]:
-    """How many photos a line has, and how many of them fall on steps on which none is taken."""
+    """Return the number of photos on a line, and the number that fall on steps on which none is taken."""
     if line.photo <= 0.0:
         return 0, 0
     count = int(length / line.photo) + 1
@@ -210,20 +214,21 @@ def _photos(line: PhotoLine, taken: Flags, length: float) -> tuple[int, int]:
 
 
 # ----------------------------------------------------------------------
-# How much photos overlap.  A photo is a rectangle on level ground below the aircraft, as high as it flies there: its
-# own tilt does not count.
+# Overlap of photos.  A photo is a rectangle on level ground below the aircraft, sized by its height above ground there;
+# the aircraft's tilt is ignored.
 
 
 @dataclass(frozen=True, slots=True)
 class OverlapMeasure:
-    """The least overlap of a survey's photos, where they can be used, as shares of a photo.
+    """Least overlap of a survey's usable photos, as shares of a photo.
 
-    camera: that takes them.
-    front: with the next on its line; None where nobody says how far apart they are taken, or none can be used.
-    line, apart, height, slow: where: the line's number from 0, m between photos, m above ground, and whether it is the
-    camera that cannot take them any sooner.
-    side: with those of the line beside; None where no two that can be used lie beside each other.
-    pair, between, heights: where: both lines' numbers, m between them, m above ground.
+    camera: the camera that takes them.
+    front: overlap with the next photo on the line; None if the distance between photos is not stated, or none is
+    usable.
+    line, apart, height, slow: where that is: the line's number from 0, m between photos, m above ground, and True if
+        the camera cannot take them any sooner.
+    side: overlap with the photos of the neighbouring line; None if no two usable lines are next to each other.
+    pair, between, heights: where that is: both lines' numbers, m between them, m above ground.
     """
 
     camera: Camera
@@ -239,7 +244,9 @@ class OverlapMeasure:
 
 
 class _Strip(NamedTuple):
-    """What of a line can be used: places (n, 3) m, heights over ground (n,) m, ground speeds (n,) m/s, and whether."""
+    """Points of a photo line, and whether they are usable.
+
+    places: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s."""
 
     places: Floats
     heights: Floats
@@ -250,21 +257,23 @@ class _Strip(NamedTuple):
 def measure_overlap(
     requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey
 ) -> OverlapMeasure | None:
-    """Measure how much a survey's photos overlap as they are flown, or planned where ``aligned`` is None.
+    """Measure how much a survey's photos overlap as they are flown, or planned if ``aligned`` is None.
 
-    None where no camera is known.
+    Return None if no camera is known.
     """
     plan = survey_plan(requirements.setup.mission, survey)
     if plan is None or plan.camera is None:
         return None
-    strips = [_strip(requirements, aligned, survey, line) for line in survey.lines]
-    return _along(_beside(OverlapMeasure(plan.camera), requirements, survey, strips), survey, strips)
+    strips = [_line_strip(requirements, aligned, survey, line) for line in survey.lines]
+    return _with_front_overlap(
+        _with_side_overlap(OverlapMeasure(plan.camera), requirements, survey, strips), survey, strips
+    )
 
 
-def _strip(
+def _line_strip(
     requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey, line: PhotoLine
 ) -> _Strip | None:
-    """A line as flown, or as planned; None for one that was not flown."""
+    """Return a line as flown, or as planned; None if it was not flown."""
     if aligned is None:
         axis = LineAxis(requirements.points[line.first : line.last + 1])
         along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP) + 1))
@@ -281,8 +290,8 @@ def _strip(
     return _Strip(rows.position, over_ground(requirements, rows.position), speeds, usable)
 
 
-def _along(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:
-    """With the least overlap along the lines."""
+def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:
+    """Return the measure with the least overlap along the lines."""
     camera = measure.camera
     for number, (line, strip) in enumerate(zip(survey.lines, strips, strict=True)):
         if strip is None or line.photo <= 0.0 or not strip.usable.any():
@@ -299,10 +308,10 @@ def _along(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | No
     return measure
 
 
-def _beside(
+def _with_side_overlap(
     measure: OverlapMeasure, requirements: RouteRequirements, survey: Survey, strips: Sequence[_Strip | None]
 ) -> OverlapMeasure:
-    """With the least overlap across the lines, step by step along the first."""
+    """Return the measure with the least overlap across the lines, step by step along the first line."""
     corners = [requirements.points[line.first : line.last + 1] for line in survey.lines]
     axis = LineAxis(corners[0])
     ends = [axis.of(places)[0] for places in corners]

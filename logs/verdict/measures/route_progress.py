@@ -1,8 +1,8 @@
 """Lay a track along its route by positions alone: the progress made, and the rows along each leg.
 
-A route that comes back to where it began, or flies the same round again, is near to many of its waypoints at once.
-So the whole track is laid along the whole route: both only go forward, and the track may end anywhere on the way.
-What guidance recorded about itself is not read.
+A route that returns to its start, or flies the same round again, is near many of its waypoints at once.  So the whole
+track is laid along the whole route: both only go forward, and the track may end anywhere on the route.  What guidance
+recorded about itself is not read.
 """
 
 import math
@@ -19,18 +19,20 @@ from world.kernels import compiled, read_only
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
-# Distance between neighbouring samples of route and track, m; more where the table would be larger than this, cells.
+# Distance between neighbouring samples of route and track, m; larger if the table would exceed `_MAX_CELLS`.
 _SAMPLE_SPACING_M = 20.0
+# Largest number of cells of the table.
 _MAX_CELLS = 16_000_000
-# Rows that far before and after the rows along a waypoint's two legs may be those nearest to it, m of track.
+# The row nearest to a waypoint may lie this far before or after the rows along its two legs, m of track.
 _WINDOW_MARGIN_M = 300.0
-# A part of the route without any of the track costs this share of its squared distance,
-_SKIP_SHARE = 0.1
-# and this distance squared, m.
+# Cost of a part of the route that has no part of the track, as a fraction of its squared distance.
+_SKIP_FRACTION = 0.1
+# Distance that is squared and added to that cost, m.
 _SKIP_DISTANCE_M = 15.0
-# A flight that may begin anywhere on the route begins at the earliest place of equally near ones, m per sample.
+# Cost of a late start, m per sample: a flight that may begin anywhere on the route begins at the earliest of equally
+# near places.
 _LATE_START_M = 1.0
-# A loiter is flown within this of its drawn circle, m; how often it goes around it is of no importance here.
+# A loiter is flown within this of its drawn circle, m; the number of laps does not matter here.
 _LOITER_MARGIN_M = 60.0
 
 
@@ -38,10 +40,10 @@ _LOITER_MARGIN_M = 60.0
 class RouteProgress:
     """Progress of a track along a route of w waypoints.
 
-    first, last: (w,) rows between which each waypoint may have been passed; first > last for one that the flight did
-    not set out for.
-    target: the waypoint that the flight was on the way to, or at, when it ended.
-    left: m of the route from where the track ends to each waypoint, (w,), negative for those behind.
+    first, last: (w,) rows between which each waypoint may have been passed; first > last for a waypoint that the flight
+        did not set out for.
+    target: the waypoint that the flight was flying to, or was at, when it ended.
+    left: m of the route from the end of the track to each waypoint, (w,), negative for waypoints behind it.
     """
 
     first: Numbers
@@ -54,7 +56,7 @@ class RouteProgress:
 class _Samples:
     """Places along a route, in flying order.
 
-    places: (m, 2) m.  radii: (m,) m within which each place is reached; 0 on a line, a circle's for a loiter.
+    places: (m, 2) m.  radii: (m,) m within which each place is reached; 0 on a line, the radius of a loiter.
     along: (m,) m from the route's start.
     of_waypoint: (w,) the sample of each waypoint; corners of one loiter share a sample.
     """
@@ -69,7 +71,7 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
     """Lay a track along a route.
 
     position: (t, 3) m, usable rows, at least two.
-    anywhere: the track may begin anywhere on the route, as a part of an imported log does; else at its start.
+    anywhere: the track may begin anywhere on the route, like a part of an imported log; otherwise at its start.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -110,7 +112,7 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
 
 
 def _samples(route: Route, spacing: float) -> _Samples:
-    """Sample a route's legs; a loiter is one sample, however often it goes around."""
+    """Sample the legs of a route; a loiter is one sample, however many laps it has."""
     points = route.waypoints[:, :2]
     places, radii, along = [points[0]], [0.0], [0.0]
     of_waypoint = np.zeros(len(points), dtype=np.int64)
@@ -130,12 +132,12 @@ def _samples(route: Route, spacing: float) -> _Samples:
             corners = [
                 k for k in range(i, len(points)) if route.stops[k] == route.stops[i] and route.arcs[i : k + 1].all()
             ]
-            places[-1], radii[-1] = _hub(route, points[corners], float(route.arcs[i]), i)
+            places[-1], radii[-1] = _loiter_center(route, points[corners], float(route.arcs[i]), i)
     return _Samples(np.array(places), np.array(radii), np.array(along), of_waypoint)
 
 
-def _hub(route: Route, corners: Floats, radius: float, first: int) -> tuple[Floats, float]:
-    """Middle of a loiter's corners, and the distance from it, m, within which the loiter is flown."""
+def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> tuple[Floats, float]:
+    """Return the center of a loiter's corners, and the distance from it within which it is flown, m."""
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     wide = float(np.hypot(*(corners - middle).T).max()) + _LOITER_MARGIN_M
     if 0 <= route.return_from < first < route.return_until:
@@ -147,10 +149,11 @@ def _hub(route: Route, corners: Floats, radius: float, first: int) -> tuple[Floa
 def _lay(
     track: Floats, places: Floats, radii: Floats, capture: float, anywhere: bool
 ) -> Numbers:  # pragma: no cover - compiled
-    """Lay a track (n, 2) along places (m, 2), both forward only, with the least sum of min(distance, capture)^2.
+    """Lay a track (n, 2) along places (m, 2), both forward only, with the least sum of costs.
 
-    Gives the first and the last row at each place, (m, 2); -1 for places before its start and after its end.  Of equal
-    ends the earliest.  A place without a row of its own costs `_SKIP_SHARE` of that and `_SKIP_DISTANCE_M`^2.
+    The cost of a row is min(distance, capture)^2; a place without a row of its own costs `_SKIP_FRACTION` of that and
+    `_SKIP_DISTANCE_M`^2.  Return the first and the last row at each place, (m, 2); -1 for places before its start and
+    after its end.  Among equal ends take the earliest.
     """
     rows, count = track.shape[0], places.shape[0]
     moves = np.zeros((rows, count), dtype=np.uint8)
@@ -168,7 +171,7 @@ def _lay(
             else:
                 best, move = diagonal + cost, 0
             if j > 0:
-                skipped = total[j - 1] + _SKIP_SHARE * cost + _SKIP_DISTANCE_M**2
+                skipped = total[j - 1] + _SKIP_FRACTION * cost + _SKIP_DISTANCE_M**2
                 if skipped < best:
                     best, move = skipped, 2
             diagonal = before

@@ -1,4 +1,4 @@
-"""What a route asks of the aircraft and what the aircraft's limits are: the planned side of every finding."""
+"""Work out what a route requires and the aircraft's limits: the planned side of every finding."""
 
 import functools
 import math
@@ -38,11 +38,11 @@ Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
-# The zones that a flight is judged by: those of its scenario, then those of its mission's own fence.
+# The zones by which a flight is judged: the scenario's zones, then the zones of the mission's own fence.
 
 
-# What chords leave an arc by is far less, m.
-_NEAR = 10.0
+# Margin about the boxes of straight pieces, m: arcs leave their chords by far less.
+_BOX_MARGIN_M = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +51,8 @@ class Airspace:
 
     zones: the scenario's, then the fence's.
     records: the same, for compiled code.
-    of_scenario: how many are the scenario's.
-    fault: why the mission's fence makes no zones; "" where it does, or where there is none.
+    of_scenario: number of zones from the scenario.
+    fault: why the mission's fence gives no zones; "" if it does, or if there is no fence.
     """
 
     zones: tuple[Zone, ...]
@@ -61,12 +61,12 @@ class Airspace:
     of_scenario: int = 0
 
     def place(self, index: int) -> Place:
-        """A zone as the place of a finding."""
+        """Return a zone as the place of a finding."""
         zone = self.zones[index]
         return Place(zone.kind, index, name=zone.name)
 
     def about(self, points: Floats) -> NDArray[np.int64]:
-        """Zones that a way (n, 3) m may violate: inclusions, and exclusions that a straight piece of it comes near.
+        """Return the zones that a path (n, 3) m may violate: inclusions, and exclusions near a segment.
 
         >>> from world.airspace.zones import Cylinder
         >>> zones = tuple(Zone(str(k), "exclusion", Cylinder(1000.0 * k, 0.0, 50.0)) for k in range(4))
@@ -75,16 +75,19 @@ class Airspace:
         [2]
         """
         boxes = self.records.zones
-        low, high = np.minimum(points[:-1], points[1:]) - _NEAR, np.maximum(points[:-1], points[1:]) + _NEAR
+        low, high = (
+            np.minimum(points[:-1], points[1:]) - _BOX_MARGIN_M,
+            np.maximum(points[:-1], points[1:]) + _BOX_MARGIN_M,
+        )
         east = (boxes["west"][:, None] <= high[:, 0]) & (boxes["east"][:, None] >= low[:, 0])
         north = (boxes["south"][:, None] <= high[:, 1]) & (boxes["north"][:, None] >= low[:, 1])
         return np.flatnonzero(~boxes["exclusion"] | (east & north).any(axis=1))
 
 
 def airspace_of(setup: FlightSetup) -> Airspace:
-    """The zones that a setup's flight is to keep out of or to stay in.
+    """Return the zones that a setup's flight has to stay out of or to stay in.
 
-    A fence that makes no zones, which a log of before fences were judged may hold, is left out and named.
+    A fence that gives no zones, as in logs from before fences were judged, is left out and reported.
 
     >>> from logs.recording.example_log import example_log
     >>> airspace_of(example_log().setup).zones
@@ -99,12 +102,15 @@ def airspace_of(setup: FlightSetup) -> Airspace:
     return Airspace(zones, _records_of(zones), fault, len(setup.scenario.zones))
 
 
-# Of the zones that were asked for last: a thousand take longer to write down than to judge.
+# The zones that were used last: writing down a thousand takes longer than judging them.
 _last_records: list[tuple[tuple[Zone, ...], ZoneRecords]] = []
 
 
 def _records_of(zones: tuple[Zone, ...]) -> ZoneRecords:
-    """Records of zones; of the same tuple as the last time, those of then, which nobody writes to."""
+    """Return the records of zones.
+
+    For the same tuple as last time these are the same records, which must not be changed.
+    """
     for known, records in _last_records:
         if known is zones:
             return records
@@ -114,7 +120,7 @@ def _records_of(zones: tuple[Zone, ...]) -> ZoneRecords:
 
 
 def with_fence_zones(setup: FlightSetup) -> FlightSetup:
-    """The setup with its mission's fence among its scenario's zones, for whatever draws them.
+    """Return the setup with its mission's fence among its scenario's zones, for drawing.
 
     >>> from logs.recording.example_log import example_log
     >>> with_fence_zones(example_log().setup).scenario.zones
@@ -126,19 +132,19 @@ def with_fence_zones(setup: FlightSetup) -> FlightSetup:
 
 
 # ----------------------------------------------------------------------
-# What a route's turns take of their legs, and the sharpest turn that fits beside its neighbours.
+# The length that a route's turns use of their legs, and the sharpest turn that fits next to its neighbours.
 
 
 @dataclass(frozen=True, slots=True)
 class TurnRequirements:
-    """A route's turns, for w waypoints.
+    """Turns of a route with w waypoints.
 
     turns: (w,) rad, positive to the right, 0 at the ends.
     tightest: (w,) m, radius of the arc at the bank limit.
-    radius: (w,) m, of the arc that is flown: the same, or a loiter's.
+    radius: (w,) m, radius of the arc that is flown: the same, or the radius of a loiter.
     before, after: (w,) m of leg that the turn uses on either side, inf for a U-turn.
-    reversal: (w - 1,) m of leg that the roll from a turn into one the other way round uses.
-    limit: (w,) rad, the sharpest turn there that fits both legs beside the neighbouring turns.
+    reversal: (w - 1,) m of leg that the roll from a turn into one to the other side uses.
+    limit: (w,) rad, the sharpest turn there that fits both legs next to the neighbouring turns.
     """
 
     turns: Floats
@@ -151,12 +157,12 @@ class TurnRequirements:
 
 
 def performance_tables(route: Route, limits: Limits) -> dict[float, PerformanceTable]:
-    """The aircraft's performance at each airspeed of a route, m/s."""
+    """Return the aircraft's performance at each airspeed of a route, m/s."""
     return {float(speed): limits.performance(float(speed)) for speed in route.airspeed}
 
 
 def turn_requirements(route: Route, tables: dict[float, PerformanceTable]) -> TurnRequirements:
-    """Work out what each turn takes, by the aircraft's performance at the route's airspeeds."""
+    """Work out the length that each turn uses, from the aircraft's performance at the route's airspeeds."""
     points = np.asarray(route.waypoints, dtype=np.float64)
     courses, runs, count = leg_courses(points), leg_runs(points), len(points)
     turns = np.zeros(count)
@@ -174,7 +180,10 @@ def turn_requirements(route: Route, tables: dict[float, PerformanceTable]) -> Tu
 
 
 def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, float]:
-    """Length of leg (m) that a turn (rad) uses before and after its waypoint; a fly-over only after it."""
+    """Return the length of leg (m) that a turn (rad) uses before and after its waypoint.
+
+    A fly-over uses only the leg after it.
+    """
     if turn < 1e-9:
         return 0.0, 0.0
     if fly_over:
@@ -188,7 +197,10 @@ def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, flo
 def _reversals(
     route: Route, tables: dict[float, PerformanceTable], courses: Floats, turns: Floats, radius: Floats, up: Floats
 ) -> Floats:
-    """Length of each leg that the roll from one bank into the other uses, (w - 1,) m; 0 between turns of one side."""
+    """Return the length of each leg used by the roll between opposite banks, (w - 1,) m.
+
+    0 between turns to the same side.
+    """
     out = np.zeros(len(courses))
     for leg in range(1, len(courses) - 1):
         flown_by = not route.fly_over[leg : leg + 2].any() and np.isfinite(radius[leg : leg + 2]).all()
@@ -201,10 +213,10 @@ def _reversals(
 
 
 def available_lengths(runs: Floats, before: Floats, after: Floats, reversal: Floats, i: int) -> tuple[float, float]:
-    """Lengths (m) of the legs before and after waypoint i that its turn may use.
+    """Return the lengths (m) of the legs before and after waypoint i that its turn may use.
 
-    Of a leg too short for its two turns the one that takes more than half of it is at fault, or both are: half of each
-    leg is left to a turn in any case.
+    If a leg is too short for its two turns, the turn that uses more than half of it is at fault, or both are: each turn
+    may use half of the leg in any case.
     """
     return (
         max(runs[i - 1] - after[i - 1], 0.5 * runs[i - 1]) - reversal[i - 1],
@@ -215,7 +227,7 @@ def available_lengths(runs: Floats, before: Floats, after: Floats, reversal: Flo
 def _sharpest_turns(
     route: Route, runs: Floats, tightest: Floats, before: Floats, after: Floats, reversal: Floats
 ) -> Floats:
-    """Sharpest turn at each waypoint that fits its legs beside the neighbouring turns, (w,) rad."""
+    """Return the sharpest turn at each waypoint that fits between the neighbouring turns, (w,) rad."""
     out = np.full(len(tightest), math.pi)
     for i in range(1, len(tightest) - 1):
         if not math.isfinite(tightest[i]):
@@ -230,7 +242,7 @@ def _sharpest_turns(
 
 
 def _sharpest_fly_over(radii: float) -> float:
-    """Sharpest fly-over turn (rad) that needs at most this many radii of leg, by bisection."""
+    """Return the sharpest fly-over turn (rad) that needs at most this many radii of leg, by bisection."""
     low, high = 0.0, math.pi
     if fly_over_run(high) <= radii:
         return high
@@ -242,7 +254,7 @@ def _sharpest_fly_over(radii: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PlannedPath:
-    """The fly-by path as a chain of n points.
+    """Fly-by path as a chain of n points.
 
     points: (n, 3) m.
     legs: (n - 1,) leg of each segment.
@@ -256,12 +268,13 @@ class PlannedPath:
 
 @dataclass(frozen=True, slots=True)
 class FlownGround:
-    """What of a flight was flown from the ground and to it.
+    """Ground phases of a flight: its take-off and its landing.
 
-    ways: what was to be flown.
-    whole: the requirements of the whole route, with take-off and landing.
+    ways: the planned ground phases.
+    whole: requirements of the whole route, with take-off and landing.
     track: of the whole flight.
-    begun, left: rows of it where the take-off had ended, and where the landing began; the first and the last for none.
+    begun, left: its rows where the take-off had ended, and where the landing began; the first and the last without
+    them.
     """
 
     ways: GroundWays
@@ -272,39 +285,40 @@ class FlownGround:
 
     @property
     def launch(self) -> Track:
-        """The take-off."""
+        """Track of the take-off."""
         return self.track.rows(0, self.begun + 1)
 
     @property
     def landing(self) -> Track:
-        """The landing."""
+        """Track of the landing."""
         return self.track.rows(self.left, len(self.track))
 
 
 @dataclass(frozen=True, slots=True)
 class RouteRequirements:
-    """A route's turns and legs in numbers, the aircraft's limits at each, and its planned path: made once a verdict.
+    """Turns, legs, limits and planned path of a route in numbers: computed once for each verdict.
 
-    route: the setup's, with true airspeeds where an autopilot takes those that are commanded for equivalent ones.
+    route: the setup's route, with true airspeeds if the autopilot treats commanded airspeeds as equivalent airspeeds.
 
     For w waypoints:
 
     points: (w, 3) m.
     runs: (w - 1,) m, horizontal.
     courses, slopes: (w - 1,) rad.
-    turns, tightest, radius, before, after, reversal: as of `TurnRequirements`.
+    turns, tightest, radius, before, after, reversal: as in `TurnRequirements`.
     blend: (w,) m of leg beyond each turn on which the slope still changes.
     fly_by_offset: (w,) m by which the fly-by passes the waypoint.
-    turn_limit: (w,) rad, as `TurnRequirements.limit`; inf where the envelope is left out.
-    climb, dive: (w - 1,) rad over the ground, the least along the leg, inf where the envelope is left out.
-    sure_climb, sure_dive: (w - 1,) what of them is certain of an aircraft that is not known for certain; else the same.
-    ground_speed: (w - 1,) m/s, NaN where the wind leaves no way.
-    envelope: whether the aircraft's limits count; where they do not, what the flight showed of them does.
+    turn_limit: (w,) rad, as `TurnRequirements.limit`; inf if the envelope is left out.
+    climb, dive: (w - 1,) rad over the ground, the least along the leg, inf if the envelope is left out.
+    sure_climb, sure_dive: (w - 1,) the certain part of those limits for an uncertain aircraft model; otherwise the
+    same.
+    ground_speed: (w - 1,) m/s, NaN if the wind leaves no ground speed.
+    envelope: True if the aircraft's limits apply; otherwise only what the flight showed of them does.
     airspace: the zones of scenario and mission.
-    surveys: those of a mission that a person brought, where the scenario judges surveys by their lines.
-    zones_on: first and last leg if zones are asked about on these alone, and only those that the planned path violates
-        there, for an answer that is in a hurry.
-    ground: of a flight that took off or landed, whose part in the air the rest is of; None for any other.
+    surveys: surveys of a user's mission, if the scenario judges surveys by their lines.
+    zones_on: first and last leg if zones are checked on these alone, and then only the zones that the planned path
+        violates there, for a quick answer.
+    ground: for a flight that took off or landed, to whose airborne part the other fields belong; None for any other.
     """
 
     setup: FlightSetup
@@ -341,20 +355,20 @@ class RouteRequirements:
 
     @property
     def legs(self) -> int:
-        """How many legs there are."""
+        """Number of legs."""
         return len(self.runs)
 
     @property
     def limits_source(self) -> str:
-        """Whose the limits of the scenario are: planfly's own where the mission came without one."""
+        """Source of the scenario's limits: planfly's defaults if the mission came without a scenario."""
         return "default" if self.setup.scenario.external else "scenario"
 
     def waypoint(self, index: int) -> Place:
-        """A waypoint as the place of a finding."""
+        """Return a waypoint as the place of a finding."""
         return Place("waypoint", index, self._item(index), number=int(self.setup.route.stops[index]))
 
     def leg(self, index: int) -> Place:
-        """A leg as the place of a finding, with the item that it leads to."""
+        """Return a leg as the place of a finding, with the item to which it leads."""
         number = int(self.setup.route.leg_numbers[index])
         return Place("leg", index, to_item=self._item(index + 1), number=number)
 
@@ -363,32 +377,35 @@ class RouteRequirements:
         return None if item < 0 else item
 
     def turns_around(self, waypoint: int) -> bool:
-        """Whether a waypoint is part of a survey's turn-around, its ends included: the autopilot's business."""
+        """Return True if a waypoint is part of a survey's turn-around, ends included.
+
+        The autopilot decides its path.
+        """
         return waypoint in _turned_around(self.surveys)[0]
 
     def leads_around(self, leg: int) -> bool:
-        """Whether a leg is part of a survey's turn-around."""
+        """Return True if a leg is part of a survey's turn-around."""
         return leg in _turned_around(self.surveys)[1]
 
     def leg_unit(self, leg: int) -> Floats:
-        """East and north components of a leg's course, (2,)."""
+        """Return the east and north components of a leg's course, (2,)."""
         return np.array([math.sin(self.courses[leg]), math.cos(self.courses[leg])])
 
     def apexes(self) -> Floats:
-        """Where the fly-by path passes each waypoint: the middles of the arcs, (w, 3) m."""
+        """Return where the fly-by path passes each waypoint: the midpoints of the arcs, (w, 3) m."""
         out = self.points.copy()
         for i in range(1, len(out) - 1):
             if self.fly_by_offset[i] > 0.0:
                 inward = self.leg_unit(i) - self.leg_unit(i - 1)
                 out[i, :2] += self.fly_by_offset[i] * inward / math.hypot(*inward)
-                # Halfway between the heights at the arc's ends.
+                # Halfway between the altitudes at the arc's ends.
                 tangent = min(self.before[i], self.runs[i - 1], self.runs[i])
                 out[i, 2] += 0.5 * tangent * (math.tan(self.slopes[i]) - math.tan(self.slopes[i - 1]))
         return out
 
 
 def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteRequirements:
-    """Work out what a setup's route asks for.
+    """Work out what a setup's route requires.
 
     envelope: False leaves the aircraft's limits out, for flown evidence alone.
     """
@@ -433,9 +450,10 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
 
 
 def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
-    """The surveys of a setup's mission that are judged by their lines; none of a plan of planfly's own.
+    """Return the surveys of a setup's mission that are judged by their lines.
 
-    Those whose camera is switched, or, where the scenario asks for "lines", all that have the form of one.
+    A plan made by planfly has none.  Surveys whose camera is switched, or, if the scenario asks for "lines", all legs
+    with the form of a survey.
     """
     asked = setup.scenario.limits.surveys
     if setup.plan is not None or asked == "path":
@@ -443,7 +461,7 @@ def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
     beyond = [(one.photo, one.turn_around) for one in setup.mission.survey_plans if one.photo is not None]
     camera = camera_spacing(setup.mission, setup.route)
     if asked != "lines" and not camera.any():
-        # Where no item switches the camera no line takes photos.
+        # If no item switches the camera, no line takes photos.
         return ()
     found = find_surveys(setup.route, camera, beyond)
     return tuple(one for one in found if asked == "lines" or one.takes_photos())
@@ -451,7 +469,10 @@ def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
 
 @functools.lru_cache(maxsize=8)
 def _turned_around(surveys: tuple[Survey, ...]) -> tuple[frozenset[int], frozenset[int]]:
-    """Waypoints and legs of all turn-arounds, the ways onto the first line and off the last among them."""
+    """Return the waypoints and legs of all turn-arounds.
+
+    Includes the paths onto the first line and off the last.
+    """
     ends = [pair for survey in surveys for pair in survey.ways_onto_lines()]
     return (
         frozenset(i for first, last in ends for i in range(first, last + 1)),
@@ -460,7 +481,9 @@ def _turned_around(surveys: tuple[Survey, ...]) -> tuple[frozenset[int], frozens
 
 
 def true_route(setup: FlightSetup) -> Route:
-    """A setup's route with true airspeeds.  ArduPlane flies equivalent ones: each leg's counts at its middle height.
+    """Return a setup's route with true airspeeds.
+
+    ArduPlane's airspeeds are equivalent: they are converted at each leg's mean altitude.
 
     >>> from flight.autopilots.arduplane.autopilot import ArduPlane
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -489,7 +512,7 @@ def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> Planne
 def _leg_limits(
     route: Route, tables: dict[float, PerformanceTable], points: Floats, courses: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Climb and dive over the ground, rad, and ground speed, m/s, that the aircraft has all along each leg."""
+    """Return climb and dive over the ground, rad, and ground speed, m/s, available all along each leg."""
     legs = len(courses)
     climb, dive, speeds = np.zeros(legs), np.zeros(legs), np.zeros(legs)
     for leg in range(legs):
@@ -503,7 +526,7 @@ def _leg_limits(
 
 
 def _fly_by_offsets(route: Route, turning: TurnRequirements) -> Floats:
-    """Distance by which the fly-by passes each waypoint, (w,) m."""
+    """Return the distance by which the fly-by passes each waypoint, (w,) m."""
     out = np.zeros(len(turning.radius))
     for i in np.flatnonzero(np.isfinite(turning.radius) & ~route.fly_over).tolist():
         radius = float(turning.radius[i])
@@ -512,9 +535,9 @@ def _fly_by_offsets(route: Route, turning: TurnRequirements) -> Floats:
 
 
 def _blends(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turning: TurnRequirements) -> Floats:
-    """Length of leg beside each turn on which the slope still changes, (w,) m.
+    """Return the length of leg next to each turn on which the slope still changes, (w,) m.
 
-    A parabola about each end of the arc, or about the waypoint where there is none.
+    A parabola about each end of the arc, or about the waypoint if there is no arc.
     """
     rise = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
     blend = np.zeros(len(points))
@@ -524,7 +547,7 @@ def _blends(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turn
         turn = abs(float(turning.turns[i]))
         arc = float(turning.radius[i]) * turn if turn > 0.0 else 0.0
         if 0.0 < arc < math.inf and math.isfinite(turning.after[i]) and not setup.route.fly_over[i]:
-            # The arc is shorter than its two tangents, so that its slope is steeper than the legs'.
+            # The arc is shorter than its two tangents, so that its slope is steeper than the slopes of the legs.
             on_arc = (rise[i - 1] + rise[i]) * turning.after[i] / arc
             steps = [abs(on_arc - rise[i - 1]), abs(on_arc - rise[i])]
         blend[i] = max(steps) * speed**2 / (2.0 * BLEND_ACCELERATION)
@@ -532,14 +555,15 @@ def _blends(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turn
 
 
 # ----------------------------------------------------------------------
-# The tighter of the scenario's and the aircraft's limit at each turn, leg and fly-by arc.
+# The tighter of the scenario's limit and the aircraft's limit at each turn, leg and fly-by arc.
 
 
 @dataclass(frozen=True, slots=True)
 class SteepArc:
-    """A fly-by arc that is steeper than the aircraft can climb or sink.
+    """Fly-by arc that is steeper than the aircraft can climb or sink.
 
-    tangent: of the arc's slope.  limit: tangent of the aircraft's, on the mean of both legs' courses; positive.
+    tangent: tangent of the arc's slope.  limit: tangent of the aircraft's limit, averaged over both legs' courses;
+    positive.
     """
 
     tangent: float
@@ -547,21 +571,27 @@ class SteepArc:
 
 
 def turn_limit(requirements: RouteRequirements, i: int) -> tuple[float, str]:
-    """Tighter of the scenario's and the aircraft's limit at a waypoint, rad, and whose it is."""
+    """Return the tighter of the scenario's and the aircraft's limit at a waypoint, rad, and its source."""
     return tighter_turn(requirements, i, float(requirements.turn_limit[i]))
 
 
 def tighter_turn(requirements: RouteRequirements, i: int, aircraft: float) -> tuple[float, str]:
-    """Tighter of the scenario's limit at a waypoint and this one of the aircraft, rad, and whose it is."""
+    """Return the tighter of the scenario's limit and this aircraft limit at a waypoint, rad.
+
+    And the source of the limit.
+    """
     fixed = requirements.limits.max_turn
-    # A circle has no angle: its corners are of our making.
+    # A loiter has no angle: planfly made its corners.
     if fixed is not None and fixed <= aircraft and requirements.setup.route.arcs[i] == 0.0:
         return fixed, "scenario"
     return aircraft, "aircraft" if math.isfinite(aircraft) else "none"
 
 
 def slope_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
-    """Tighter limit on a leg's climb or, for a leg that falls, dive: rad, positive, and whose it is."""
+    """Return the tighter limit on a leg's climb or dive, rad, positive, and its source.
+
+    The dive applies to a falling leg.
+    """
     rising = requirements.slopes[leg] >= 0.0
     fixed = requirements.limits.max_climb if rising else requirements.limits.max_dive
     aircraft = float((requirements.climb if rising else requirements.dive)[leg])
@@ -571,10 +601,10 @@ def slope_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
 
 
 def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
-    """The fly-by arc at a leg's end, where it is too steep.
+    """Return the fly-by arc at a leg's end if it is too steep.
 
-    None where it leaves the airspeed within `OFF_SPEED`: what the aircraft cannot climb or sink on the arc it takes
-    from its speed or adds to it, g dh / V.
+    None if the airspeed stays within `OFF_SPEED`: the climb or descent that the aircraft cannot make on the arc changes
+    its speed by g dh / V.
     """
     i = leg + 1
     if i == requirements.legs or requirements.setup.route.fly_over[i] or requirements.setup.route.arcs[i] > 0.0:

@@ -1,4 +1,4 @@
-"""How each leg was climbed or descended: slope, height, throttle, and the steepest flight that the aircraft showed."""
+"""Measure how each leg was climbed or descended: slope, height, throttle, and the ability shown."""
 
 import math
 from dataclasses import dataclass
@@ -46,7 +46,7 @@ Flags = NDArray[np.bool_]
 
 
 # ----------------------------------------------------------------------
-# Course and slope of flown legs, by least squares where a leg is long enough.
+# Course and slope of flown legs, by least squares if a leg is long enough.
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +54,8 @@ class LegFit:
     """A measured course or slope of a leg.
 
     value, tolerance: rad.
-    run: m that it was measured over.
-    fitted: by least squares over a long enough piece; a short leg's is rough.
+    run: m over which it was measured.
+    fitted: by least squares over a long enough piece; the value of a short leg is rough.
     """
 
     value: float
@@ -65,7 +65,7 @@ class LegFit:
 
 
 def fit_line(x: Floats, y: Floats) -> tuple[float, float]:
-    """Slope of the least-squares line of y on x, and the RMS of what it leaves.  x is not all one value."""
+    """Return the slope of the least-squares line of y on x, and the RMS of its residuals.  x must vary."""
     dx, dy = x - x.mean(), y - y.mean()
     slope = float((dx * dy).sum() / (dx * dx).sum())
     return slope, float(np.sqrt(np.mean((dy - slope * dx) ** 2)))
@@ -74,9 +74,11 @@ def fit_line(x: Floats, y: Floats) -> tuple[float, float]:
 def straight_span(
     requirements: RouteRequirements, leg: int, clear: float, *, level: bool = False
 ) -> tuple[float, float]:
-    """Where on a leg (m from its start) the turns at its ends are over, and ``clear`` metres further in.
+    """Return the span of a leg (m from its start) that lies clear of the turns at its ends.
 
-    level: the blends of slope are to be over too.
+    clear: distance kept from the turns, m.
+
+    level: exclude the blends of slope too.
     """
     start, end = clear, clear
     if level:
@@ -86,7 +88,7 @@ def straight_span(
 
 
 def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
-    """Course that a leg was flown on; None where too little of it was flown."""
+    """Return the course on which a leg was flown, or None if too little of it was flown."""
     if not aligned.flew(leg):
         return None
     rows = aligned.leg_rows(leg)
@@ -96,8 +98,8 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
     if inside.sum() >= 20 and np.ptp(along[inside]) >= SHORTEST_COURSE:
         bend, rest = fit_line(along[inside], across[inside])
         run = float(np.ptp(along[inside]))
-        return LegFit(requirements.courses[leg] + math.atan(bend), _unsteady(COURSE_FLOOR, rest, run), run, True)
-    # A short leg: the mean course between its turns, over a second at least.
+        return LegFit(requirements.courses[leg] + math.atan(bend), _angle_tolerance(COURSE_FLOOR, rest, run), run, True)
+    # A short leg: the mean course between its turns, over at least a second.
     low, high = straight_span(requirements, leg, 0.0)
     between = np.flatnonzero((along >= low) & (along <= high))
     if not between.size:
@@ -114,7 +116,7 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
 
 
 def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
-    """Slope that a leg was flown at; None where less than a second of it was flown."""
+    """Return the slope at which a leg was flown, or None if less than a second of it was flown."""
     if not aligned.flew(leg):
         return None
     rows = aligned.leg_rows(leg)
@@ -125,11 +127,11 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
     if inside.sum() >= 20 and np.ptp(along[inside]) >= SHORTEST_SLOPE:
         rise, rest = fit_line(along[inside], position[inside, 2])
         run = float(np.ptp(along[inside]))
-        return LegFit(math.atan(rise), _unsteady(SLOPE_FLOOR, rest, run), run, True)
+        return LegFit(math.atan(rise), _angle_tolerance(SLOPE_FLOOR, rest, run), run, True)
     time = aligned.track.time[rows]
     if time[-1] - time[0] < 1.0:
         return None
-    # A short leg: the least-squares slope of at least four seconds about its middle, or of all there is of it.
+    # A short leg: the least-squares slope of at least four seconds about its midpoint, or of the whole leg if shorter.
     middle = float(np.interp(0.5 * requirements.runs[leg], np.maximum.accumulate(along), time))
     start = min(max(middle - 0.5 * SHORTEST_TIME, float(time[0])), max(float(time[0]), float(time[-1]) - SHORTEST_TIME))
     window = (time >= start) & (time <= start + SHORTEST_TIME)
@@ -140,19 +142,18 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
     return LegFit(math.atan(rise), ROUGH_SLOPE, float(np.ptp(run_at)), False)
 
 
-def _unsteady(floor: float, rest: float, run: float) -> float:
-    """Tolerance of a fitted angle: what is left beside the line, at the ends of the run, turns it this far."""
+def _angle_tolerance(floor: float, rest: float, run: float) -> float:
+    """Return the tolerance of a fitted angle: residuals at the ends of the run rotate the line."""
     return min(floor + math.atan2(2.0 * rest, run), MAX_UNSTEADY)
 
 
 @dataclass(frozen=True, slots=True)
 class Ability:
-    """The steepest climb, or dive, that the aircraft showed at a throttle limit.
+    """Steepest climb, or dive, that the aircraft showed at a throttle limit.
 
-    slope: over the ground, at the leg's commanded airspeed in the mean wind, rad, positive in the direction of the
-    leg.
-    error: its standard error, rad.
-    seconds: for how long it was seen.
+    slope: over the ground, at the leg's commanded airspeed in the mean wind, rad, positive in the direction of the leg.
+    error: standard error of the slope, rad.
+    seconds: duration over which it was seen.
     """
 
     slope: float
@@ -160,21 +161,21 @@ class Ability:
     seconds: float
 
     def covers(self, planned: float) -> bool:
-        """Whether it is more, beyond its own error, than a leg's slope (rad) asks."""
+        """Return True if the ability exceeds a leg's slope (rad) by more than its own error."""
         return self.slope - SURE * self.error > abs(planned)
 
 
 @dataclass(frozen=True, slots=True)
 class SlopeMeasure:
-    """How one leg was climbed or descended; None where it was not.
+    """Measured climb or descent of one leg; None in a field if the leg was not flown.
 
     slope: as fitted.
     height_error: m, largest distance above (negative: below) the leg's line.
-    short: no part of the leg is clear of the blends.
+    short: True if no part of the leg is clear of the blends.
     at_full, at_idle: s with the throttle at its limits.
-    slow, fast: m/s, the largest mean of airspeed below, above the command over `SATURATED` seconds meanwhile, as far
-    as no gust explains it; 0 for none.
-    ability: what the aircraft could do at the throttle limit that the leg asks for, where the flight came to it.
+    slow, fast: m/s, the largest mean airspeed error below and above the command over `SATURATED` seconds at those
+        limits, without the part that a gust explains; 0 for none.
+    ability: the aircraft's ability at the throttle limit that the leg needs, if the flight reached that limit.
     finished: the leg was flown to its end.
     """
 
@@ -210,7 +211,7 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
 
 
 def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[float | None, bool]:
-    """Largest signed distance from the leg's line where it is clear of blends, m, and whether nothing is."""
+    """Return the largest signed distance from the leg's line, m, and whether no part is clear of blends."""
     along, _ = along_across(requirements, leg, position)
     low, high = straight_span(requirements, leg, CLEAR_OF_TURN, level=True)
     inside = (along >= low) & (along <= high)
@@ -226,7 +227,7 @@ def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
-    """Rows of a leg after the aircraft has had time to take up its commanded speed; empty for a leg as short."""
+    """Return the rows of a leg after the time for taking up its commanded speed; may be empty."""
     rows = aligned.leg_rows(leg)
     speeds = requirements.route.airspeed
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
@@ -235,7 +236,7 @@ def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 
 
 def _saturation(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> tuple[float, float, float, float]:
-    """Seconds at full and idle throttle, and the speed lost and gained meanwhile, as `SlopeMeasure` has them."""
+    """Return seconds at full and idle throttle, and the speed lost and gained, as in `SlopeMeasure`."""
     rows = steady_rows(requirements, aligned, leg)
     track = aligned.track
     if rows.stop - rows.start < 2:
@@ -248,13 +249,13 @@ def _saturation(requirements: RouteRequirements, aligned: AlignedTrack, leg: int
     steady = _speed_in_mean_wind(requirements, aligned, rows) - commanded
     width = max(1, round(SATURATED / tick))
     lifted = lifted_speed(aligned.track.time, aligned.track.airspeed, aligned.track.wind[:, 2], rows.stop)[rows]
-    slow = _mean_while(full, np.minimum(-error, -steady) - np.maximum(0.0, -lifted), width)
-    fast = _mean_while(idle, np.minimum(error, steady) - np.maximum(0.0, lifted), width)
+    slow = _largest_mean_within(full, np.minimum(-error, -steady) - np.maximum(0.0, -lifted), width)
+    fast = _largest_mean_within(idle, np.minimum(error, steady) - np.maximum(0.0, lifted), width)
     return float(full.sum() * tick), float(idle.sum() * tick), slow, fast
 
 
 def _at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
-    """Which rows have the throttle at full, and which at idle."""
+    """Return the rows that have the throttle at full, and those that have it at idle."""
     track = aligned.track
     throttle = track.controls[rows, THROTTLE]
     full = throttle >= FULL
@@ -266,12 +267,12 @@ def _at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: sli
 
 
 def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> Ability | None:
-    """What the aircraft could do at the throttle limit that a leg asks for: full to climb, idle to dive.
+    """Measure the aircraft's ability at the throttle limit that a leg needs: full to climb, idle to dive.
 
     Thrust less drag gives an aircraft the climb rate v_up + v . a / g, where v is its velocity relative to the air and
-    a its acceleration over the ground: exact in any gust, for lift does no work.  A least-squares plane over airspeed
-    and height gives it at the commanded airspeed and the greatest height where it was seen, where an aircraft climbs
-    least.
+    a its acceleration over the ground: exact in any gust, because lift does no work.  A least-squares plane over
+    airspeed and altitude gives it at the commanded airspeed and the greatest altitude at which it was seen, where an
+    aircraft climbs least.
     """
     rows = steady_rows(requirements, aligned, leg)
     track, sign = aligned.track, 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
@@ -281,7 +282,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     full &= track.controls[rows, THROTTLE] >= FULL_THROTTLE
     along, _ = along_across(requirements, leg, track.position[rows])
     low, high = straight_span(requirements, leg, 0.0)
-    use = _held_for(full if sign > 0.0 else idle, round(SETTLED_AFTER / aligned.tick))
+    use = _rows_after(full if sign > 0.0 else idle, round(SETTLED_AFTER / aligned.tick))
     use &= (along >= low) & (along <= high)
     seconds = float(use.sum() * aligned.tick)
     if seconds < SHOWN_OVER:
@@ -302,18 +303,18 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
         for value in (fit[0], fit[0] + fit[1])
     ]
     error = abs(slopes[1] - slopes[0])
-    # Written so that NaN says nothing.
+    # Written so that NaN gives None.
     return Ability(sign * slopes[0], error, seconds) if error <= UNSURE else None
 
 
-def _held_for(mask: Flags, count: int) -> Flags:
-    """Rows of ``mask`` that the ``count`` rows before are in as well."""
+def _rows_after(mask: Flags, count: int) -> Flags:
+    """Return the rows of ``mask`` whose ``count`` preceding rows are in the mask too."""
     row = np.arange(mask.size)
     return np.asarray(row - np.maximum.accumulate(np.where(mask, -1, row)) > count)
 
 
 def _plane_at_origin(value: Floats, x: Floats, y: Floats, independent: float) -> tuple[float, float] | None:
-    """Value at x = y = 0 of the least-squares plane, and its standard error; None where it is not determined."""
+    """Return the least-squares plane's value at x = y = 0 and its standard error, or None if singular."""
     columns = [np.ones_like(x), x] + ([y] if np.ptp(y) > 1e-3 else [])
     table = np.column_stack(columns)
     moments = table.T @ table / len(x)
@@ -326,7 +327,7 @@ def _plane_at_origin(value: Floats, x: Floats, y: Floats, independent: float) ->
 
 
 def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> Floats:
-    """Speed that the air would see without gusts, m/s."""
+    """Return the airspeed that the aircraft would have without gusts, m/s."""
     wind, track = requirements.setup.scenario.wind, aligned.track
     mean = wind.at_each(np.ascontiguousarray(track.position[rows, 2]))
     east, north = track.velocity[rows, 0] - mean[:, 0], track.velocity[rows, 1] - mean[:, 1]
@@ -335,7 +336,10 @@ def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, 
 
 @compiled
 def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) -> Floats:  # pragma: no cover - compiled
-    """Airspeed gained from rising air (m/s) in rows 0..stop, as it fades, for an aircraft that holds its path."""
+    """Return the airspeed gained from rising air (m/s) in rows 0..stop, as it fades.
+
+    For an aircraft that holds its path.
+    """
     out = np.zeros(stop)
     for k in range(1, stop):
         step = time[k] - time[k - 1]
@@ -344,8 +348,8 @@ def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) ->
     return out
 
 
-def _mean_while(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
-    """Largest mean of ``value`` over ``width`` rows of which most are in ``mask``; 0 where there are none."""
+def _largest_mean_within(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
+    """Return the largest mean of ``value`` over ``width`` rows mostly in ``mask``, or 0 without any."""
     if mask.size < width:
         return 0.0
     total = np.concatenate([[0.0], np.cumsum(value)])

@@ -1,7 +1,8 @@
-"""The flown side of every finding: the usable rows of a track, and which of them belong to which leg.
+"""Align a track with a route: its usable rows, and the rows of each leg.
 
-Only time, position, velocity, attitude, airspeed, throttle, wind, current and energy are read.  The columns that
-guidance keeps of itself (leg, cross-track, height error, clearance) are not: a verdict is not to rest on them.
+This is the flown side of every finding.  Only time, position, velocity, attitude, airspeed, throttle, wind, current and
+energy are read.  The columns that guidance records about itself (leg, cross-track, height error, clearance) are not: a
+verdict must not depend on them.
 """
 
 import math
@@ -26,27 +27,27 @@ RowNumbers = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 
 
-# A waypoint that the route leads to so much further than it reaches was not flown by, m.
+# A waypoint was not passed if the route from the track's end to it is longer than its arrival distance and this, m.
 _STILL_AHEAD_M = 50.0
-# Largest table of the assignment of rows to waypoints, cells; the track is thinned to stay within it.
+# Largest number of cells in the assignment of rows to waypoints; the track is thinned to stay within it.
 _CELLS = 40_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class AlignedTrack:
-    """A track laid beside a route of w waypoints; t usable rows.
+    """Track aligned with a route of w waypoints; t usable rows.
 
     track: the usable rows.
-    bad_rows: how many rows had no finite, plausible numbers or no later time than the row before.
-    first_bad: time of the first of them, s; NaN where there is none.
+    bad_rows: number of rows with non-finite or implausible numbers or a time not later than the row before.
+    first_bad: time of the first of them, s; NaN if there is none.
     rows: (w,) the row nearest to each waypoint's apex, never decreasing; the last row for a waypoint that the flight
-    did not get to.
+        did not reach.
     distance: (w,) m from there to the apex.
-    passed: (w,) bool, the flight went by.
+    passed: (w,) bool, the flight passed the waypoint.
     course: (t,) rad over the ground, unwrapped.
     distance_run: (t,) m along the ground track.
-    low, low_at: (t - 1,) least height above ground between a row and the next, m, and the fraction of the way where
-    it is; NaN off the known terrain, and without any.
+    low, low_at: (t - 1,) least height above ground between a row and the next, m, and the fraction of the segment at
+        which it occurs; NaN off the known terrain, and without terrain.
     tick: usual time between rows, s.
     """
 
@@ -63,37 +64,37 @@ class AlignedTrack:
     tick: float
 
     def leg_rows(self, leg: int) -> slice:
-        """Rows between a leg's two waypoints, both included."""
+        """Return the rows between a leg's two waypoints, both included."""
         return slice(int(self.rows[leg]), int(self.rows[leg + 1]) + 1)
 
     def leg_ends(self) -> tuple[float, ...]:
-        """When each leg but the last ended, s: at the row nearest to its waypoint's apex; inf where it was not met."""
+        """Return the end time of each leg but the last, s; inf if its waypoint was not reached."""
         ends = np.where(self.passed, self.track.time[self.rows], math.inf)[1:-1]
         return tuple(ends.tolist())
 
     def flew(self, leg: int) -> bool:
-        """Whether any of a leg was flown."""
+        """Return True if any part of a leg was flown."""
         return bool(self.passed[leg]) and self.rows[leg + 1] > self.rows[leg]
 
     def leg_at(self, row: int) -> int:
-        """Leg that a row was flown on; the last row is on the leg that the flight ended on."""
+        """Return the leg on which a row was flown; the last row is on the leg that the flight ended on."""
         return int(np.searchsorted(self.rows[1:-1], min(row, len(self.track) - 2), side="right"))
 
     def where(self, row: int, fraction: float = 0.0) -> str:
-        """Place of a row, or of a fraction of the way from it to the next, on the map, in words."""
+        """Return the place of a row, or of a fraction of the segment to the next row, on the map, in words."""
         position = self.track.position
         east, north = (position[row] + fraction * (position[min(row + 1, len(position) - 1)] - position[row]))[:2]
         return f"east {east:.0f} m, north {north:.0f} m"
 
     def around(self, first: int, last: int, seconds: float) -> slice:
-        """Rows first..last and those within ``seconds`` of them."""
+        """Return rows first..last and the rows within ``seconds`` of them."""
         time = self.track.time
         start = int(np.searchsorted(time, time[first] - seconds))
         return slice(start, int(np.searchsorted(time, time[last] + seconds, side="right")))
 
 
 def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack | None:
-    """Lay a track beside a route; None where it has fewer than two usable rows."""
+    """Align a track with a route; return None if the track has fewer than two usable rows."""
     good = _usable(track, own=requirements.setup.source is None)
     if int(good.sum()) < 2:
         return None
@@ -105,10 +106,10 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     apexes, last = requirements.apexes(), len(clean) - 1
     progress = route_progress(requirements.setup.route, clean.position, anywhere=requirements.setup.source is not None)
     arrived = _arrival_distances(requirements)
-    progress = _past_arrivals(requirements, clean, progress, arrived)
-    rows, distance = _assign(clean, apexes, progress)
+    progress = _with_arrivals(requirements, clean, progress, arrived)
+    rows, distance = _passage_rows(clean, apexes, progress)
     off = np.hypot(*(clean.position[rows, :2] - requirements.points[:, :2]).T)
-    # The flight is past a waypoint that it flew by, or at one that it ended at; one far ahead it did not fly by.
+    # The flight is past a waypoint that it passed, or at the waypoint where it ended; it did not pass one far ahead.
     ahead = progress.left > arrived + _STILL_AHEAD_M
     ahead[-1] = False
     passed = ((rows < last) & ~ahead) | (off <= arrived)
@@ -138,17 +139,17 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
 
 
 def _arrival_distances(requirements: RouteRequirements) -> Floats:
-    """Distance from each waypoint, (w,) m, within which a track that ends there has passed it."""
+    """Return the distance from each waypoint, (w,) m, within which a track that ends there has passed it."""
     route, follows_path = requirements.setup.route, requirements.setup.autopilot.follows_path
     offsets = requirements.fly_by_offset if follows_path else np.zeros(len(route.waypoints))
     arrived = [max(float(offset) + ARRIVED, reach(requirements, i).radius) for i, offset in enumerate(offsets)]
     first = route.return_from
     if first >= 0:
-        # A return ends where its autopilot circles, which is not where its circle is drawn.
+        # A return ends where its autopilot loiters, which is not where the loiter is drawn.
         until = route.return_until
         arrived[first + 1 : until] = [max(NEAR, radius) for radius in arrived[first + 1 : until]]
     if requirements.setup.autopilot.loiter_rules.at_middle:
-        # A mission that ends on a circle about a middle ends anywhere on it, which is as wide as it is flown.
+        # A mission that ends on a loiter about a center ends anywhere on it, as wide as it is flown.
         ends, item = route.arcs.size - 1, route.items[-1]
         while ends > 0 and route.items[ends] == item and route.arcs[ends - 1]:
             arrived[ends] = max(arrived[ends], NEAR)
@@ -156,12 +157,12 @@ def _arrival_distances(requirements: RouteRequirements) -> Floats:
     return np.array(arrived)
 
 
-def _past_arrivals(
+def _with_arrivals(
     requirements: RouteRequirements, track: Track, progress: RouteProgress, arrived: Floats
 ) -> RouteProgress:
-    """Add the waypoints that a track ends at to those that it set out for.
+    """Add the waypoints at which a track ends to the waypoints that it set out for.
 
-    A flight within reach of a waypoint is on the way to the next one, from where it came within reach.
+    A flight within reach of a waypoint is flying to the next one, from the row where it came within reach.
     """
     points, last, target = requirements.points, len(track) - 1, progress.target
     first, until = progress.first.copy(), progress.last.copy()
@@ -178,9 +179,10 @@ def _past_arrivals(
 def _begin_last_leg(
     requirements: RouteRequirements, track: Track, rows: RowNumbers, passed: NDArray[np.bool_], arrived: Floats
 ) -> None:
-    """Begin the leg that a track ends on where the track came within reach of its first waypoint; changes ``rows``.
+    """Begin the track's last leg at the row that came within reach of its first waypoint.
 
-    Only where the track ends within that reach, before the waypoint: who flies is on the next leg by then.
+    Changes ``rows``.  Only if the track ends within that reach, before the waypoint: the autopilot is on the next leg
+    by then.
     """
     k = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
     if not 0 < k < len(rows) - 1 or rows[k] < len(track) - 1 or requirements.setup.route.arcs[k] > 0.0:
@@ -191,14 +193,14 @@ def _begin_last_leg(
 
 
 def along_across(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[Floats, Floats]:
-    """Distance along a leg from its start and to the right of its line, m, of positions (n, 3)."""
+    """Return distances along a leg from its start and to the right of its line, m, of positions (n, 3)."""
     east, north = position[:, 0] - requirements.points[leg, 0], position[:, 1] - requirements.points[leg, 1]
     ux, uy = math.sin(requirements.courses[leg]), math.cos(requirements.courses[leg])
     return east * ux + north * uy, east * uy - north * ux
 
 
 def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
-    """Least horizontal distance of each segment of a track from a target, m, and the fraction where that is.
+    """Return each track segment's least horizontal distance from a target, m, and its fraction there.
 
     position: (n, 3).  target: (2,) or (3,).  Returns (n - 1,) twice.
     """
@@ -212,10 +214,10 @@ def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
 
 
 def _usable(track: Track, *, own: bool) -> NDArray[np.bool_]:
-    """Rows with finite, plausible numbers, later than every usable row before them.
+    """Return the rows with finite, plausible numbers, later than every usable row before them.
 
-    own: the flight is planfly's, which has all numbers in every row; of an imported log places and velocities count,
-    and each rule looks to what it needs beside them.
+    own: the flight is planfly's own, with all numbers in every row; of an imported log only positions and velocities
+    are checked here, and each rule checks what else it needs.
     """
     good = np.isfinite(track.time)
     plausible: tuple[tuple[str, float], ...] = (("position", FARTHEST), ("velocity", FASTEST))
@@ -236,10 +238,11 @@ def _usable(track: Track, *, own: bool) -> NDArray[np.bool_]:
     return np.asarray(good & (time > before))
 
 
-def _assign(track: Track, apexes: Floats, progress: RouteProgress) -> tuple[RowNumbers, Floats]:
-    """Row of each waypoint's passage: the assignment in time order with the least sum of squared distances.
+def _passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tuple[RowNumbers, Floats]:
+    """Return the row of each waypoint's passage, and its distance, m.
 
-    Of the rows that are along each waypoint's legs.
+    The assignment in time order with the least sum of squared distances.  Only rows along each waypoint's legs are
+    considered.
     """
     position, count, last = track.position, len(apexes), len(track) - 1
     tick = max(1e-6, float(track.time[-1] - track.time[0]) / last)
@@ -248,7 +251,7 @@ def _assign(track: Track, apexes: Floats, progress: RouteProgress) -> tuple[RowN
     chords, capped = _align(read_only(position), apexes, first, until, step, CAPTURE_RADIUS)
     rows = np.zeros(count, dtype=np.int64)
     distance = np.zeros(count)
-    # Missed waypoints lie between their neighbours; those after the last one met lie at the end.
+    # Missed waypoints lie between their neighbours; waypoints after the last one that was met lie at the end.
     met = np.flatnonzero(~capped)
     final = int(met[-1]) if met.size else -1
     low = 0
@@ -273,10 +276,10 @@ def _assign(track: Track, apexes: Floats, progress: RouteProgress) -> tuple[RowN
 def _align(
     position: Floats, marks: Floats, first: RowNumbers, until: RowNumbers, step: int, capture: float
 ) -> tuple[RowNumbers, NDArray[np.bool_]]:  # pragma: no cover - compiled
-    """Find the chord (of ``step`` rows) of each mark, in time order, with the least sum of min(distance, capture)^2.
+    """Find the chord (of ``step`` rows) of each mark, in time order.
 
-    By dynamic programming; of equal assignments the earliest.  Also which marks no row of their chord captures: each
-    is captured by chords first..until alone.
+    The sum of min(distance, capture)^2 is the least.  By dynamic programming; among equal assignments the earliest.
+    Also return which marks no row of their chord captures; only chords first..until can capture a mark.
     """
     last = position.shape[0] - 1
     chords = -(-last // step)
@@ -323,32 +326,33 @@ def _align(
 
 
 # ----------------------------------------------------------------------
-# Which leg each row of a track was flown on, as a verdict aligned them.
+# The leg on which each row of a track was flown, as a verdict aligned it.
 #
-# What guidance noted of it is left aside, so that a report's tables and a replay cannot differ from the verdict.
+# The legs recorded by guidance are ignored, so that a report's tables and a replay cannot differ from the verdict.
 
-_ASIDE = ("velocity", "attitude", "airspeed", "controls", "wind", "current", "energy")
+_IGNORED_COLUMNS = ("velocity", "attitude", "airspeed", "controls", "wind", "current", "energy")
 
 
 def find_leg_ends(setup: FlightSetup, track: Track) -> tuple[float, ...]:
-    """When each leg but the last ended, s, for a track without a verdict; inf where its waypoint was not met.
+    """Return the end of each leg but the last, s, for a track without a verdict.
 
-    Only time and position count.  Empty for a track with fewer than two usable rows.
+    inf if its waypoint was not reached.  Only time and position are used.  Empty for a track with fewer than two usable
+    rows.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
     >>> find_leg_ends(log.setup, log.track)
     (20.0,)
     """
-    places = replace(track, **{name: np.zeros_like(getattr(track, name)) for name in _ASIDE})
+    places = replace(track, **{name: np.zeros_like(getattr(track, name)) for name in _IGNORED_COLUMNS})
     aligned = align_track(route_requirements(setup), places)
     return () if aligned is None else aligned.leg_ends()
 
 
 def with_legs(track: Track, leg_ends: Sequence[float]) -> Track:
-    """Return the track with its ``leg`` column made anew of the times at which legs end, s, rising.
+    """Return the track with its ``leg`` column computed again from the times at which legs end, s, rising.
 
-    leg_ends: of a `logs.verdict.verdict.Verdict` or of `find_leg_ends`.  Without any, all rows are on leg 0.
+    leg_ends: from a `logs.verdict.verdict.Verdict` or from `find_leg_ends`.  If empty, all rows are on leg 0.
     """
     ends = np.array(leg_ends, dtype=np.float64)
     return replace(track, leg=np.searchsorted(ends, track.time, side="right").astype(np.int32))

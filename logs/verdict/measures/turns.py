@@ -1,4 +1,4 @@
-"""How each turn was flown: angle, bank, radius, overshoot, and where the aircraft settled."""
+"""Measure how each turn was flown: angle, bank, radius, overshoot, and where the aircraft settled."""
 
 import math
 from dataclasses import dataclass, replace
@@ -16,23 +16,23 @@ Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
-# How an imported flight took each corner: its nearest pass, and how far past the new leg it went.
+# Corners of an imported flight: the nearest pass, and how far past the new leg the flight went.
 #
-# The autopilot of an imported flight knows nothing of planfly's arcs: it turns where it holds the waypoint to be
-# reached.  So its corners are measured against what is known of them, the waypoint and the next leg.
+# The autopilot of an imported flight knows nothing of planfly's arcs: it turns where it considers the waypoint reached.
+# So its corners are measured against known quantities: the waypoint and the next leg.
 
-# Share of the next leg over which a corner is looked at: by its end the next corner has begun.
+# Fraction of the next leg over which a corner is examined: by its end the next corner has begun.
 OF_NEXT_LEG = 0.7
 
 
 @dataclass(frozen=True, slots=True)
 class CornerPass:
-    """How one waypoint was passed.
+    """Measured pass of one waypoint.
 
     time: s, of the nearest pass.  nearest: m, horizontal distance from the waypoint then.
     overshoot: m past the next leg, on the outside of the turn, from there to `OF_NEXT_LEG` of that leg, or to the next
-    waypoint's pass where that is sooner; None where the next leg was not joined.
-    beyond: m past the next leg's end at the nearest pass, where it was not joined.
+        waypoint's pass if that is sooner; None if the next leg was not joined.
+    beyond: m past the next leg's end at the nearest pass, if the leg was not joined.
     """
 
     time: float
@@ -42,7 +42,7 @@ class CornerPass:
 
 
 def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[CornerPass, ...]:
-    """How each waypoint of a route was passed, in its order: each after the one before it.
+    """Measure how each waypoint of a route was passed, in route order: each after the one before it.
 
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.measures.route_requirements import route_requirements
@@ -53,27 +53,27 @@ def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tup
     >>> len(passes) == requirements.legs + 1, passes[1].nearest < 60.0
     (True, True)
     """
-    found = _nearest(requirements, aligned)
+    found = _nearest_passes(requirements, aligned)
     times, tick = [time for time, _ in found], aligned.tick
     out = []
     for k, (time, nearest) in enumerate(found):
         overshoot, beyond = None, 0.0
         if 0 < k < requirements.legs:
             later = next((other for other in times[k + 1 :] if other > time + tick), float(aligned.track.time[-1]))
-            overshoot, beyond = _past_next_leg(requirements, aligned, k, time, later)
+            overshoot, beyond = _measure_overshoot_of_next_leg(requirements, aligned, k, time, later)
         out.append(CornerPass(time, nearest, overshoot, beyond))
     return tuple(out)
 
 
-def _nearest(requirements: RouteRequirements, aligned: AlignedTrack) -> list[tuple[float, float]]:
-    """Time (s) and distance (m) of each waypoint's nearest pass, between the pass before it and the next one's."""
+def _nearest_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> list[tuple[float, float]]:
+    """Return time (s) and distance (m) of each waypoint's nearest pass, between the neighbouring passes."""
     time, rows = aligned.track.time, aligned.rows
     out: list[tuple[float, float]] = []
     begin = float(time[0])
     for k in range(len(rows)):
-        # Of waypoints that lie by the same row none is a bound for the others.
+        # Waypoints that share a row do not bound each other.
         later = rows[k + 1 :][time[rows[k + 1 :]] > max(float(time[rows[k]]), begin)]
-        moments, place = _way(aligned, begin, float(time[later[0]] if later.size else time[-1]))
+        moments, place = _track_between(aligned, begin, float(time[later[0]] if later.size else time[-1]))
         away, fraction = approaches(place, requirements.points[k])
         nearest = int(np.argmin(away))
         begin = float(moments[nearest] + fraction[nearest] * (moments[nearest + 1] - moments[nearest]))
@@ -81,26 +81,26 @@ def _nearest(requirements: RouteRequirements, aligned: AlignedTrack) -> list[tup
     return out
 
 
-def _way(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Floats]:
-    """Moments (n,) s from one time to another, and places (n, 3) of the flight then."""
+def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Floats]:
+    """Return moments (n,) s from one time to another, and the positions (n, 3) of the flight then."""
     time = aligned.track.time
     moments = np.concatenate([[start], time[(time > start) & (time < end)], [end]])
     return moments, np.column_stack([np.interp(moments, time, aligned.track.position[:, j]) for j in range(3)])
 
 
-def _past_next_leg(
+def _measure_overshoot_of_next_leg(
     requirements: RouteRequirements, aligned: AlignedTrack, k: int, start: float, end: float
 ) -> tuple[float | None, float]:
-    """Overshoot (m; None without one) of the corner at a waypoint, and how far past the leg's end it began (m)."""
+    """Return the overshoot (m, or None) at a waypoint, and how far past the leg's end it began (m)."""
     run = float(requirements.runs[k])
-    along, across = along_across(requirements, k, _way(aligned, start, end)[1])
+    along, across = along_across(requirements, k, _track_between(aligned, start, end)[1])
     if along[0] > run:
         return None, float(along[0]) - run
     outside = -math.copysign(1.0, float(requirements.turns[k])) * across
     gone = np.flatnonzero(along >= OF_NEXT_LEG * run)
     until = int(gone[0]) if gone.size else len(along)
     if 0 < until < len(along):
-        # To the very place: rows may be a second apart.
+        # Interpolate to the exact end: rows may be a second apart.
         share = (OF_NEXT_LEG * run - along[until - 1]) / (along[until] - along[until - 1])
         last = outside[until - 1] + share * (outside[until] - outside[until - 1])
         return max(0.0, float(last), float(outside[:until].max())), 0.0
@@ -109,7 +109,7 @@ def _past_next_leg(
 
 @dataclass(frozen=True, slots=True)
 class TurnMeasure:
-    """How one turn was flown; None where it was not, or where there is nothing to measure.
+    """Measured turn; None in a field if the turn was not flown, or there is nothing to measure.
 
     angle, tolerance: rad, of the course change.
     fitted: the courses of both legs are fits.
@@ -120,8 +120,9 @@ class TurnMeasure:
     settled: m, mean distance from the next leg in the last second before its end.
     passed: m, least distance from the waypoint.
     full_circles: whole turns flown beyond the corner's own.
-    over: the flight got past the turn.
-    corner: of an imported flight, how its waypoint was passed; ``overshoot`` and ``passed`` are then its.
+    over: True if the flight got past the turn.
+    corner: for an imported flight, the measured pass of the waypoint; ``overshoot`` and ``passed`` are then taken from
+    it.
     """
 
     angle: float | None = None
@@ -159,14 +160,14 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int)
     position = track.position[first : last + 1]
     before, _ = along_across(requirements, i - 1, position)
     along, across = along_across(requirements, i, position)
-    entry = _first(before >= requirements.runs[i - 1] - requirements.before[i], middle - first)
+    entry = _first_row(before >= requirements.runs[i - 1] - requirements.before[i], middle - first)
     leaving = np.arange(first, last + 1) >= middle
-    leave = _first(leaving & (along >= requirements.after[i]), last - first)
-    # A neighbour that asks for more than the leg has gets half of it: it is at fault, not this turn.
+    leave = _first_row(leaving & (along >= requirements.after[i]), last - first)
+    # A neighbour that needs more than the leg has gets half of it: the neighbour is at fault, not this turn.
     ahead = min(
         float(requirements.before[i + 1]), max(0.5 * requirements.runs[i], requirements.runs[i] - requirements.after[i])
     )
-    end = _first(leaving & (along >= requirements.runs[i] - ahead), last - first)
+    end = _first_row(leaving & (along >= requirements.runs[i] - ahead), last - first)
     around = aligned.around(first + entry, first + max(entry, leave), 1.0)
     held, radius = _second_by_second(aligned, around)
     angle, tolerance, fitted = _angle(requirements, aligned, i)
@@ -188,7 +189,7 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int)
     )
 
 
-def _first(mask: NDArray[np.bool_], otherwise: int) -> int:
+def _first_row(mask: NDArray[np.bool_], otherwise: int) -> int:
     found = int(np.argmax(mask))
     return found if mask[found] else otherwise
 
@@ -202,7 +203,7 @@ def _angle(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> tu
 
 
 def _second_by_second(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
-    """Largest mean bank over a second (rad) and least radius over a second (m; inf for no turn)."""
+    """Return the largest mean bank (rad) and the least radius (m; inf for no turn), each over a second."""
     time = aligned.track.time[rows]
     bank = np.abs(aligned.track.attitude[rows, ROLL].astype(np.float64))
     ticks = int(np.searchsorted(time, time[0] + 1.0))
@@ -219,7 +220,7 @@ def _second_by_second(aligned: AlignedTrack, rows: slice) -> tuple[float, float]
 def _overshoot(
     requirements: RouteRequirements, i: int, position: Floats, before: Floats, along: Floats, across: Floats
 ) -> float | None:
-    """Largest distance outside the arc, and outside the next leg after it, m; 0 where always within."""
+    """Return the largest distance outside the arc and then outside the next leg, m; 0 if always within."""
     if requirements.setup.route.fly_over[i] or not math.isfinite(requirements.before[i]):
         return None
     side = math.copysign(1.0, requirements.turns[i])
@@ -240,7 +241,10 @@ def _overshoot(
 def _settled(
     requirements: RouteRequirements, aligned: AlignedTrack, i: int, first: int, end: int, along: Floats, across: Floats
 ) -> float:
-    """Mean distance from the next leg's line in its last second before the next turn, or there, m."""
+    """Return the mean distance from the next leg's line in its last second before the next turn, m.
+
+    If the turn takes all of the leg, the distance at its end.
+    """
     time = aligned.track.time[first : first + end + 1]
     start = int(np.searchsorted(time, time[-1] - 1.0))
     rows = np.arange(start, end + 1)

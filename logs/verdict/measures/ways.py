@@ -1,4 +1,4 @@
-"""Ways on the map that no path was planned of, and what is in them: ground, missile spheres and zones."""
+"""Check unplanned paths on the map against the ground, missile spheres and zones."""
 
 import math
 from collections.abc import Sequence
@@ -20,60 +20,61 @@ from world.airspace.zone_kernels import zone_records
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
-# Heights (m AMSL) at runs (m from a way's beginning) that rise.
+# Altitudes (m AMSL) at increasing runs (m from the path's start).
 Profile = list[tuple[float, float]]
 
-# m of a way that is looked at in one piece: what is known of the ground before it ends counts by pieces.
-_PIECE = 100.0
+# Length of the pieces in which a path's clearance is computed, m.  The ground that is known before a gap in the
+# elevation data applies piece by piece.
+_PIECE_LENGTH_M = 100.0
 
 
 class Way(NamedTuple):
-    """A way of n points: (n, 3) m, and the run to each, (n,) m."""
+    """Path of n points: (n, 3) m, and the run to each point, (n,) m."""
 
     points: Floats
     run: Floats
 
     def between(self, first: float, last: float) -> "Way":
-        """The part between two runs, m."""
+        """Return the part between two runs, m."""
         inner = self.run[(self.run > first) & (self.run < last)]
         at = np.concatenate([[first], inner, [max(first, last)]])
         return Way(np.stack([np.interp(at, self.run, self.points[:, k]) for k in range(3)], axis=1), at)
 
 
 def track_way(track: Track) -> Way:
-    """The way of a flown track over the ground."""
+    """Return the horizontal path of a flown track."""
     position = np.asarray(track.position, dtype=np.float64)
     step = np.diff(position[:, :2], axis=0)
     return Way(position, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
 
 
 def straight_way(begin: Sequence[float] | Floats, course: float, profile: Profile) -> Way:
-    """A way on one course (rad) from a place (east, north, m)."""
+    """Return a path on one course (rad) from a start (east, north, m)."""
     run, up = np.array(profile, dtype=np.float64).T
     east, north = begin[0] + run * math.sin(course), begin[1] + run * math.cos(course)
     return Way(np.stack([east, north, up], axis=1), run)
 
 
 def way_clearance(ground: Terrain, way: Way) -> tuple[float, float]:
-    """Least height above ground on a way and the run where that is, m.
+    """Return the least height above ground on a path and the run at which it occurs, m.
 
-    NaN where the ground is not known all along, and what is known of it is not met.
+    NaN if the ground is not known along the whole path and the path does not hit the ground that is known.
     """
     first, last = float(way.run[0]), float(way.run[-1])
-    cuts = np.linspace(first, last, max(2, math.ceil((last - first) / _PIECE) + 1))
+    cuts = np.linspace(first, last, max(2, math.ceil((last - first) / _PIECE_LENGTH_M) + 1))
     run = np.union1d(cuts, way.run)
     points = np.stack([np.interp(run, way.run, way.points[:, k]) for k in range(3)], axis=1)
     found = [ground.clearance(*points[k : k + 2]) for k in range(len(run) - 1)]
     low = np.array([clearance for clearance, _ in found])
-    # Of a NaN, where there is one, but for ground that is met.
+    # A NaN takes precedence, unless the path hits known ground.
     k = int(np.nanargmin(low)) if (low < 0.0).any() else int(np.argmin(low))
     return float(low[k]), float(run[k] + found[k][1] * (run[k + 1] - run[k]))
 
 
 def entered_by_way(requirements: RouteRequirements, way: Way) -> str:
-    """The missile's sphere or the zone that a way enters, in words; "" for none.
+    """Return the name of the first missile sphere or zone that a path enters, or "" if it enters none.
 
-    A zone that the way begins in is none: whoever stands there knows.  Nor is one to stay in that has a floor.
+    Ignores zones the path starts in, and inclusion zones with a floor.
     """
     scenario, airspace = requirements.setup.scenario, requirements.airspace
     if not scenario.external:
@@ -92,18 +93,18 @@ def entered_by_way(requirements: RouteRequirements, way: Way) -> str:
 
 
 # ----------------------------------------------------------------------
-# What of a mission such ways begin and end with.
+# The mission items at which such paths begin and end.
 
 
 def is_laid_out(requirements: RouteRequirements) -> bool:
-    """Whether ways are laid out: over known ground, but for imported flights and plans that stay in the air."""
+    """Return True if ground paths apply: known terrain, not an imported flight or an airborne plan."""
     setup = requirements.setup
     on_ground = setup.plan is None or setup.plan.ways is not None
     return setup.scenario.terrain is not None and on_ground and setup.source is None
 
 
 def first_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
-    """The first waypoint that is an item's, and that item where it is a take-off."""
+    """Return the index of the first waypoint of a mission item, and that item if it is a take-off."""
     route = requirements.setup.route
     first = next((k for k, seq in enumerate(route.items.tolist()) if seq >= 0), 0)
     found = [one for one in requirements.setup.mission.items if one.seq == int(route.items[first])]
@@ -111,7 +112,7 @@ def first_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None
 
 
 def landing_item(requirements: RouteRequirements) -> tuple[int, MissionItem] | None:
-    """The waypoint that a mission lands at by a glide, and its item; None for none."""
+    """Return the waypoint at which a mission lands by a glide and its item, or None without one."""
     lands = {item.seq: item for item in requirements.setup.mission.items if item.command == Command.NAV_LAND}
     found = [(k, lands[seq]) for k, seq in enumerate(requirements.setup.route.items.tolist()) if k and seq in lands]
     return found[-1] if found else None

@@ -1,11 +1,12 @@
-"""How a path meets zones of airspace, compiled: how deep, for how long, where it goes in and out.
+"""Find where a path violates airspace zones, compiled: depth, duration, entry and exit.
 
-How far beyond a zone's limit a place is changes no faster along a path than the path moves, or its height above the
-ground does.  A way is cut in halves until that says of each part on which side it is, and that no part holds a deeper
-place than is known.  Nothing between two looks is missed, on arcs and over terrain as on straight lines.
+The distance of a place beyond a zone's limit changes no faster along a path than the path itself moves, or than its
+height above ground changes.  A path is bisected until each part is certain to be on one side of the limit, and no part
+can contain a place deeper than the deepest known one.  Nothing between two samples is missed, on arcs and over terrain
+as on straight lines.
 
-shapely's distance and intersection take 170 times as long (1,000 zones, 36,000 rows: 7.7 s, here 0.05 s), give a depth
-of the rows alone (0.5 m off), and know neither arcs, heights above ground nor times.
+shapely's distance and intersection take 170 times as long (1,000 zones, 36,000 rows: 7.7 s, here 0.05 s), give the
+depth of the rows alone (0.5 m off), and support neither arcs, heights above ground nor times.
 """
 
 import math
@@ -24,11 +25,11 @@ Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
-# Parts of a move beside a zone, compiled: how far beyond the zone's limit they can be between their ends.
+# Parts of a move near a zone, compiled: how far beyond the zone's limit they can be between their ends.
 
 
-# A part of a move: its first and last share, and of both ends where they are, m, how far they are outside the zone's
-# shape and band, m, and which of its edges is nearest.
+# A part of a move: its first and last fraction of the move, and for both ends: the position, m, the distances outside
+# the zone's shape and outside its band, m, and the zone's nearest edge.
 PART = record_dtype(
     "first",
     "last",
@@ -49,9 +50,9 @@ PART = record_dtype(
 def look_at_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> tuple[float, float, int]:  # pragma: no cover - compiled
-    """How far a place is outside zone z's shape and outside its band, m, negative inside; and its nearest edge.
+    """Return a place's distances outside zone z's shape and band, m, and its nearest edge.
 
-    NaN outside a band that counts from the ground where that is not known.
+    Negative inside.  NaN for a band given above ground if the ground there is not known.
     """
     zone = records.zones[z]
     away, edge = nearest_edge(records, z, east, north)
@@ -63,13 +64,15 @@ def look_at_zone(
 
 @inlined
 def beyond_limit(exclusion: bool, away: float, off: float) -> float:  # pragma: no cover - compiled
-    """How far beyond a zone's limit a place is, m: the least way, level or straight up or down, that ends it.
+    """Return how far beyond a zone's limit a place is, m.
 
-    Negative on the right side: the way that there is at least.  away, off: as of `look_at_zone`.  NaN where only the
-    ground would tell, which is not known.
+    This is the shortest move, level or vertical, to comply again.
+
+    Negative for a place that complies: the shortest move to the limit.  away, off: from `look_at_zone`.  NaN if the
+    answer depends on ground that is not known.
     """
     if off != off:
-        # Beside its shape it is outside whatever the ground.
+        # Outside the zone's shape the place is outside the zone whatever the ground.
         if away <= 0.0:
             return math.nan
         off = away
@@ -79,7 +82,7 @@ def beyond_limit(exclusion: bool, away: float, off: float) -> float:  # pragma: 
 
 @inlined
 def copy_part(source: Record, target: Record) -> None:  # pragma: no cover - compiled
-    """Make one part another."""
+    """Copy one part to another."""
     target.first, target.last = source.first, source.last
     target.east, target.north, target.away, target.off = source.east, source.north, source.away, source.off
     target.to_east, target.to_north, target.to_away = source.to_east, source.to_north, source.to_away
@@ -90,16 +93,17 @@ def copy_part(source: Record, target: Record) -> None:  # pragma: no cover - com
 def between_ends(
     exclusion: bool, part: Record, run: float, rise: float, farthest: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Least and greatest distance beyond a zone's limit that a part can have between its ends, m.
+    """Return the least and greatest distance beyond a zone's limit between a part's ends, m.
 
-    run: its length, m.  rise: the most that its height in the band changes.  farthest: no place of it is further beyond
-    the zone's outline, m.
+    run: length of the part, m.  rise: the largest change of its height in the band.  farthest: upper bound of its
+    distance beyond the zone's outline, m.
     """
     sign = -1.0 if exclusion else 1.0
     level, upright = sign * (part.away + part.to_away), sign * (part.off + part.to_off)
     level_low, level_high = 0.5 * (level - run), min(farthest, 0.5 * (level + run))
     if upright != upright:
-        # Over ground that is not known at an end the outline alone tells, of an exclusion that it is not inside.
+        # Over unknown ground at one end only the outline can decide: it can show that the part is not inside an
+        # exclusion.
         return (-math.inf, level_high) if exclusion else (level_low, math.inf)
     low, high = 0.5 * (upright - rise), 0.5 * (upright + rise)
     if exclusion:
@@ -111,10 +115,11 @@ def between_ends(
 def farthest_from_outline(
     records: ZoneRecords, z: int, move: Record, part: Record, run: float
 ) -> float:  # pragma: no cover - compiled
-    """No place of a part is further beyond zone z's outline than this, m, by the edges that are nearest to its ends.
+    """Return an upper bound, m, of a part's distance beyond zone z's outline.
 
-    The distance from one edge, or from a centre, is greatest at an end of a straight way.  An arc leaves its chord by
-    no more than an eighth of its curvature times its length squared, where it is less than a radian.
+    It follows from the edges nearest to the part's ends.  The distance from one edge, or from a center, is greatest at
+    an end of a straight line.  An arc of less than a radian leaves its chord by no more than an eighth of its curvature
+    times its length squared.
     """
     zone = records.zones[z]
     bow: float = 0.125 * abs(move.curvature) * run * run
@@ -141,11 +146,11 @@ def farthest_from_outline(
     return float(zone.radius - math.sqrt(off_e * off_e + off_n * off_n) + bow)
 
 
-# How a path meets one zone.  depth: m beyond the zone's limit at the most, negative where it stays on its right side;
-# right where it is above 0, and for the zone that comes nearest to being violated; of every other one no less than its
-# true value.  at_time, at_east, at_north, at_up, at_leg: where that is.  entries: how often it goes wrong.  beyond: s
-# in all.  entry and exit: the first and the last of it.  unknown: whether some of it is above unknown ground, where the
-# zone counts from the ground.
+# How a path meets one zone.  depth: greatest distance beyond the zone's limit, m, negative if the path complies.  It is
+# exact if it is above 0, and for the zone that is nearest to being violated; for all others it is an upper bound.
+# at_time, at_east, at_north, at_up, at_leg: where that is.  entries: number of violations.  beyond: s in total.  entry
+# and exit: start of the first violation and end of the last.  unknown: True if some of the path is above unknown ground
+# and the zone has a limit above ground.
 VISIT = record_dtype(
     "depth",
     "at_time",
@@ -167,25 +172,27 @@ VISIT = record_dtype(
     ("exit_leg", np.int64),
     ("unknown", np.bool_),
 )
-# m.  What depths beyond a zone's limit are worked out to, half of what a waypoint is rounded by, and what the places
-# where a path goes in and out are.  Numerical precisions: the verdict tolerates `logs.verdict.tolerances.ROUNDING`.
-DEPTH_PRECISION, EDGE_PRECISION = 0.01, 1e-3
-# Parts at a time: halves of halves, of which a way of 1,000 km comes down to `EDGE_PRECISION` in 34, the whole move,
-# and one to swap two by.
+# Precision of depths beyond a zone's limit, m: half of the rounding of a waypoint.  A numerical precision: the verdict
+# tolerates `logs.verdict.tolerances.ROUNDING`.
+DEPTH_PRECISION = 0.01
+# Precision of the places where a path enters and leaves, m.
+EDGE_PRECISION = 1e-3
+# Largest number of parts held at a time.  Bisecting a path of 1,000 km down to `EDGE_PRECISION` takes 34, and there is
+# one for the whole move and one to swap two parts.
 _MAX_PARTS = 64
-# s.  Two stays that are no further apart are one.
-_TOUCH = 1e-6
+# Two violations that are no further apart than this are one, s.
+_MERGE_TIME_S = 1e-6
 
 
 def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) -> Records:
-    """How a path meets each of z zones: (z,) of `VISIT`.
+    """Return how a path meets each of z zones: (z,) of `VISIT`.
 
-    moves: (m,) of `logs.verdict.measures.path_moves.MOVE`.  terrain: None where none is known.
+    moves: (m,) of `logs.verdict.measures.path_moves.MOVE`.  terrain: None if unknown.
     """
     heights, to_pixel, pitch = read_only(np.full((2, 2), np.nan, dtype=np.float32)), np.zeros(1, POLYMAP)[0], 1.0
     if terrain is not None:
         heights, to_pixel, pitch = terrain.heights, terrain.to_pixel.record, terrain.spacing
-    # What compiled code makes has its fields, and not numpy's records that have them as attributes.
+    # Arrays from compiled code have the fields, but not numpy's records with the fields as attributes.
     return _path_zones(moves, records, heights, to_pixel, pitch).view(VISIT)
 
 
@@ -210,7 +217,7 @@ def _path_zones(
                 apart[z] = min(apart[z], box_distance(records, z, block.west, block.east, block.south, block.north))
     parts = np.zeros(_MAX_PARTS, PART)
     known = -math.inf
-    # The nearest first: what is known of them says of the others that they are further away.
+    # The nearest zone first: its depth is a bound that shows that the others are further away.
     for z in np.argsort(apart, kind="mergesort"):
         if -apart[z] < known:
             visits[z].depth = -apart[z]
@@ -234,8 +241,8 @@ def _visit(
 ) -> None:  # pragma: no cover - compiled
     """Fill in how a path meets zone z; known: m, depths below it need not be exact.
 
-    In three rounds: the moves' ends alone; the deepest place, which is near the best of them; and, where the zone is
-    violated, when.
+    In three rounds: the moves' ends alone; the deepest place, which is near the best of those ends; and, if the zone is
+    violated, the times.
     """
     zone = records.zones[z]
     above_ground = zone.floor_above_ground or zone.ceiling_above_ground
@@ -249,7 +256,7 @@ def _visit(
                 records, z, heights, to_pixel, block.west + across, block.south + along, block.low + lift
             )
             highest = beyond_limit(zone.exclusion, away, off) + max(reach, lift + steepest * reach)
-            # Unknown ground beside a middle that is known is to be found.
+            # The ground may be unknown near a center point whose ground is known: look for it.
             if highest <= (0.0 if turn == 2 else max(known, visit.depth)) and not (above_ground and away < reach):
                 continue
             first, last = b * BLOCK_MOVES, min(moves.shape[0], (b + 1) * BLOCK_MOVES)
@@ -271,7 +278,7 @@ def _visit_block(
     parts: Records,
     visit: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Add some moves in a row to a visit; turn: the round, as `_visit` counts them."""
+    """Add consecutive moves to a visit; turn: the round, numbered as in `_visit`."""
     part = parts[0]
     part.to_east, part.to_north, up = move_point(moves[0], 0.0)
     part.to_away, part.to_off, part.to_edge = look_at_zone(
@@ -288,11 +295,11 @@ def _visit_block(
         if turn == 0:
             _deepen(moves[k], part, records.zones[z].exclusion, visit)
         else:
-            _cut_move(moves[k], turn == 2, records, z, heights, to_pixel, steepest, known, parts, visit)
+            _bisect_move(moves[k], turn == 2, records, z, heights, to_pixel, steepest, known, parts, visit)
 
 
 @inner
-def _cut_move(
+def _bisect_move(
     move: Record,
     ordered: bool,
     records: ZoneRecords,
@@ -304,13 +311,14 @@ def _cut_move(
     parts: Records,
     visit: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Cut a move, the first of the parts, in halves until each is certain, and add them to a visit.
+    """Bisect a move, the first of the parts, until each part is certain, and add the parts to a visit.
 
-    ordered: until it is certain of each on which side of the limit it is, and then added by its time; else until none
-    can be deeper than what is known.  The first part's end is left as it was: the next move begins there.
+    ordered: bisect until each part is known to be on one side of the limit, and add the parts in order of time;
+    otherwise until none can be deeper than the known depth.  The first part's end is left unchanged: the next move
+    begins there.
     """
     exclusion = records.zones[z].exclusion
-    # The most that the height in a band changes over the whole move.
+    # The largest change of the height in a band over the whole move.
     climb = max(abs(move.climb), abs(move.climb + 2.0 * move.bend)) + steepest * move.length
     copy_part(parts[0], parts[1])
     left = 1
@@ -323,7 +331,7 @@ def _cut_move(
         done = highest <= enough or (ordered and lowest > 0.0) or max(run, rise) <= EDGE_PRECISION
         done = done or _is_unknown(exclusion, part)
         if not done:
-            # With the edges beside it looked at, which takes longer.
+            # Bound again with the nearest edges, which takes longer.
             farthest = farthest_from_outline(records, z, move, part, run)
             lowest, highest = between_ends(exclusion, part, run, rise, farthest)
             done = highest <= enough
@@ -346,7 +354,7 @@ def _cut_move(
         if not ordered and beyond_limit(exclusion, part.to_away, part.to_off) > beyond_limit(
             exclusion, earlier.away, earlier.off
         ):
-            # The half that may be deeper is to lie on top: what is found there spares the other.
+            # Put the half that may be deeper on top: its result may make the other half unnecessary.
             copy_part(part, parts[_MAX_PARTS - 1])
             copy_part(earlier, part)
             copy_part(parts[_MAX_PARTS - 1], earlier)
@@ -355,14 +363,14 @@ def _cut_move(
 
 @inner
 def _is_unknown(exclusion: bool, part: Record) -> bool:  # pragma: no cover - compiled
-    """Whether both ends are above ground that would tell and is not known: all between counts as unknown."""
+    """Return True if both ends depend on unknown ground: the whole part between them is then unknown."""
     before, after = beyond_limit(exclusion, part.away, part.off), beyond_limit(exclusion, part.to_away, part.to_off)
     return before != before and after != after
 
 
 @inner
 def _deepen(move: Record, part: Record, exclusion: bool, visit: Record) -> None:  # pragma: no cover - compiled
-    """Take a part's ends for the deepest place of a visit where they are, and note unknown ground."""
+    """Update the deepest place of a visit with a part's ends, and note unknown ground."""
     for at_end in range(2):
         depth = beyond_limit(exclusion, part.away, part.off)
         if at_end:
@@ -376,7 +384,7 @@ def _deepen(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
 
 @inner
 def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> None:  # pragma: no cover - compiled
-    """Add a part of a move, wrong or right throughout or passing the limit once, to a visit."""
+    """Add a part of a move that violates, complies, or crosses the limit once, to a visit."""
     before, after = beyond_limit(exclusion, part.away, part.off), beyond_limit(exclusion, part.to_away, part.to_off)
     if not (before > 0.0 or after > 0.0):
         return
@@ -387,7 +395,7 @@ def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> Non
         leave = enter + (leave - enter) * before / (before - after)
     begins, ends = move.time + enter * move.lasts, move.time + leave * move.lasts
     visit.beyond += ends - begins
-    if visit.entries == 0 or begins > visit.exit_time + _TOUCH:
+    if visit.entries == 0 or begins > visit.exit_time + _MERGE_TIME_S:
         visit.entries += 1
         if visit.entries == 1:
             visit.entry_time, visit.entry_leg = begins, move.leg

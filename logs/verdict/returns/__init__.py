@@ -1,1 +1,1 @@
-"""Returns to launch from everywhere on the way: where each goes, what it meets, what would help."""
+"""Returns to launch from all places on the path: destinations, hazards, and suggestions."""

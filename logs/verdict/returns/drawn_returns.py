@@ -1,6 +1,6 @@
-"""What pictures show of returns: the ways of the worst, and how low the aircraft could be called home from.
+"""Prepare returns for drawing: the worst paths, and the least altitude from which a return is safe.
 
-Neither is needed to judge returns, and both take as long as that: they are flown where a picture is asked for.
+Neither is needed to judge returns, and both take as long as judging: they are computed only if a picture is wanted.
 """
 
 import math
@@ -29,18 +29,23 @@ from logs.verdict.returns.suggest_returns import come_home
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# Ways that are drawn.
+# Largest number of return paths that are drawn.
 MAX_WAYS = 3
-# The least height is looked for from so many places at the most, so far below and above the flight (m), in steps that
-# are halved at the end.
-_PLACES, _STEP, _STEPS, _HALVINGS = 40, 80.0, 15, 3
+# Largest number of places at which the least safe altitude is searched.
+_MAX_PLACES = 40
+# Step of that search above or below the flight, m.
+_STEP_M = 80.0
+# Number of steps in one direction.
+_STEPS = 15
+# Number of times that the last step is halved.
+_HALVINGS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorstReturn:
-    """A return that is drawn, the worst of its seconds.
+    """Return that is drawn, the worst of its time range.
 
-    found: these seconds.  way: (t, 3) places a second apart, m.  at: (3,) where it goes wrong, or comes lowest.
+    found: the range.  way: (t, 3) positions a second apart, m.  at: (3,) where it goes wrong, or is lowest.
     """
 
     found: ReturnRange
@@ -49,30 +54,30 @@ class WorstReturn:
 
     @property
     def one(self) -> ReturnFlown:
-        """The return."""
+        """The return itself."""
         return self.found.worst
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeastHeights:
-    """The least height that a return by RTL is safe from, at places of the way.
+    """Least altitude from which a return by RTL is safe, at places on the path.
 
     time: (n,) s.
-    height: (n,) m AMSL: from the flight's own height the nearest above it from which the return is safe, where that
-        from its own is not; else how low it stays safe when the flight is lowered.  NaN where no height was found.
-    searched: how far above the flight it was looked for, m.
+    height: (n,) m AMSL: if the return from the flight's own altitude is unsafe, the nearest higher altitude from which
+        it is safe; otherwise the lowest altitude at which it stays safe.  NaN if no altitude was found.
+    searched: range of the search above the flight, m.
     """
 
     time: Floats
     height: Floats
-    searched: float = _STEP * _STEPS
+    searched: float = _STEP_M * _STEPS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnReturns:
-    """Returns with what is drawn of them.
+    """Returns with the data for drawing them.
 
-    worst: the worst first.  glides: from the same places; none where that was not asked.
+    worst: the worst first.  glides: from the same places; empty if not wanted.
     """
 
     returns: Returns
@@ -82,14 +87,14 @@ class DrawnReturns:
 
     @property
     def by_kind(self) -> list[tuple[Kind, list[ReturnFlown]]]:
-        """Stretches of the way from which returns come to the same; where there are two ways home the worse counts."""
+        """Segments of the path by the outcome of their returns; of two return paths the worse one applies."""
         by_time = sorted(self.returns.each, key=lambda one: one.time)
         worst = [min(ones, key=badness) for _, ones in groupby(by_time, lambda one: one.time)]
         return stretches(worst, lambda one: one.kind)
 
     @property
     def by_reach(self) -> list[tuple[Reach, list[Glide]]]:
-        """Stretches of the way from which the same can be reached without an engine."""
+        """Segments of the track with the same best glide destination."""
         return stretches(self.glides.each, lambda one: one.reach)
 
 
@@ -98,7 +103,7 @@ Key = TypeVar("Key")
 
 
 def stretches(ones: Sequence[One], key: Callable[[One], Key]) -> list[tuple[Key, list[One]]]:
-    """What is alike in a row, by its key; each but the last goes on to where the next begins.
+    """Group consecutive items by their key; each group but the last includes the first item of the next.
 
     >>> stretches([1, 3, 2, 5], lambda one: one % 2)
     [(1, [1, 3, 2]), (0, [2, 5]), (1, [5])]
@@ -112,21 +117,21 @@ def stretches(ones: Sequence[One], key: Callable[[One], Key]) -> list[tuple[Key,
 def drawn_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, glides: Glides = NOT_ASKED
 ) -> DrawnReturns:
-    """What is drawn of returns that were judged.
+    """Return judged returns with all data for drawing them.
 
-    starts: that they were judged from.
+    starts: the places from which they were judged.
     """
     least = least_heights(world, starts if returns.each else starts.at(np.zeros(0, dtype=np.intp)))
     return DrawnReturns(returns, worst_returns(world, starts, returns), least, glides)
 
 
 def plainly_drawn(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
-    """The same without glides and least heights, which take longest."""
+    """Return judged returns without glides and least altitudes, which take longest."""
     return DrawnReturns(returns, worst_returns(world, starts, returns), LeastHeights(np.zeros(0), np.zeros(0)))
 
 
 def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> tuple[WorstReturn, ...]:
-    """The worst of each kind of trouble first, and then the next worst; the lowest where all are safe."""
+    """Return the worst of each kind of failure, then the next worst; the lowest return if all are safe."""
     wrong = [one for one in returns.ranges if not one.worst.safe]
     firsts = {one.worst.kind: one for one in reversed(wrong)}
     order = [one for one in wrong if firsts[one.worst.kind] is one]
@@ -138,12 +143,13 @@ def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
     targets = [one.worst.target for one in chosen]
     _, ways = fly_home(world, starts.at(rows), targets, keep=True)
     return tuple(
-        WorstReturn(found, way, _where(world, found.worst, way)) for found, way in zip(chosen, ways, strict=True)
+        WorstReturn(found, way, _failure_place(world, found.worst, way))
+        for found, way in zip(chosen, ways, strict=True)
     )
 
 
-def _where(world: ReturnWorld, one: ReturnFlown, way: Floats) -> Floats:
-    """Where a return goes wrong, or comes lowest."""
+def _failure_place(world: ReturnWorld, one: ReturnFlown, way: Floats) -> Floats:
+    """Return where a return goes wrong, or is lowest."""
     if one.kind == "threat":
         away = np.linalg.norm(way - world.around.spheres[one.threat], axis=1)
         return np.asarray(way[int(np.argmin(away))])
@@ -153,24 +159,24 @@ def _where(world: ReturnWorld, one: ReturnFlown, way: Floats) -> Floats:
 
 
 # ----------------------------------------------------------------------
-# How low the aircraft could be called home from.
+# The least altitude from which the aircraft could be called home.
 
 
 def least_heights(world: ReturnWorld, starts: ReturnStarts) -> LeastHeights:
-    """The least heights at up to `_PLACES` of the starts; NaN where the ground is not known."""
+    """Return the least altitudes at up to `_MAX_PLACES` of the starts; NaN if the ground is unknown."""
     if not len(starts):
         return LeastHeights(np.zeros(0), np.zeros(0))
-    rows = np.unique(np.linspace(0, len(starts) - 1, _PLACES).round().astype(np.intp))
+    rows = np.unique(np.linspace(0, len(starts) - 1, _MAX_PLACES).round().astype(np.intp))
     chosen = starts.at(rows)
     begins = heights_above_ground(world, chosen)
     lowest = np.where(np.isfinite(begins), np.minimum(0.0, world.limit - begins), math.nan)
     safe = come_home(world, chosen)
-    # Heights over the flight's own, m: the last from which it was safe, and from which it was not.
+    # Altitudes relative to the flight, m: the last one that was safe, and the last one that was not.
     good, bad = np.where(safe, 0.0, math.nan), np.where(safe, math.nan, 0.0)
     direction = np.where(safe, -1.0, 1.0)
     going = np.isfinite(lowest)
     for step in range(1, _STEPS + 1):
-        tried = np.maximum(direction * step * _STEP, lowest)
+        tried = np.maximum(direction * step * _STEP_M, lowest)
         ok = _safe_from(world, chosen, tried, going)
         good, bad = np.where(going & ok, tried, good), np.where(going & ~ok, tried, bad)
         going &= (ok == safe) & (tried > lowest)
@@ -183,7 +189,10 @@ def least_heights(world: ReturnWorld, starts: ReturnStarts) -> LeastHeights:
 
 
 def _safe_from(world: ReturnWorld, starts: ReturnStarts, above: Floats, asked: Flags) -> Flags:
-    """Whether returns are safe from so much higher, m; those that are not asked for are not flown."""
+    """Return True for each return that is safe from an offset altitude, m.
+
+    Only the returns in ``asked`` are flown.
+    """
     found = np.zeros(len(starts), dtype=np.bool_)
     if asked.any():
         rows = starts.rows[asked].copy()

@@ -1,7 +1,7 @@
-"""The glide's footprint: from how low over the ground a place can be reached without an engine, as shapes on a map.
+"""Map the glide footprint: the least height above ground from which a place can be reached engine-out.
 
-The search backwards from the places that somebody has chosen (`logs.verdict.returns.glide_map`) leaves the least height
-in every cell.  What stands here is that height over the cell's ground, in bands, with the outlines of each band.
+The backward search from the chosen places (`logs.verdict.returns.glide_map`) gives the least altitude for every cell.
+This module converts it to a height above the cell's ground, in bands, with the outlines of each band.
 """
 
 import math
@@ -19,17 +19,17 @@ Floats = NDArray[np.float64]
 # An outline (k, 2) in m, closed, and its holes.
 Part = tuple[Floats, ...]
 
-# Upper ends of the bands, m above ground.
+# Upper limits of the bands, m above ground.
 BANDS = (150.0, 300.0, 600.0)
-# By their ends, the roles that they are drawn in.
+# Drawing role of each band, by its upper limit.
 BAND_ROLES = dict(zip(BANDS, ("glide-near", "glide-middle", "glide-far"), strict=True))
 _ALL = (-math.inf, math.inf)
-# Cells along the longer side of what is shown, at most: larger ones are as bad as the worst cell in them.
+# Largest number of cells along the longer side of the shown map; a larger cell is as bad as the worst cell in it.
 _MAX_CELLS = 200
 
 
 class Band(NamedTuple):
-    """Where the least height above ground lies between two heights, m.  parts: of the map."""
+    """Area where the least height above ground lies between two heights, m.  parts: of the map."""
 
     above: float
     up_to: float
@@ -38,11 +38,11 @@ class Band(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GlideFootprint:
-    """The map that glides were looked up on.
+    """Map on which glides were looked up.
 
     made: its cells.
-    chosen: (n, e) least height, m AMSL, from which home, a rally point or a landing place is reached; inf for none.
-    flat: (n, e) whether a cell could be landed on.
+    chosen: (n, e) least altitude, m AMSL, from which home, a rally point or a landing place is reached; inf if none is.
+    flat: (n, e) True for a cell on which a landing is possible.
     """
 
     made: GlideMap
@@ -50,7 +50,7 @@ class GlideFootprint:
     flat: Flags
 
     def bands(self, east: tuple[float, float] = _ALL, north: tuple[float, float] = _ALL) -> tuple[Band, ...]:
-        """By the height above ground that is needed, the least first, as far as the map lies within these ranges, m."""
+        """Return the bands of needed height above ground, lowest first, for the map within these ranges, m."""
         made = self.made
         above = np.where(np.isfinite(made.ground), self.chosen - made.ground, math.inf)
         cells = _Cells.within(made, east, north)
@@ -63,15 +63,15 @@ class GlideFootprint:
         return tuple(band for band in found if band.parts)
 
     def landings(self, east: tuple[float, float] = _ALL, north: tuple[float, float] = _ALL) -> tuple[Part, ...]:
-        """Ground that is flat by the elevation file, as far as the map lies within these ranges, m."""
+        """Return ground that is flat by the elevation file, for the map within these ranges, m."""
         cells = _Cells.within(self.made, east, north)
         return cells.parts(cells.merged(self.flat.astype(np.float64)) > 0.0)
 
 
 class _Cells(NamedTuple):
-    """Square blocks of cells of a map, in rows to the north.
+    """Square blocks of map cells, in rows to the north.
 
-    west, south: m, of the first block's corner.  side: of a block, m.  block: cells along it.
+    west, south: m, of the first block's corner.  side: of a block, m.  block: number of cells along it.
     first: row and column of the first cell.  shape: rows and columns of blocks.
     """
 
@@ -84,7 +84,7 @@ class _Cells(NamedTuple):
 
     @classmethod
     def within(cls, made: GlideMap, east: tuple[float, float], north: tuple[float, float]) -> "_Cells":
-        """Those of a map that lie in ranges, m."""
+        """Return the blocks of a map that lie within ranges, m."""
         rows, columns = made.floor.shape
         sides = ((north, made.south, rows), (east, made.west, columns))
         low = [math.floor(max(0.0, (edge[0] - origin) / made.cell)) for edge, origin, _ in sides]
@@ -95,14 +95,14 @@ class _Cells(NamedTuple):
         return cls(west, south, block * made.cell, block, (low[0], low[1]), (spans[0] // block, spans[1] // block))
 
     def merged(self, values: Floats) -> Floats:
-        """The greatest of each block's values."""
+        """Return the greatest value in each block."""
         (row, column), (rows, columns) = self.first, self.shape
         cut = values[row : row + rows * self.block, column : column + columns * self.block]
         blocks = cut.reshape(rows, self.block, columns, self.block)
         return np.asarray(blocks.max(axis=(1, 3)))
 
     def parts(self, chosen: Flags) -> tuple[Part, ...]:
-        """Outlines of chosen blocks, with their holes."""
+        """Return the outlines of chosen blocks, with their holes."""
         if not chosen.any():
             return ()
         edges = np.diff(np.pad(chosen.astype(np.int8), ((0, 0), (1, 1))), axis=1)

@@ -1,16 +1,16 @@
-"""How high an aircraft without thrust has to be, everywhere, to glide to a place: shortest paths backwards over ground.
+"""Compute for every cell the altitude that an aircraft needs to glide to a place.
 
-One search begins at the places to be reached and goes against the way that is flown.  A cell's label is the least
-height from which the glide gets there: that of the next cell and what the way to it costs, and no less than the ground
-with its margin, there and between them; so the terrain stands in the labels, and one search serves every second of a
-flight.  A way costs its length times sink by ground speed on its course in the wind at that height, which is exact for
-each step of a path.  Labels only grow on the way back: cells are settled by height, in bands no higher than the
-cheapest step (E. W. Dijkstra, "A Note on Two Problems in Connexion with Graphs", 1959; bands: R. B. Dial, "Algorithm
-360", 1969).
+The shortest paths over terrain are searched backwards.  One search begins at the places to be reached and runs
+against the direction of flight.  A cell's label is the least altitude from which the glide gets there: the label of
+the next cell plus the height lost on the step to it, and no less than the ground with its margin, there and between
+them.  So the labels include the terrain, and one search serves every second of a flight.  A step costs its length
+times sink by ground speed on its course in the wind at that altitude, which is exact for each step of a path.  Labels
+only grow in the backward direction: cells are settled by altitude, in bands no higher than the cheapest step (E. W.
+Dijkstra, "A Note on Two Problems in Connexion with Graphs", 1959; bands: R. B. Dial, "Algorithm 360", 1969).
 
-A step goes to one of 32 cells, in directions 7 to 14 degrees apart.  On a plane the labels are those of the straight
-way, or more: by 1.0 % at the most in still air, and 1.8 % in 10 m/s for an aircraft that glides at 18 m/s
-(`tests/logs/verdict/returns/test_glide_map.py`).
+A step goes to one of 32 cells, in directions 7 to 14 degrees apart.  On a plane the labels equal the altitudes for the
+straight path, or exceed them: by 1.0 % at the most in still air, and by 1.8 % in 10 m/s for an aircraft that glides at
+18 m/s (`tests/logs/verdict/returns/test_glide_map.py`).
 """
 
 import math
@@ -36,14 +36,17 @@ Flags = NDArray[np.bool_]
 Cells = NDArray[np.int64]
 
 # ----------------------------------------------------------------------
-# The map: cells with their least heights.
+# The map: cells with their least altitudes.
 
-# Cells that a map has at most, and their least size, m.
-MAX_CELLS, _MIN_CELL = 700_000, 20.0
-# The largest, m, or the pixels of the elevation file that its side is long: a larger one is as high as its highest
-# ground where most of it is valley.
-_LARGEST_CELL, _MAX_PIXELS = 240.0, 8
-# So far around the places and the flight the map goes, m.
+# Largest number of cells of a map.
+MAX_CELLS = 700_000
+# Smallest side of a cell, m.
+_MIN_CELL_M = 20.0
+# Largest side of a cell, m: a larger cell has the altitude of its highest ground even if most of it is valley.
+_MAX_CELL_M = 240.0
+# Largest side of a cell, pixels of the elevation file, if that is more.
+_MAX_CELL_PIXELS = 8
+# Margin of the map around the places and the flight, m.
 AROUND = 3000.0
 
 
@@ -51,10 +54,10 @@ AROUND = 3000.0
 class GlideMap:
     """Square cells in rows to the north and columns to the east.
 
-    west, south: m, of the middle of the first cell.  cell: its side, m.
-    ground: (n, e) of the middles, m, NaN where it is not known.
-    floor: (n, e) least height in a cell: its highest ground and the margin, m; NaN where it is not known.
-    low, high: (n, e) between these heights a cell lies in kill spheres, m; inf and -inf for none.
+    west, south: m, center of the first cell.  cell: its side, m.
+    ground: (n, e) ground altitude at the centers, m, NaN if unknown.
+    floor: (n, e) least altitude in a cell: its highest ground plus the margin, m; NaN if unknown.
+    low, high: (n, e) altitudes between which a cell lies in kill spheres, m; inf and -inf if in none.
     """
 
     west: float
@@ -66,21 +69,21 @@ class GlideMap:
     high: Floats
 
     def cell_of(self, east: float, north: float) -> tuple[int, int]:
-        """Row and column of the cell that a place on the map is in."""
+        """Return row and column of the cell that contains a place on the map."""
         row, column = round((north - self.south) / self.cell), round((east - self.west) / self.cell)
         return row, column
 
     def middle(self, row: int, column: int) -> tuple[float, float]:
-        """East and north of a cell's middle, m."""
+        """Return east and north of a cell's center, m."""
         return self.west + column * self.cell, self.south + row * self.cell
 
 
 def glide_map(
     terrain: Terrain, places: Floats, margin: float, spheres: Floats, radii: Floats, around: float = AROUND
 ) -> GlideMap | None:
-    """The map around places (p, 2), m; None where they lie so far apart that its cells would hide what they hold.
+    """Return the map around places (p, 2), m, or None if its cells would be too coarse for its extent.
 
-    margin: m above ground that a glide keeps.  spheres, radii: (m, 3) and (m,) of kill spheres, m.
+    margin: height above ground that a glide keeps, m.  spheres, radii: (m, 3) and (m,) of kill spheres, m.
 
     >>> from world.terrain import flat_terrain
     >>> ground = flat_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), 100.0, 0.0)
@@ -91,8 +94,8 @@ def glide_map(
     """
     (west, south), (east, north) = places.min(axis=0) - around, places.max(axis=0) + around
     spacing = max(1.0, terrain.spacing)
-    cell = max(_MIN_CELL, min(0.5 * spacing, 100.0), math.sqrt((east - west) * (north - south) / MAX_CELLS))
-    if cell > max(_LARGEST_CELL, _MAX_PIXELS * spacing):
+    cell = max(_MIN_CELL_M, min(0.5 * spacing, 100.0), math.sqrt((east - west) * (north - south) / MAX_CELLS))
+    if cell > max(_MAX_CELL_M, _MAX_CELL_PIXELS * spacing):
         return None
     columns, rows = math.ceil((east - west) / cell) + 1, math.ceil((north - south) / cell) + 1
     highest = highest_in_cells(terrain, west - 0.5 * cell, south - 0.5 * cell, cell, rows, columns)
@@ -106,7 +109,10 @@ def glide_map(
 
 
 def _add_sphere(made: GlideMap, centre: Floats, radius: float) -> None:
-    """Widen the heights that cells lie in kill spheres at: each by its place nearest to the sphere's middle."""
+    """Widen the altitude range in which cells lie in a kill sphere.
+
+    Each cell at its point nearest to the sphere's center.
+    """
     row, column = made.cell_of(float(centre[0]), float(centre[1]))
     steps = math.ceil(radius / made.cell) + 1
     rows = slice(max(0, row - steps), max(0, row + steps + 1))
@@ -124,21 +130,24 @@ def _add_sphere(made: GlideMap, centre: Floats, radius: float) -> None:
     high[inside] = np.maximum(high, centre[2] + half)[inside]
 
 
-# A landing place is a square of this side (m), of which the plane that fits it best rises by no more than this share,
-# and whose heights leave it by no more than this (root mean square, m).
-PATCH, STEEPEST, ROUGHEST = 150.0, 0.05, 1.5
+# Side of the square that a landing place needs, m.
+PATCH = 150.0
+# Largest gradient of the plane that fits the square best, m per m.
+STEEPEST = 0.05
+# Largest root-mean-square deviation of the square's ground from that plane, m.
+ROUGHEST = 1.5
 
 
 def landable(made: GlideMap) -> Flags:
-    """Cells (n, e) around which the ground is flat by the elevation file, and outside kill spheres.
+    """Return cells (n, e) with flat ground around them by the elevation file, outside kill spheres.
 
-    The file knows no trees, houses or water.
+    The file has no trees, houses or water.
     """
     half = max(1, math.ceil(0.5 * (PATCH / made.cell - 1.0) - 1e-9))
     taps = np.arange(-half, half + 1)
     count = taps.size**2
     ground = made.ground
-    # Heights over some middle one, so that their squares keep their digits.
+    # Heights relative to a mean, so that their squares keep their digits.
     z = ground - (np.nanmean(ground) if np.isfinite(ground).any() else 0.0)
     one = np.ones(taps.size)
     total, squares = _patch(z, one, one), _patch(z * z, one, one)
@@ -152,7 +161,7 @@ def landable(made: GlideMap) -> Flags:
 
 
 def _patch(values: Floats, by_row: Floats, by_column: Floats) -> Floats:
-    """Weighted sums (n, e) over the square around each cell; NaN where it leaves the map."""
+    """Return weighted sums (n, e) over the square around each cell; NaN if the square leaves the map."""
     out = values
     for axis, weights in ((0, by_row), (1, by_column)):
         half = weights.size // 2
@@ -164,7 +173,7 @@ def _patch(values: Floats, by_row: Floats, by_column: Floats) -> Floats:
 
 
 def bar_zones(made: GlideMap, flat: Flags, zones: ZoneRecords, above: float) -> None:
-    """Take out of cells (n, e) those in exclusion zones that reach down to so far above ground, m."""
+    """Clear cells (n, e) in exclusion zones that reach down to a height above ground, m."""
     for z in np.flatnonzero(zones.zones["exclusion"]):
         _bar_zone(flat, made.ground, zones, int(z), made.west, made.south, made.cell, above)
 
@@ -188,27 +197,27 @@ def _bar_zone(
 
 
 # ----------------------------------------------------------------------
-# Steps from cell to cell, and what they cost.
+# Steps from cell to cell, and their cost.
 
-# Cells that a step goes on by, in the eighth of a circle from east to north-east; the other seven are mirrored.
-_EIGHTH = ((1, 0), (4, 1), (2, 1), (3, 2), (1, 1))
-# A step: cells that it goes on by, its course (rad), its length in cells, and the cells between, of `_BETWEEN`.
+# Steps in cells in the octant from east to north-east; the other seven octants are mirrored.
+_OCTANT_STEPS = ((1, 0), (4, 1), (2, 1), (3, 2), (1, 1))
+# A step: its offset in cells, its course (rad), its length in cells, and its range of cells in `_BETWEEN`.
 STEP = record_dtype(
     ("east", np.int64), ("north", np.int64), "course", "length", ("first", np.int64), ("last", np.int64)
 )
-# A cell between: from the step's end, and the share of the step that lies between the end and it.
+# A cell crossed by a step: its offset from the step's end, and the fraction of the step between the end and the cell.
 _BETWEEN = record_dtype(("east", np.int64), ("north", np.int64), "share")
 
 
 def steps() -> tuple[Records, Records]:
-    """The 32 steps, (32,) of `STEP`, and the cells that lie between the ends of each.
+    """Return the 32 steps, (32,) of `STEP`, and the cells that lie between the ends of each.
 
     >>> made, between = steps()
     >>> len(made), len({round(float(one.course), 6) for one in made})
     (32, 32)
     """
     found: set[tuple[int, int]] = set()
-    for a, b in _EIGHTH:
+    for a, b in _OCTANT_STEPS:
         found |= {(x * i, y * j) for x, y in ((a, b), (b, a)) for i in (-1, 1) for j in (-1, 1)}
     made: Records = np.zeros(len(found), STEP)
     between: list[tuple[int, int, float]] = []
@@ -218,7 +227,7 @@ def steps() -> tuple[Records, Records]:
         nearest: dict[tuple[int, int], float] = {}
         for k in range(1, 64):
             share = k / 64.0
-            # From the end backwards; corners, which are touched and not crossed, fall to either side.
+            # From the end backwards; corners, which are touched and not crossed, are assigned to either side.
             cell = (-round(share * east), -round(share * north))
             nearest.setdefault(cell, share)
         ends = ((0, 0), (-east, -north))
@@ -231,10 +240,10 @@ def steps() -> tuple[Records, Records]:
 
 
 class GlideSlopes(NamedTuple):
-    """Height lost per metre over the ground, by course and height.
+    """Height lost per metre over the ground, by course and altitude.
 
-    low, pitch: the first height and the step between two, m.
-    table: (c, h) m per m, for the courses of `steps`; inf where no progress is made.
+    low, pitch: the first altitude and the step between two, m.
+    table: (c, h) m per m, for the courses of `steps`; inf if no progress is made.
     """
 
     low: float
@@ -242,18 +251,18 @@ class GlideSlopes(NamedTuple):
     table: Floats
 
 
-# Between two heights of the slopes, m.
-_PITCH = 100.0
-# Slower than this over the ground (m/s) is no progress.
-_SLOWEST = 1.0
+# Altitude step of the slopes, m.
+_ALTITUDE_STEP_M = 100.0
+# Least ground speed that is progress, m/s.
+_MIN_GROUND_SPEED_MPS = 1.0
 
 
 def glide_slopes(aircraft: PointMass, airspeed: float, low: float, top: float) -> GlideSlopes:
-    """Slopes between two heights (m AMSL) at an airspeed, equivalent, m/s."""
+    """Return the slopes between two altitudes (m AMSL) at an equivalent airspeed, m/s."""
     courses = np.array(steps()[0]["course"])
-    table = np.empty((courses.size, max(2, math.ceil((top - low) / _PITCH) + 1)))
+    table = np.empty((courses.size, max(2, math.ceil((top - low) / _ALTITUDE_STEP_M) + 1)))
     _fill_slopes(aircraft.record, aircraft.excess, airspeed, courses, low, table)
-    return GlideSlopes(low, _PITCH, table)
+    return GlideSlopes(low, _ALTITUDE_STEP_M, table)
 
 
 @compiled
@@ -261,7 +270,7 @@ def _fill_slopes(
     aircraft: Record, excess: Floats, airspeed: float, courses: Floats, low: float, table: Floats
 ) -> None:  # pragma: no cover - compiled
     for h in range(table.shape[1]):
-        amsl = low + h * _PITCH
+        amsl = low + h * _ALTITUDE_STEP_M
         true = airspeed * true_by_equivalent(amsl)
         sink = max(0.0, -excess_power(excess, 0.0, true, amsl, aircraft))
         level = math.sqrt(max(0.0, true * true - sink * sink))
@@ -271,7 +280,7 @@ def _fill_slopes(
             along = wind * (aircraft.wind_east * east + aircraft.wind_north * north)
             across = wind * (aircraft.wind_east * north - aircraft.wind_north * east)
             over = ground_speed(level, along, across)
-            table[c, h] = sink / over if over > _SLOWEST else math.inf
+            table[c, h] = sink / over if over > _MIN_GROUND_SPEED_MPS else math.inf
 
 
 # ----------------------------------------------------------------------
@@ -280,12 +289,12 @@ def _fill_slopes(
 
 @dataclass(frozen=True, slots=True)
 class Needs:
-    """What the search has found for one set of places.
+    """Result of the search for one set of places.
 
     made: the map.
-    need: (n, e) least height from which a glide gets to one of them, m AMSL; inf for none.
-    origin: (n, e) the cell of the place that it gets to, counted through all rows; -1 for none.
-    onward: (n, e) the step that it goes on by, an index of `steps`; -1 at the place itself.
+    need: (n, e) least altitude from which a glide gets to one of them, m AMSL; inf if none.
+    origin: (n, e) the cell of the place that is reached, numbered through all rows; -1 if none.
+    onward: (n, e) the next step of the glide, an index of `steps`; -1 at the place itself.
     """
 
     made: GlideMap
@@ -295,9 +304,9 @@ class Needs:
 
 
 def least_heights(made: GlideMap, cells: Cells, slopes: GlideSlopes, top: float) -> Needs:
-    """Search backwards from cells up to a height, m AMSL, above which nothing is asked.
+    """Search backwards from cells up to an altitude, m AMSL; higher labels are not computed.
 
-    Cells beyond the map, and those whose ground is not known, lead nowhere.
+    Cells off the map, and cells whose ground is unknown, lead nowhere.
     """
     need: Floats = np.full_like(made.floor, math.inf)
     origin: Codes = np.full(need.shape, -1, dtype=np.int32)
@@ -331,9 +340,9 @@ def _search(
     between: Records, slopes: Floats, slopes_low: float, pitch: float, cell: float, lowest: float, band: float,
     top: float, heads: Codes, links: Codes,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Settle cells by height, band after band.
+    """Settle cells by altitude, band after band.
 
-    heads: (b,) the first cell of each band, -1 for none.  links: (cells, 2) the cells before and after one in its band.
+    heads: (b,) the first cell of each band, -1 for none.  links: (cells, 2) a cell's neighbours in its band.
     """
     rows, columns = need.shape
     flat = need.ravel()
@@ -371,15 +380,15 @@ def _lifted(
     floor: Floats, low: Floats, high: Floats, between: Records, move: Record, row: int, column: int, here: float,
     loss: float,
 ) -> float:  # pragma: no cover - compiled  # fmt: skip
-    """Least height where a step begins that ends at a cell at a height, above what lies between; NaN for none."""
+    """Return the least start altitude of a step that ends in a cell, above all cells between, or NaN."""
     wanted = here + loss
     for k in range(move.first, move.last):
         cell = between[k]
         i, j = row + cell.north, column + cell.east
-        # From where it begins, the glide has lost so much there.
+        # Height lost from the step's start to this cell.
         lost = (1.0 - cell.share) * loss
         there = _out_of_spheres(max(wanted - lost, floor[i, j]), low[i, j], high[i, j])
-        # NaN, where the ground is not known, is no height.
+        # NaN, for unknown ground, fails the comparison.
         if not floor[i, j] <= there:
             return math.nan
         wanted = there + lost
@@ -392,13 +401,13 @@ def _lifted(
 
 @inner
 def _out_of_spheres(up: float, low: float, high: float) -> float:  # pragma: no cover - compiled
-    """A height, or the top of the spheres that it lies in."""
+    """Return an altitude, or the top of the spheres that contain it."""
     return high if low < up < high else up
 
 
 @inner
 def _put(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
-    """Put a cell at the head of a band."""
+    """Insert a cell at the head of a band."""
     first = heads[band]
     links[cell, 0], links[cell, 1] = -1, first
     if first >= 0:
@@ -408,7 +417,7 @@ def _put(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: n
 
 @inner
 def _take(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
-    """Take a cell out of its band, if it is in it."""
+    """Remove a cell from its band, if it is in it."""
     before, after = links[cell, 0], links[cell, 1]
     if before >= 0:
         links[before, 1] = after

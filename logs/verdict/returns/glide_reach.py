@@ -1,9 +1,10 @@
-"""What a flying aircraft can glide to: it flies on for a moment, turns to the way that leads there, and glides.
+"""Compute what a flying aircraft can glide to.
 
-The way there is that of a search backwards (`logs.verdict.returns.glide_map`), which knows no turns.  So the turn is
-flown first, to either side, in the mean wind: banked as far as its autopilot banks and its airspeed bears, as much
-faster as the load in that bank makes it, with the sink of that.  What its speed above that of the glide would give back
-is not counted, nor what it takes to get as fast as the turn.
+It flies on for a moment, turns to the path there, and glides.  The path comes from a backward search
+(`logs.verdict.returns.glide_map`) that ignores turns.  So the turn is flown first, to either side, in the mean wind:
+at the bank that the autopilot commands and the airspeed allows, at the higher speed and sink that the load factor of
+that bank causes.  Neither the altitude that the excess speed over the glide speed would give back nor the altitude
+needed to reach the speed of the turn is included.
 """
 
 import math
@@ -24,24 +25,26 @@ from world.wind import mean_wind_speed
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int32]
 
-# How finely a turn is looked at, rad, and how far it goes round at the most.
-_PART, _PARTS = math.radians(10.0), 40
-# Steps of the way ahead whose end tells its course.
-_AHEAD = 6
-# Where a turn has led: m, and rad.
+# Step in which a turn is checked, rad.
+_TURN_STEP_RAD = math.radians(10.0)
+# Largest number of steps of a turn.
+_MAX_TURN_STEPS = 40
+# Number of steps along the path ahead after which its course is measured.
+_LOOKAHEAD_STEPS = 6
+# State at the end of a turn: m, and rad.
 _TURNING = record_dtype("east", "north", "up", "course")
-# The glider, for compiled code: airspeed, equivalent, m/s, and bank, rad.
+# The glider, for compiled code: equivalent airspeed, m/s, and bank, rad.
 _GLIDER = record_dtype("airspeed", "bank", "west", "south", "cell")
 
 
 def heights_left(
     starts: Records, needs: Needs, aircraft: PointMass, around: Surroundings, airspeed: float, bank: float
 ) -> tuple[Floats, Codes]:
-    """What is left (n,) of each start's height over the least from which a place is reached, m, and that place.
+    """Return each start's altitude (n,) above the least from which a place is reached, m, and that place.
 
     starts: (n,) of `flight.autopilots.arduplane.swift_return.RETURN_START`.  airspeed: of the glide, equivalent, m/s.
-    bank: of the turn, rad; only what the airspeed bears of it is flown.  What is left is negative where the place is
-    out of reach, -inf where no way leads there.  The place is a cell of the map, counted through all rows, as in
+    bank: of the turn, rad; limited to the bank that the airspeed allows.  The altitude left is negative if the place is
+    out of reach, -inf if no path leads there.  The place is a cell of the map, numbered through all rows, as in
     `logs.verdict.returns.glide_map.Needs`.
     """
     left, reached = np.full(len(starts), -math.inf), np.full(len(starts), -1, dtype=np.int32)
@@ -57,7 +60,7 @@ def heights_left(
 
 
 def place_of(made: GlideMap, cell: int) -> tuple[float, float, float]:
-    """East, north and ground height of a cell that is counted through all rows, m."""
+    """Return east, north and ground altitude of a cell that is numbered through all rows, m."""
     row, column = divmod(cell, made.floor.shape[1])
     return (*made.middle(row, column), float(made.ground[row, column]))
 
@@ -67,7 +70,7 @@ def _look_ahead(
     starts: Records, spheres: Floats, radii: Floats, floor: Floats, need: Floats, origin: Codes, onward: Codes,
     moves: Records, glider: Record, aircraft: Record, excess: Floats, left: Floats, reached: Codes,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Fill what is left and what is reached, for each start the better of both turns."""
+    """Fill in the altitude left and the place reached, for each start by the better of both turns."""
     turnings = np.zeros(1, _TURNING)
     here = turnings[0]
     fastest = aircraft.slowest + (excess.shape[1] - 1) * aircraft.speed_step
@@ -81,11 +84,12 @@ def _look_ahead(
         bank = min(glider.bank, stall_bank(speed, slowest))
         tilt = math.tan(bank)
         straight = -excess_power(excess, 0.0, speed, start.up, aircraft)
-        # In the turn it flies at the same angle of attack, which the load makes faster, but no faster than it may.
+        # The turn is flown at the same angle of attack: the load makes it faster, but no faster than the airspeed
+        # limit.
         fast = max(speed, min(speed / math.sqrt(math.cos(bank)), fastest))
         sink = aircraft.induced / fast * tilt * tilt - excess_power(excess, 0.0, fast, start.up, aircraft)
-        lasts = _PART * fast / (GRAVITY * tilt)
-        # To the middle of a cell beside, whatever the course.
+        lasts = _TURN_STEP_RAD * fast / (GRAVITY * tilt)
+        # Height loss to the center of a neighbouring cell, whatever the course.
         worst = -excess_power(excess, 0.0, slowest, start.up, aircraft) / max(1.0, 0.95 * slowest - wind)
         for side in (-1.0, 1.0):
             yaw = math.atan2(air_east, air_north)
@@ -93,16 +97,19 @@ def _look_ahead(
             here.north = start.north + REACTION * start.velocity_north
             here.up = start.up - REACTION * max(straight, -start.velocity_up)
             before = 0.0
-            for part in range(_PARTS):
+            for part in range(_MAX_TURN_STEPS):
                 over_east, over_north = fast * math.sin(yaw) + wind_east, fast * math.cos(yaw) + wind_north
                 here.course = math.atan2(over_east, over_north)
                 if not _is_clear(here, floor, spheres, radii, glider):
                     break
                 spare, i, j = _best_cell(here, need, worst, glider)
                 rest = _rest_of_turn(here, i, j, side, onward, moves, glider) if spare > -math.inf else before
-                # The way ahead changes on a turn, so that a part may go past it by more than that part.
-                passed = 0.0 < before <= 2.0 * _PART and -2.0 * _PART <= rest < 0.0
-                if part + 1 == _PARTS or (spare > -math.inf and (passed or -_PART <= rest <= 0.5 * _PART)):
+                # The path ahead changes during a turn, so that one step may overshoot its course by more than that
+                # step.
+                passed = 0.0 < before <= 2.0 * _TURN_STEP_RAD and -2.0 * _TURN_STEP_RAD <= rest < 0.0
+                if part + 1 == _MAX_TURN_STEPS or (
+                    spare > -math.inf and (passed or -_TURN_STEP_RAD <= rest <= 0.5 * _TURN_STEP_RAD)
+                ):
                     if spare > left[n]:
                         left[n], reached[n] = spare, origin[i, j]
                     break
@@ -110,8 +117,8 @@ def _look_ahead(
                 here.east += lasts * over_east
                 here.north += lasts * over_north
                 here.up -= lasts * sink
-                yaw += side * _PART
-    # Compiled code frees an array after its last use, and a record of it does not count as one.
+                yaw += side * _TURN_STEP_RAD
+    # Compiled code frees an array after its last use, and use of a record of it does not keep it alive.
     if turnings.size != 1:
         left[:] = math.nan
 
@@ -120,7 +127,7 @@ def _look_ahead(
 def _is_clear(
     here: Record, floor: Floats, spheres: Floats, radii: Floats, glider: Record
 ) -> bool:  # pragma: no cover - compiled
-    """Whether a place is above the margin over the ground, on the map, and outside every kill sphere."""
+    """Return True if a place is on the map, above the ground's margin, and outside every kill sphere."""
     i, j = round((here.north - glider.south) / glider.cell), round((here.east - glider.west) / glider.cell)
     if not (0 <= i < floor.shape[0] and 0 <= j < floor.shape[1]) or not here.up >= floor[i, j]:
         return False
@@ -135,9 +142,9 @@ def _is_clear(
 def _best_cell(
     here: Record, need: Floats, worst: float, glider: Record
 ) -> tuple[float, int, int]:  # pragma: no cover - compiled
-    """Of the cell of a place and those beside it the one from which most is left: what is left, row and column.
+    """Return the best of a place's cell and its neighbours: altitude left, row and column.
 
-    A cell's middle may lie in a sphere that the place itself is outside of.  worst: height lost per metre to a middle.
+    A cell's center may lie in a sphere that the place itself is outside of.  worst: height lost per metre to a center.
     """
     row, column = round((here.north - glider.south) / glider.cell), round((here.east - glider.west) / glider.cell)
     best, at_row, at_column = -math.inf, row, column
@@ -155,8 +162,8 @@ def _best_cell(
 def _rest_of_turn(
     here: Record, i: int, j: int, side: float, onward: Codes, moves: Records, glider: Record
 ) -> float:  # pragma: no cover - compiled
-    """What is left of a turn to the way that leads on from a cell, rad; negative beyond it, 0 at the way's end."""
-    for _ in range(_AHEAD):
+    """Return the rest of a turn to the path on from a cell, rad; negative beyond it, 0 at the path's end."""
+    for _ in range(_LOOKAHEAD_STEPS):
         m = onward[i, j]
         if m < 0:
             break

@@ -1,4 +1,4 @@
-"""Glides without an engine in words."""
+"""Describe glides without an engine in words."""
 
 import math
 
@@ -27,7 +27,7 @@ _REACHED: dict[Reach, str] = {
 
 
 def reached_text(reach: Reach) -> str:
-    """What the best in reach without an engine is.
+    """Return the text for the best place in reach without an engine.
 
     >>> reached_text("home")
     'home is in reach'
@@ -36,7 +36,7 @@ def reached_text(reach: Reach) -> str:
 
 
 def glides_headline(glides: Glides) -> str:
-    """What can be reached, in a line.
+    """Return a one-line summary of the places that can be reached.
 
     >>> glides_headline(Glides((), (), 18.0, not_judged="terrain"))
     'not judged: there is no elevation file'
@@ -46,7 +46,7 @@ def glides_headline(glides: Glides) -> str:
     if not glides.each:
         return "no place to glide from"
     counted = [(reach, glides.count(reach)) for reach in REACHES]
-    # Home is told even where nobody gets there.
+    # Home is reported even if it is reached from nowhere.
     reached = ", ".join(_FROM[reach].format(count=count) for reach, count in counted if count or reach == "home")
     if any(one.own.end == "not flown" for one in glides.each):
         own = "ArduPlane's own return, which would follow the terrain, is not flown"
@@ -56,7 +56,7 @@ def glides_headline(glides: Glides) -> str:
 
 
 def site_text(site: GlideSite) -> str:
-    """A place that somebody has chosen.
+    """Return the name of a chosen place.
 
     >>> site_text(GlideSite("rally", 2, 0.0, 0.0)), site_text(GlideSite("landing", 9, 0.0, 0.0))
     ('rally point 2', 'the landing at item 9')
@@ -71,12 +71,12 @@ def site_text(site: GlideSite) -> str:
 
 
 def glide_range_text(found: GlideRange, glides: Glides) -> str:
-    """A range of seconds: what can be reached from there, what is left over, and what ArduPlane itself does."""
+    """Return the text of a time range: what is in reach, the height left over, and ArduPlane's own return."""
     when = f"{found.first:.0f} s" if found.count == 1 else f"{found.first:.0f} to {found.last:.0f} s"
-    return f"{when}: {_reached(found, glides)}{_own(found.least)}"
+    return f"{when}: {_reach_text(found, glides)}{_own_return_text(found.least)}"
 
 
-def _reached(found: GlideRange, glides: Glides) -> str:
+def _reach_text(found: GlideRange, glides: Glides) -> str:
     one = found.least
     spare = glides.spare(one)
     at = "" if found.count == 1 else f" at the least, from {one.time:.0f} s"
@@ -94,7 +94,7 @@ def _reached(found: GlideRange, glides: Glides) -> str:
             return "not known, for it is beyond the elevation data"
 
 
-def _own(one: Glide) -> str:
+def _own_return_text(one: Glide) -> str:
     name = one.own.target.name
     match one.own.end:
         case "arrives":
@@ -113,7 +113,7 @@ def _own(one: Glide) -> str:
 
 
 def glide_notes(glides: Glides) -> list[str]:
-    """What a person has to know of how glides were flown."""
+    """Return notes on the assumptions under which glides were flown."""
     if not glides.each:
         return []
     notes = [

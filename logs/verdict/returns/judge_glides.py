@@ -1,10 +1,10 @@
-"""What can be reached when the engine stops?  From each start: by ArduPlane's own return, and by the best way there is.
+"""Judge what is in reach after an engine failure: by ArduPlane's own return, and by the best path.
 
-ArduPlane does not know that its engine has stopped: its return to launch is flown without thrust by its law
-(`flight.autopilots.arduplane.swift_return`), straight at its target and onto its slope.  What could be reached at all
-is told by searches backwards from home, the rally points and the landing places of the mission, and from all ground
-that is flat by the elevation file (`logs.verdict.returns.glide_map`).  Both keep `MARGIN` above ground all the way, and
-out of kill spheres.
+ArduPlane does not know that its engine has stopped: its return to launch is simulated without thrust by its control law
+(`flight.autopilots.arduplane.swift_return`), straight at its target and onto its slope.  What can be reached at all
+is found by backward searches from home, the rally points and the landing places of the mission, and from all ground
+that is flat by the elevation file (`logs.verdict.returns.glide_map`).  Both keep `MARGIN` above ground on the whole
+path, and stay out of kill spheres.
 """
 
 import math
@@ -37,27 +37,27 @@ from world.kernels import Record
 
 Floats = NDArray[np.float64]
 
-# Height above ground that a glide keeps, up to where it arrives, m.  The law without thrust was 13 m too high at the
-# most, and the elevation file has its own error.
+# Height above ground that a glide keeps until it arrives, m.  ArduPlane's law without thrust was at most 13 m too high,
+# and the elevation file has its own error.
 MARGIN = 30.0
 
 _NOWHERE = (math.nan, math.nan, math.nan)
 
 SiteKind = Literal["home", "rally", "landing"]
-# The best that can be reached from a place, the best first: home; a rally point or a landing place of the mission; flat
-# ground; nothing; or it is not known, since the aircraft is beyond the elevation data.
+# The best destination in reach from a place, best first: home; a rally point or a landing place of the mission; flat
+# ground; nothing; or unknown, because the aircraft is beyond the elevation data.
 Reach = Literal["home", "site", "flat", "nothing", "unknown"]
 REACHES: tuple[Reach, ...] = ("home", "site", "flat", "nothing", "unknown")
-# How ArduPlane's own return ends without thrust: at its target; there, but lower over the ground than `MARGIN`; in the
-# ground; in a kill sphere; off the elevation data; or it is not flown, for it would follow the terrain.
+# Outcome of ArduPlane's own return without thrust: at its target; at its target, but lower above ground than `MARGIN`;
+# ground impact; in a kill sphere; off the elevation data; or not simulated, because it would follow the terrain.
 OwnEnd = Literal["arrives", "low", "ground", "threat", "unknown", "not flown"]
 # Why nothing is judged: there is no elevation file; the model has no trim with the throttle closed; or the mission
-# reaches too far for a map of it.
+# is too large for a map.
 NotJudged = Literal["", "terrain", "trim", "far"]
 
 
 class GlideSite(NamedTuple):
-    """A place that somebody has chosen.
+    """Chosen place to glide to.
 
     number: of the rally point, or the mission item that lands; 0 for home.
     east, north: m.
@@ -73,11 +73,11 @@ class GlideSite(NamedTuple):
 class OwnGlide:
     """ArduPlane's return without thrust.
 
-    target: where it goes.  end: what it comes to.
-    over: height over the ground at its target when it gets there, m; NaN where it does not.
-    clearance: least height above ground on the way, m.
-    at: east, north, up where it comes down, m; NaN where it does not.
-    short: from there to its target, m; NaN likewise.
+    target: its destination.  end: its outcome.
+    over: height above ground at arrival over its target, m; NaN if it does not arrive.
+    clearance: least height above ground on the path, m.
+    at: east, north, up of the ground impact, m; NaN without one.
+    short: distance from there to its target, m; NaN without an impact.
     """
 
     target: ReturnTarget
@@ -90,14 +90,14 @@ class OwnGlide:
 
 @dataclass(frozen=True, slots=True)
 class Glide:
-    """What can be reached from one place.
+    """Destinations in reach from one place.
 
     time: s of the flight.  start: (3,) m.
-    own: what ArduPlane's return does.
-    left: for each of `Glides.sites` the height left over what the way there takes, m: negative where that is more than
-        there is, -inf where no way leads there.
-    flat: the same for flat ground.  flat_at: east, north and height of that, m, NaN for none.
-    reach: the best of all.
+    own: outcome of ArduPlane's return.
+    left: for each of `Glides.sites` the altitude left over after the path there, m: negative if the altitude is too
+        low, -inf if no path leads there.
+    flat: the same for flat ground.  flat_at: east, north and altitude of that ground, m, NaN if none.
+    reach: the best destination.
     """
 
     time: float
@@ -111,10 +111,10 @@ class Glide:
 
 @dataclass(frozen=True, slots=True)
 class GlideRange:
-    """Seconds in a row from which the same can be reached, and ArduPlane's return ends alike.
+    """Time range with the same destination in reach and the same outcome of ArduPlane's return.
 
-    first, last: s.  count: how many.  site: index of `Glides.sites` that most is left over for, -1 for none.
-    least: of them the one with the least left over for what can be reached.
+    first, last: s.  count: number of glides.  site: index of the site in `Glides.sites` with most altitude left, or -1.
+    least: the glide with the least altitude left over at its best destination.
     """
 
     first: float
@@ -126,15 +126,15 @@ class GlideRange:
 
 @dataclass(frozen=True, slots=True)
 class Glides:
-    """Glides from everywhere on the way.
+    """Glides from all places on the path.
 
-    each: by their times; none where nothing is judged.
-    sites: home first, rally points and landing places.
-    airspeed: that glides are flown at, equivalent, m/s.
+    each: by time; empty if nothing is judged.
+    sites: home first, then rally points and landing places.
+    airspeed: of the glides, equivalent, m/s.
     cell: side of the map's cells, m.
-    fuel: whether the engine burns fuel: what it brakes when it stands is not known.
-    not_judged: why nothing is.
-    footprint: the map that they were looked up on; None where nothing is judged.
+    fuel: True if the engine burns fuel: the drag of the stopped engine is unknown.
+    not_judged: why nothing is judged.
+    footprint: the map used for the glides; None if nothing is judged.
     """
 
     each: tuple[Glide, ...]
@@ -146,30 +146,30 @@ class Glides:
     footprint: GlideFootprint | None = field(default=None, repr=False, compare=False)
 
     def count(self, reach: Reach) -> int:
-        """From how many places this is the best."""
+        """Return the number of places whose best destination is this one."""
         return sum(one.reach == reach for one in self.each)
 
     @property
     def arrivals(self) -> int:
-        """How many of ArduPlane's own returns arrive."""
+        """Number of ArduPlane's own returns that arrive."""
         return sum(one.own.end == "arrives" for one in self.each)
 
     @property
     def somewhere(self) -> bool | None:
-        """Whether something is in reach from everywhere; None where that is not known."""
+        """True if something is in reach from all places; None if unknown."""
         if self.count("nothing"):
             return False
         return None if not self.each or self.count("unknown") else True
 
     def best_site(self, one: Glide) -> int:
-        """Home where that is in reach, else the site that most is left over for; -1 for none in reach."""
+        """Return home if it is in reach, otherwise the site with most altitude left, or -1 if none is."""
         if one.reach == "home":
             return 0
         return int(np.argmax(one.left)) if one.reach == "site" else -1
 
     @property
     def ranges(self) -> tuple[GlideRange, ...]:
-        """All in ranges of seconds, by time."""
+        """All glides in time ranges, by time."""
         found = []
         for (site, *_), group in groupby(self.each, lambda one: (self.best_site(one), one.reach, one.own.end)):
             ones = list(group)
@@ -179,20 +179,23 @@ class Glides:
         return tuple(found)
 
     def spare(self, one: Glide) -> float:
-        """Height left over for the best that can be reached, m; below 0 where nothing can, -inf where no way leads."""
+        """Return the altitude left at the best destination, m.
+
+        Below 0 if none is in reach, -inf without a path.
+        """
         if one.reach in ("home", "site"):
             return one.left[self.best_site(one)]
         return one.flat if one.reach == "flat" else max((*one.left, one.flat))
 
 
-# Of a flight that nobody asked it of.
+# Placeholder for a flight without judged glides.
 NOT_ASKED = Glides((), (), math.nan)
 
 
 def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
-    """Judge what can be reached without an engine from each start; one low in a take-off or landing is left out.
+    """Judge what can be reached without an engine from each start, except from low take-offs and landings.
 
-    From there the aircraft comes down straight ahead.
+    From a low start the aircraft descends straight ahead.
     """
     starts = starts.at(np.flatnonzero(~starts.low))
     parameters = world.parameters
@@ -215,27 +218,27 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     low = float(np.nanmin(made.ground)) if np.isfinite(made.ground).any() else 0.0
     slopes = glide_slopes(world.aircraft, airspeed, low, max(top, low + 1.0))
 
-    def looked(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
+    def search_from(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
         needs = least_heights(made, cells, slopes, top)
         return *heights_left(rows, needs, world.aircraft, around, airspeed, bank), needs.need
 
-    by_site = [looked(np.array([made.cell_of(site.east, site.north)])) for site in sites]
+    by_site = [search_from(np.array([made.cell_of(site.east, site.north)])) for site in sites]
     left = [found[0] for found in by_site]
     landings = _flat_ground(world, made)
-    flat, flat_cells, _ = looked(np.argwhere(landings))
+    flat, flat_cells, _ = search_from(np.argwhere(landings))
     known = np.isfinite(terrain.height(rows["east"], rows["north"]))
     each = []
     for k, row in enumerate(rows):
         lefts = tuple(float(one[k]) for one in left)
         at = place_of(made, int(flat_cells[k])) if flat_cells[k] >= 0 else _NOWHERE
         start = (float(row["east"]), float(row["north"]), float(row["up"]))
-        reach = _best(lefts, float(flat[k])) if known[k] else "unknown"
+        reach = _best_reach(lefts, float(flat[k])) if known[k] else "unknown"
         each.append(Glide(float(starts.time[k]), start, ends[k], lefts, float(flat[k]), at, reach))
     chosen = np.minimum.reduce([found[2] for found in by_site])
     return Glides(tuple(each), sites, airspeed, made.cell, fuel, footprint=GlideFootprint(made, chosen, landings))
 
 
-def _best(left: tuple[float, ...], flat: float) -> Reach:
+def _best_reach(left: tuple[float, ...], flat: float) -> Reach:
     if left[0] >= 0.0:
         return "home"
     if any(one >= 0.0 for one in left):
@@ -244,7 +247,7 @@ def _best(left: tuple[float, ...], flat: float) -> Reach:
 
 
 def _sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
-    """Home, rally points, and where the mission lands."""
+    """Return home, rally points, and the mission's landing places."""
     mission, origin = world.setup.mission, world.scenario.origin
     return (
         GlideSite("home", 0, world.home.east, world.home.north),
@@ -254,7 +257,7 @@ def _sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
 
 
 def _flat_ground(world: ReturnWorld, made: GlideMap) -> Flags:
-    """Cells (n, e) that could be landed on: flat, and in no exclusion zone that reaches down to the ground."""
+    """Return cells (n, e) for landing: flat, and in no exclusion zone that reaches down to the ground."""
     flat = landable(made)
     bar_zones(made, flat, world.airspace.records, MARGIN)
     return flat
@@ -265,7 +268,10 @@ def _flat_ground(world: ReturnWorld, made: GlideMap) -> Flags:
 
 
 def _own_glides(world: ReturnWorld, starts: ReturnStarts) -> list[OwnGlide]:
-    """ArduPlane's returns without thrust; one that goes on to land is flown as far as its circle."""
+    """Simulate ArduPlane's returns without thrust.
+
+    A return that goes on to land is flown as far as its loiter.
+    """
     targets = [world.target(row) for row in starts.rows]
     if "terrain" in world.open:
         return [OwnGlide(one, "not flown", math.nan, math.nan, _NOWHERE, math.nan) for one in targets]

@@ -1,10 +1,10 @@
-"""Is every return to launch safe?  Each start is flown home by ArduPlane's law, and what it meets is judged.
+"""Judge whether every return to launch is safe: simulate ArduPlane's RTL from each start.
 
-Where RTL_AUTOLAND, or a battery's failsafe, leads to a landing sequence of the mission, the way there is judged.
+If RTL_AUTOLAND, or a battery failsafe, leads to a landing sequence of the mission, the path to it is judged.
 
-A return is flown on a point mass (`flight.autopilots.arduplane.swift_return`), in the mean wind.  Those of which that
-could be wrong are flown again in JSBSim by whoever asks: what that finds counts for the one that was flown, and where
-it is worse, for all like it.
+A return is simulated with a point mass (`flight.autopilots.arduplane.swift_return`), in the mean wind.  Returns whose
+simulation could be wrong are flown again in JSBSim if the caller provides that.  The result replaces the point mass for
+the return that was flown again, and if it is worse, for all similar returns.
 """
 
 import math
@@ -53,52 +53,54 @@ from world.wind import mean_wind_speed
 
 Floats = NDArray[np.float64]
 
-# What a return comes to, the worst first: it hits the ground, enters a missile's sphere, goes into a zone or out of
-# one, does not arrive, takes more energy than there is, leaves the elevation data, is flown too differently by the
-# point mass and in JSBSim, comes lower than the least height above ground; or is safe.
+# Outcome of a return, the worst first: it hits the ground, enters a missile's sphere, violates a zone, does not arrive,
+# uses more energy than available, leaves the elevation data, differs too much between the point mass and JSBSim, goes
+# below the least height above ground; or is safe.
 Kind = Literal["ground", "threat", "zone", "lost", "energy", "unknown", "unsure", "low", "safe"]
 KINDS: tuple[Kind, ...] = ("ground", "threat", "zone", "lost", "energy", "unknown", "unsure", "low", "safe")
-# What of them nobody would call a return that went well.
+# Outcomes that are failures of the return.
 UNSAFE = frozenset(KINDS[:5])
 
-# How it comes home: it stays in a circle there; goes on from it to a landing sequence (RTL_AUTOLAND 1); or flies
-# straight to a landing sequence (RTL_AUTOLAND 2, and what "land" means to a battery's failsafe).
+# End of a return: it stays in a loiter there; it goes on from the loiter to a landing sequence (RTL_AUTOLAND 1); or it
+# flies straight to a landing sequence (RTL_AUTOLAND 2, and "land" as a battery failsafe action).
 Way = Literal["circle", "on to land", "straight to land"]
-# What leaves returns open, whatever is judged of them: they follow the terrain; the autopilot has another law; mode
-# AUTOLAND lands by a pattern of its own; they go by the mission's return path (RTL_AUTOLAND 4); or the landing sequence
-# begins with the landing itself.
+# Reasons that leave returns undecided, whatever their simulation shows: they follow the terrain; the autopilot has
+# another control law; mode AUTOLAND lands by a pattern of its own; they follow the mission's return path (RTL_AUTOLAND
+# 4); or the landing sequence begins with the landing itself.
 Open = Literal["terrain", "law", "autoland", "return path", "landing"]
 
-# Nearer than this (m) to a limit the point mass could be wrong: it is within 7 m of 38 flights of ArduPlane.
+# Closer to a limit than this the point mass could be wrong, m: it is within 7 m of 38 flights of ArduPlane.
 UNSURE = 10.0
-# How far apart the two are counts this near (m) to a limit; further away it decides nothing.
-_DECIDES = 50.0
-# A return that begins lower than the least height above ground, as after a take-off, is held to the height that it has
-# there, less what its turn takes, m; in a flown take-off or landing to this share of it, for it may be sinking.
+# The difference between point mass and JSBSim matters only this close to a limit, m.
+_DECISIVE_MARGIN_M = 50.0
+# Height that the turn of a return costs, m.  A return that begins below the least height above ground, as after a
+# take-off, has to keep its starting height less this.
 TURN = 2.0
-_LOW_SHARE = 0.5
-# Lower over the ground than this, m, no return is judged in a take-off or a landing: nothing turns there.
+# Fraction of its starting height that a return from a flown take-off or landing has to keep: it may be sinking.
+_LOW_START_FRACTION = 0.5
+# Least height above ground from which returns in a take-off or a landing are judged, m: nothing turns below it.
 TOUCHING = 10.0
-# Higher up one is left out that hits the ground or comes low within this run, m, for it loses the rest of that share.
-_SINKS_WITHIN = 500.0
-# A start banked by more than this (rad) is none that a flight in JSBSim could begin at: it is flown in to, straight.
-_BANKED = math.radians(10.0)
+# A return from higher up is left out if it hits the ground or gets low within this run, m, because it sinks by the rest
+# of that fraction.
+_SINK_RUN_M = 500.0
+# Bank beyond which a JSBSim flight cannot begin at a start, rad: the start is approached in straight flight.
+_MAX_START_BANK_RAD = math.radians(10.0)
 
 
 @dataclass(frozen=True, slots=True)
 class ReturnFlown:
-    """One return.
+    """One simulated return.
 
     time: s of the flight at which it begins.  start: (3,) m.
-    target: where it goes, and why there.
-    kind: what it comes to.
-    clearance: least height above ground, m, NaN where that is not known; clearance_at: (3,) m, where.
-    outside: least distance outside a kill sphere, m, inf for none; threat: which, -1 for none.
-    zone: which zone it goes wrong at, an index of `Returns.airspace`, -1 for none.
-    energy: that it takes, Wh; left: what is left then, Wh; NaN where it is not known.
-    seconds: to its circle, NaN where it does not get there.
-    floor: height above ground that is asked of it, m: the least height, or what it begins with where that is less.
-    used: energy that was used before it begins, Wh; NaN where it is not known.
+    target: its destination, and the reason for it.
+    kind: its outcome.
+    clearance: least height above ground, m, NaN if unknown; clearance_at: (3,) m, where.
+    outside: least distance outside a kill sphere, m, inf for none; threat: index of that sphere, -1 for none.
+    zone: the zone that it violates, an index of `Returns.airspace`, -1 for none.
+    energy: energy that it uses, Wh; left: energy left at its end, Wh; NaN if unknown.
+    seconds: time to its loiter, NaN if it does not get there.
+    floor: required height above ground, m: the least height, or the starting height if that is less.
+    used: energy that was used before it begins, Wh; NaN if unknown.
     """
 
     time: float
@@ -118,15 +120,15 @@ class ReturnFlown:
 
     @property
     def safe(self) -> bool:
-        """Whether nothing is wrong with it."""
+        """True if the return is safe."""
         return self.kind == "safe"
 
 
 @dataclass(frozen=True, slots=True)
 class ReturnRange:
-    """Seconds in a row from which returns go to the same place, and come to the same.
+    """Time range from which returns go to the same place with the same outcome.
 
-    first, last: s.  count: how many returns.  worst: the worst of them.
+    first, last: s.  count: number of returns.  worst: the worst of them.
     """
 
     first: float
@@ -135,18 +137,18 @@ class ReturnRange:
     worst: ReturnFlown
 
 
-# Whether there is a point of no return by energy: nowhere; behind some place; before the first; or it is not known,
-# because the battery or what was used of it is not, or because no return arrives.
+# Point of no return by energy: none; after some place; before the first place; or unknown, because the battery or the
+# energy used is unknown, or because no return arrives.
 NoReturn = Literal["never", "later", "at once", "battery", "used", "arrives"]
 
 
 class PointOfNoReturn(NamedTuple):
-    """The last place from which a return leaves the reserve, in the wind that there is.
+    """Last place from which a return leaves the reserve, in the given wind.
 
-    kind: whether there is one, or why it is not known.
-    time: s, of the last place with the reserve; NaN where there is no point of no return, or none is known.
-    left: Wh that the return from there leaves, or the least that any does where there is no such point.
-    skipped: how many returns before it do not arrive, so that what they take is not known.
+    kind: whether there is such a point, or why it is unknown.
+    time: s, of the last place with the reserve; NaN if there is no point of no return, or it is unknown.
+    left: Wh left after the return from there, or the least left after any return if there is no such point.
+    skipped: number of returns before it that do not arrive, so that their energy is unknown.
     """
 
     kind: NoReturn
@@ -157,21 +159,21 @@ class PointOfNoReturn(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Returns:
-    """Returns from everywhere on the way.
+    """Returns from all places on the path.
 
-    each: by their times.  every: s between two.
-    causes: what can take the aircraft off its mission, and what it does then.
-    limit: least height above ground that is asked for, m.
+    each: by time.  every: s between two.
+    causes: events that can take the aircraft off its mission, and its action then.
+    limit: least height above ground that is required, m.
     airspace: the zones.
     reserve: energy that has to be left, Wh.
-    flown: whether they begin on a flown track; on the planned path otherwise.
-    again: of those that were flown again in JSBSim, the clearance there less the one on the point mass, m.
-    stands_in: whether ArduPlane's law stands in for an autopilot that has none of its own for this.
-    open: what is not judged of them.
-    autoland: RTL_AUTOLAND; None where it is another autopilot's mission.
+    flown: True if they begin on a flown track, False for the planned path.
+    again: for each return flown again in JSBSim, the clearance there minus the clearance of the point mass, m.
+    stands_in: True if ArduPlane's law stands in for an autopilot without a return law.
+    open: parts that are not judged.
+    autoland: RTL_AUTOLAND; None for the mission of another autopilot.
     landings: the mission's landing sequences.
-    left_out: how many more there would be while the aircraft is on the ground, or so low in a take-off or a landing
-        that it sinks to the ground before it can return.
+    left_out: number of further returns while the aircraft is on the ground, or so low in a take-off or a landing that
+        it sinks to the ground before it can return.
     """
 
     each: tuple[ReturnFlown, ...]
@@ -190,38 +192,38 @@ class Returns:
 
     @property
     def safe(self) -> bool:
-        """Whether every return is, and nothing is left open; a landing at its end is not judged."""
+        """True if every return is safe and nothing is left undecided; a landing at the end is not judged."""
         return bool(self.each) and not self.open and all(one.safe for one in self.each)
 
     @property
     def undecided(self) -> bool:
-        """Whether none is known to be unsafe, and of some it is not known."""
+        """True if no return is known to be unsafe, but some are unknown."""
         wrong = bool(self.unsafe) or self.count("low") > 0
         return not wrong and (bool(self.open) or self.count("unknown") > 0 or self.count("unsure") > 0)
 
     @property
     def lands(self) -> bool:
-        """Whether any goes to a landing sequence."""
+        """True if any return goes to a landing sequence."""
         return any(one.target.landing is not None for one in self.each)
 
     @property
     def unsafe(self) -> tuple[ReturnFlown, ...]:
-        """Those of `UNSAFE`."""
+        """Returns whose outcome is in `UNSAFE`."""
         return tuple(one for one in self.each if one.kind in UNSAFE)
 
     def count(self, kind: Kind) -> int:
-        """How many come to this."""
+        """Return the number of returns with this outcome."""
         return sum(one.kind == kind for one in self.each)
 
     @property
     def point_of_no_return(self) -> PointOfNoReturn:
-        """By energy, of the returns as RTL flies them; those that do not arrive are left out."""
+        """Point of no return by energy, for RTL returns; returns that do not arrive are left out."""
         last, least, skipped = math.nan, math.inf, 0
         if not self.each or all(math.isnan(one.left) for one in self.each):
             return PointOfNoReturn("battery")
         for k, one in enumerate(self.each):
             if k and one.time <= self.each[k - 1].time:
-                # From here on returns by another way.
+                # From here on the returns end differently.
                 break
             if math.isnan(one.used):
                 return PointOfNoReturn("used")
@@ -235,33 +237,33 @@ class Returns:
 
     @property
     def ranges(self) -> tuple[ReturnRange, ...]:
-        """All in ranges of seconds, the worst first."""
+        """All returns in time ranges, the worst first."""
         found = []
-        for _, group in groupby(self.each, _likeness):
+        for _, group in groupby(self.each, _report_key):
             ones = list(group)
             found.append(ReturnRange(ones[0].time, ones[-1].time, len(ones), min(ones, key=badness)))
         return tuple(sorted(found, key=lambda one: (*badness(one.worst), one.first)))
 
 
-def _likeness(one: ReturnFlown) -> tuple[object, ...]:
-    """Equal for returns that are told together."""
+def _report_key(one: ReturnFlown) -> tuple[object, ...]:
+    """Return a key that is equal for returns that are reported together."""
     goes = (one.kind, one.target.name)
     return (*goes, one.threat, one.zone) if one.kind in ("threat", "zone") else goes
 
 
 def badness(one: ReturnFlown) -> tuple[int, float]:
-    """By what returns are ordered, the worst first."""
+    """Return the sort key of a return, the worst first."""
     measure = one.outside if one.kind == "threat" else one.left if one.kind == "energy" else one.clearance
     return KINDS.index(one.kind), math.inf if math.isnan(measure) else measure
 
 
 @dataclass(frozen=True, slots=True)
 class ReturnWorld:
-    """All that decides returns but where they begin.
+    """Data that decides returns, except where they begin.
 
     parameters: of ArduPlane.  home, rally: on the map.
     aircraft: as a point mass.  around: ground and spheres.
-    stands_in: as of `Returns`.  other_law: whether it stands in for one that returns by a law of its own.
+    stands_in: as in `Returns`.  other_law: True if it replaces an autopilot with its own return law.
     landings: the mission's landing sequences.
     """
 
@@ -278,7 +280,7 @@ class ReturnWorld:
 
     @property
     def scenario(self) -> Scenario:
-        """The setup's."""
+        """Scenario of the setup."""
         return self.setup.scenario
 
     @property
@@ -288,12 +290,12 @@ class ReturnWorld:
 
     @property
     def battery_known(self) -> bool:
-        """Whether anybody stated what the battery holds; energy is not judged otherwise."""
+        """True if the battery's energy is stated; otherwise energy is not judged."""
         return not self.setup.envelope.battery_guessed or self.scenario.flight.battery_wh is not None
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """What can take the aircraft off its mission; of another autopilot that is not known."""
+        """Events that can take the aircraft off its mission; unknown, thus empty, for another autopilot."""
         if self.other_law:
             return ()
         mission = self.setup.mission
@@ -306,19 +308,19 @@ class ReturnWorld:
 
     @property
     def way(self) -> Way:
-        """How RTL comes home."""
+        """End of a return by RTL."""
         named: dict[int, Way] = {1: "on to land", 2: "straight to land"}
         return named.get(int(self.parameters.rtl_autoland), "circle") if self.landings else "circle"
 
     @property
     def ways(self) -> tuple[Way, ...]:
-        """How its returns come home, RTL's first."""
+        """All ways in which returns end, RTL's first."""
         lands = any(cause.does == "land" for cause in self.causes) and self.way != "straight to land"
         return (self.way, "straight to land") if lands else (self.way,)
 
     @property
     def open(self) -> tuple[Open, ...]:
-        """What cannot be judged of its returns."""
+        """Parts of its returns that cannot be judged."""
         found: dict[Open, bool] = {
             "terrain": self.parameters.follows_terrain_home,
             "law": self.other_law,
@@ -329,48 +331,48 @@ class ReturnWorld:
         return tuple(name for name, is_so in found.items() if is_so)
 
     def target(self, row: Record, way: Way | None = None) -> ReturnTarget:
-        """Where a return from a start goes.  way: RTL's if none is stated."""
+        """Return the destination of a return from a start.  way: end of the return, RTL's by default."""
         rules = ArduPlane(self.parameters).return_rules
         here = (float(row["east"]), float(row["north"]), float(row["up"]))
         way = way or self.way
         if way == "straight to land" and (landing := nearest_landing(here, self.landings)) is not None:
             away = math.dist(here[:2], landing.place[:2])
-            name, why = f"the landing sequence at item {landing.item}", self._chosen(landing)
+            name, why = f"the landing sequence at item {landing.item}", self._choice_reason(landing)
             return ReturnTarget(landing.place, name, why, away, landing=landing, straight=True)
         target = choose_target(rules, here, self.home, self.rally)
         return self.going_on(target) if way == "on to land" else target
 
     def going_on(self, target: ReturnTarget) -> ReturnTarget:
-        """A return to a circle, with the landing sequence that RTL then goes on to."""
+        """Return the target of a return to a loiter, with the landing sequence to which RTL then goes on."""
         landing = nearest_landing(target.position, self.landings) if self.way == "on to land" else None
         if landing is None:
             return target
-        reasons = [one for one in (target.reason, self._chosen(landing)) if one]
+        reasons = [one for one in (target.reason, self._choice_reason(landing)) if one]
         name = f"{target.name}, and on to the landing sequence at item {landing.item}"
         return target._replace(name=name, reason=", ".join(reasons), landing=landing)
 
-    def _chosen(self, landing: LandingStart) -> str:
-        """Why a landing sequence."""
+    def _choice_reason(self, landing: LandingStart) -> str:
+        """Return the reason for choosing a landing sequence."""
         return f"item {landing.item} is of the nearest of {len(self.landings)}" if len(self.landings) > 1 else ""
 
     def with_parameters(self, **values: float) -> "ReturnWorld":
-        """The same with other parameters, by ArduPlane's names and in its units."""
+        """Return a copy with other parameters, by ArduPlane's names and in its units."""
         return replace(self, parameters=self.parameters.changed(**values))
 
     def with_rally(self, rally: Sequence[ReturnPlace]) -> "ReturnWorld":
-        """The same with other rally points."""
+        """Return a copy with other rally points."""
         return replace(self, rally=tuple(rally))
 
 
 def _has_return_path(setup: FlightSetup) -> bool:
-    """Whether a mission has a landing sequence or a return path, which RTL_AUTOLAND 4 goes by."""
+    """Return True if a mission has a landing sequence or a return path, which RTL_AUTOLAND 4 follows."""
     return any(item.command in (Command.DO_RETURN_PATH_START, Command.DO_LAND_START) for item in setup.mission.items)
 
 
 def return_world(setup: FlightSetup) -> ReturnWorld:
-    """What decides the returns of a setup's mission.
+    """Collect the data that decides the returns of a setup's mission.
 
-    The law is ArduPlane's, with the setup's parameters where it has any, with the aircraft's otherwise.
+    The control law is ArduPlane's, with the setup's parameters if it has any, otherwise with the aircraft's parameters.
     Raises MissionError for a mission without a home, and FlightError for an aircraft that cannot be loaded.
     """
     places = return_places(setup.mission, setup.scenario.origin, setup.scenario.terrain)
@@ -395,10 +397,10 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
     )
 
 
-# What flies a return in JSBSim: least height above ground and least distance outside a kill sphere, m; None where it
-# cannot be flown.
+# Callable that flies a return in JSBSim: least height above ground and least distance outside a kill sphere, m; None if
+# it cannot be flown.
 FlyAgain = Callable[[ReturnWorld, Record], tuple[float, float] | None]
-# Returns that are flown again, at most.
+# Largest number of returns that are flown again.
 MAX_AGAIN = 4
 
 
@@ -410,10 +412,11 @@ def judge_returns(
     most: int = MAX_AGAIN,
     advance: Callable[[float, float], None] = lambda done, total: None,
 ) -> Returns:
-    """Fly and judge the return from each start.
+    """Simulate and judge the return from each start.
 
-    every: s between them.  fly_again: flies a return in JSBSim; None for no such flights.  most: of them.
-    advance: called with how many are judged, and of how many; what it raises ends the work.
+    every: s between them.  fly_again: flies a return in JSBSim; None for no such flights.  most: largest number of
+    them.
+    advance: called with the number judged and the total; an exception that it raises ends the work.
     """
     each: list[ReturnFlown] = []
     again: list[float] = []
@@ -428,9 +431,9 @@ def judge_returns(
         ones = []
         for k, row in enumerate(flown):
             advance(number * len(starts) + k, total)
-            ones.append(_judged(world, starts, k, ends[k], row, paths[k] if paths else _NO_WAY, float(asked[k])))
+            ones.append(_judge_return(world, starts, k, ends[k], row, paths[k] if paths else _NO_WAY, float(asked[k])))
         if fly_again is not None and way == "circle":
-            ones, apart = _set_right(world, starts, ones, flown, fly_again, most)
+            ones, apart = _recheck_in_jsbsim(world, starts, ones, flown, fly_again, most)
             again += apart
         begins = heights_above_ground(world, starts)
         kept = [one for k, one in enumerate(ones) if not (starts.low[k] and sinks_down(one, float(begins[k])))]
@@ -454,15 +457,17 @@ def judge_returns(
 
 
 def sinks_down(one: ReturnFlown, height: float) -> bool:
-    """Whether a return from low in a take-off or a landing sinks to the ground there, which is no fault of its way.
+    """Return True if a return from a low start in a take-off or landing just sinks to the ground.
 
-    height: that it begins at, over the ground, m.  Lower than `TOUCHING` each that hits the ground or comes low near
-    where it begins; higher up one that loses half of its height for it.  One that flies into rising ground, or hits a
-    hill later, counts.
+    That is no fault of its path.
+
+    height: its starting height above ground, m.  Below `TOUCHING` this is any return that hits the ground or gets low
+    near its start; higher up, one that loses half of its height by then.  A return that flies into rising ground, or
+    hits a hill later, is judged.
     """
     run = math.dist(one.start[:2], one.clearance_at[:2])
-    sinks = height < TOUCHING or one.start[2] - one.clearance_at[2] >= (1.0 - _LOW_SHARE) * height
-    return one.kind in ("ground", "low", "unsure") and sinks and run <= _SINKS_WITHIN
+    sinks = height < TOUCHING or one.start[2] - one.clearance_at[2] >= (1.0 - _LOW_START_FRACTION) * height
+    return one.kind in ("ground", "low", "unsure") and sinks and run <= _SINK_RUN_M
 
 
 _NO_WAY: Floats = np.zeros((0, 3))
@@ -476,13 +481,15 @@ def fly_home(
     *,
     keep: bool = False,
 ) -> tuple[Records, tuple[Floats, ...]]:
-    """Returns from starts to their targets: (n,) of `RETURN_FLOWN`, and their ways where there are zones to meet.
+    """Simulate returns from starts to their targets: (n,) of `RETURN_FLOWN`, and their paths.
 
-    least: as of `flight.autopilots.arduplane.swift_return.fly_returns`.  keep: whether all ways are wanted.
+    The paths are returned if there are zones.
+
+    least: as in `flight.autopilots.arduplane.swift_return.fly_returns`.  keep: True to return all paths.
     """
     radius = ArduPlane(world.parameters).return_rules.radius
     circles = [None if end.straight else ReturnCircle(*end.position, radius, end.slope_base) for end in ends]
-    # A landing is not flown: what would begin with it ends where it would go on to it.
+    # A landing is not simulated: a return that would begin with the landing ends where it would go on to it.
     landings = [end.landing if end.landing and not end.landing.lands else None for end in ends]
     keep = keep or bool(world.airspace.zones)
     found = fly_returns(
@@ -492,14 +499,14 @@ def fly_home(
 
 
 def floors(world: ReturnWorld, starts: ReturnStarts) -> Floats:
-    """Height above ground (n,) that is asked of the return from each start, m."""
+    """Return the required height above ground (n,) for the return from each start, m."""
     begins = heights_above_ground(world, starts)
     own = np.where(begins < world.limit, begins - TURN, world.limit)
-    return np.where(starts.low, np.minimum(_LOW_SHARE * begins, world.limit), own)
+    return np.where(starts.low, np.minimum(_LOW_START_FRACTION * begins, world.limit), own)
 
 
 def heights_above_ground(world: ReturnWorld, starts: ReturnStarts) -> Floats:
-    """Of starts (n,), m; NaN where the ground is not known."""
+    """Return the heights above ground of starts (n,), m; NaN if the ground is unknown."""
     if world.scenario.terrain is None:
         return np.full(len(starts), math.nan)
     rows = starts.rows
@@ -507,10 +514,10 @@ def heights_above_ground(world: ReturnWorld, starts: ReturnStarts) -> Floats:
 
 
 def kind_of(world: ReturnWorld, flown: Record, zone: int, left: float, floor: float) -> Kind:
-    """What a flown return comes to.
+    """Classify a simulated return.
 
-    zone: that it goes wrong at, -1 for none.  left: Wh in the end, NaN where it is not known.
-    floor: height above ground that is asked of it, m.
+    zone: the zone that it violates, -1 for none.  left: Wh left at the end, NaN if unknown.
+    floor: required height above ground, m.
     """
     if flown["ended"] == HIT:
         return "ground"
@@ -523,12 +530,12 @@ def kind_of(world: ReturnWorld, flown: Record, zone: int, left: float, floor: fl
     if left < RESERVE * world.setup.battery:
         return "energy"
     if flown["clearance"] < floor - CLEARANCE_TOLERANCE:
-        # Wherever it goes after that.
+        # Applies wherever the return goes after that.
         return "low"
     return "unknown" if flown["ended"] == OFF_GROUND or math.isnan(flown["clearance"]) else "safe"
 
 
-def _judged(
+def _judge_return(
     world: ReturnWorld, starts: ReturnStarts, k: int, target: ReturnTarget, flown: Record, way: Floats, floor: float
 ) -> ReturnFlown:
     zone = zone_met(world, way) if len(way) > 1 else -1
@@ -554,7 +561,7 @@ def _judged(
 
 
 def zone_met(world: ReturnWorld, way: Floats) -> int:
-    """The zone that a way (t, 3) goes furthest wrong at, -1 for none."""
+    """Return the zone that a path (t, 3) violates most, -1 for none."""
     step = np.diff(way, axis=0)
     moves: Records = np.zeros(len(step), MOVE)
     run = np.hypot(step[:, 0], step[:, 1])
@@ -573,10 +580,10 @@ def zone_met(world: ReturnWorld, way: Floats) -> int:
 # Returns that the point mass could have wrong, flown again in JSBSim.
 
 
-def _set_right(
+def _recheck_in_jsbsim(
     world: ReturnWorld, starts: ReturnStarts, each: list[ReturnFlown], flown: Records, fly_again: FlyAgain, most: int
 ) -> tuple[list[ReturnFlown], list[float]]:
-    """Fly the least sure of each stretch of unsure returns in JSBSim, and set right what that tells of the stretch."""
+    """Fly the most doubtful of each run of doubtful returns in JSBSim, and correct the run by the result."""
     out, differences = list(each), []
     by_doubt = groupby(range(len(each)), lambda k: doubt(each[k]) < UNSURE)
     groups = [[k for k in group if is_steady(world, starts.rows[k])] for unsure, group in by_doubt if unsure]
@@ -586,54 +593,54 @@ def _set_right(
         found = fly_again(world, starts.rows[k])
         if found is None:
             continue
-        # By how much it was higher, and farther outside spheres, m; 0 where there is nothing to compare.
+        # Differences in clearance and in distance outside spheres, m; 0 if there is nothing to compare.
         apart = [new - old for new, old in zip(found, (each[k].clearance, each[k].outside), strict=True)]
         higher, farther = (one if math.isfinite(one) else 0.0 for one in apart)
         if math.isfinite(apart[0]):
             differences.append(higher)
-        low = min(each[k].clearance, each[k].clearance + higher) < each[k].floor + _DECIDES
-        close = min(each[k].outside, each[k].outside + farther) < _DECIDES
+        low = min(each[k].clearance, each[k].clearance + higher) < each[k].floor + _DECISIVE_MARGIN_M
+        close = min(each[k].outside, each[k].outside + farther) < _DECISIVE_MARGIN_M
         disagrees = (low and abs(higher) > UNSURE) or (close and abs(farther) > UNSURE)
-        out[k] = _moved(world, each[k], flown[k], higher, farther)
+        out[k] = _with_offsets(world, each[k], flown[k], higher, farther)
         if disagrees and out[k].kind not in ("ground", "threat"):
             out[k] = replace(out[k], kind="unsure")
         for j in group:
             if j != k and disagrees and each[j].kind in ("low", "safe"):
                 out[j] = replace(each[j], kind="unsure")
             elif j != k and not disagrees:
-                # What was flown of one return makes no other better.
-                out[j] = _moved(world, each[j], flown[j], min(0.0, higher), min(0.0, farther))
+                # The flight of one return never improves another one.
+                out[j] = _with_offsets(world, each[j], flown[j], min(0.0, higher), min(0.0, farther))
     return out, differences
 
 
-def _moved(world: ReturnWorld, one: ReturnFlown, flown: Record, higher: float, farther: float) -> ReturnFlown:
-    """A return that is so much higher and farther outside spheres than it was flown, m."""
+def _with_offsets(world: ReturnWorld, one: ReturnFlown, flown: Record, higher: float, farther: float) -> ReturnFlown:
+    """Return a copy that is higher and farther outside spheres by these differences, m."""
     moved = flown.copy()
     moved["clearance"] += higher
     moved["outside"] += farther
     if moved["clearance"] <= 0.0:
         moved["ended"] = HIT
     elif moved["ended"] == HIT:
-        # It was flown on from where it grazed the ground: energy and zones are of the whole way.
+        # It was simulated on from where it grazed the ground: energy and zones cover the whole path.
         moved["ended"] = NEVER if math.isnan(one.seconds) else CIRCLED
     kind = kind_of(world, moved, one.zone, one.left, one.floor)
     return replace(one, clearance=float(moved["clearance"]), outside=float(moved["outside"]), kind=kind)
 
 
 def is_steady(world: ReturnWorld, row: Record) -> bool:
-    """Whether an aircraft could be flown in to a start: not far banked, nor slower than it flies."""
+    """Return True if a JSBSim flight can be led to a start: small bank, and fast enough to fly."""
     wind = world.scenario.wind
     over = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, float(row["up"]))
     east = float(row["velocity_east"]) + over * math.sin(wind.from_course)
     north = float(row["velocity_north"]) + over * math.cos(wind.from_course)
     airspeed = math.hypot(east, north, float(row["velocity_up"]))
-    return abs(float(row["roll"])) <= _BANKED and airspeed >= float(world.aircraft.record.slowest)
+    return abs(float(row["roll"])) <= _MAX_START_BANK_RAD and airspeed >= float(world.aircraft.record.slowest)
 
 
 def doubt(one: ReturnFlown) -> float:
-    """How near to what decides it a return comes, m: the ground, the height that is asked of it, or a kill sphere."""
+    """Return a return's distance, m, from what decides it: ground, required height, or a kill sphere."""
     if one.kind in ("zone", "unknown"):
-        # Neither comes of how far away anything is.
+        # Neither depends on a distance.
         return math.inf
     near = [abs(one.clearance)]
     if one.kind != "ground":

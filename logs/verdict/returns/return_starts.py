@@ -1,4 +1,4 @@
-"""Where on its way an aircraft may be called home: one place for each second of a flight, or of a planned path."""
+"""Sample places from which an aircraft may be called home, at intervals along a flight or path."""
 
 from dataclasses import dataclass
 
@@ -17,22 +17,22 @@ from world.kernels import Records
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# Velocities of a track that holds none are taken over this long, s.
-_OVER = 1.0
-# m.  So far a return sinks from a final with its motor off before it climbs: it counts as low that much above a limit.
+# Time over which velocities are computed for a track without velocities, s.
+_VELOCITY_WINDOW_S = 1.0
+# Height that a return loses from a final with its motor off before it climbs, m; a place this close to a limit is low.
 SINKING = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class ReturnStarts:
-    """Where returns begin.
+    """Places where returns begin.
 
     time: (n,) s.  rows: (n,) of `flight.autopilots.arduplane.swift_return.RETURN_START`.
-    used: (n,) energy used until then, Wh; NaN where it is not known.
-    flown: whether they are of a flown track, and not of the planned path.
-    low: (n,) whether they are in a flown take-off or landing, lower over the ground than the required clearance and
-        `SINKING` more.
-    grounded: how many others there would be while the aircraft is too slow to fly: on its launch, or landed.
+    used: (n,) energy used until then, Wh; NaN if unknown.
+    flown: True for a flown track, False for the planned path.
+    low: (n,) True for a place in a flown take-off or landing that is lower above ground than the required clearance
+        plus `SINKING`.
+    grounded: number of further places where the aircraft is too slow to fly: on its launch, or landed.
     """
 
     time: Floats
@@ -43,17 +43,17 @@ class ReturnStarts:
     grounded: int = 0
 
     def __len__(self) -> int:
-        """How many there are."""
+        """Return the number of places."""
         return len(self.time)
 
     def at(self, chosen: NDArray[np.intp]) -> "ReturnStarts":
-        """Some of them."""
+        """Return the chosen places."""
         chosen_of = (self.time[chosen], self.rows[chosen], self.used[chosen])
         return ReturnStarts(*chosen_of, self.flown, self.low[chosen], self.grounded)
 
 
 def flown_starts(setup: FlightSetup, track: Track, every: float) -> ReturnStarts:
-    """Places of a track every so many seconds, up to where it returns to launch itself, while it flies.
+    """Sample a flown track at an interval in s, up to its own return to launch, while the aircraft flies.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -69,7 +69,7 @@ def flown_starts(setup: FlightSetup, track: Track, every: float) -> ReturnStarts
         return _no_starts(flown=True)
     time = track.time[known]
     wanted = np.arange(time[0], time[-1] + 1e-9, every)
-    # The nearest row; a pause in a log has none.
+    # Take the nearest row; in a pause of the log there is none.
     every_row = known[np.unique(np.searchsorted(time, wanted - 1e-9).clip(0, len(known) - 1))]
     near, slow = _by_the_ground(setup, track, every_row)
     rows, low = every_row[~slow], near[~slow]
@@ -85,7 +85,7 @@ def _no_starts(*, flown: bool) -> ReturnStarts:
 
 
 def _by_the_ground(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
-    """Of rows (n,): which are low over the ground in a flown take-off or landing, and which too slow to fly there."""
+    """Return which rows (n,) are low in a flown take-off or landing, and which are also too slow to fly."""
     ways, terrain = setup.ground_ways, setup.scenario.terrain
     on_way = by_the_ground(track, ways)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)
@@ -98,10 +98,10 @@ def _by_the_ground(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> 
 
 
 def _velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
-    """Velocities over the ground (n, 3) at rows; by the places around them where the track holds none."""
+    """Return velocities over the ground (n, 3) at rows; from nearby positions if the track has none."""
     velocity = track.velocity[rows].astype(np.float64)
     for k in np.flatnonzero(~np.isfinite(velocity).all(axis=1)):
-        near = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _OVER)
+        near = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)
         first, last = (near[0], near[-1]) if near.size else (rows[k], rows[k])
         lasts = float(track.time[last] - track.time[first])
         velocity[k] = (track.position[last] - track.position[first]) / lasts if lasts > 0.0 else 0.0
@@ -109,7 +109,7 @@ def _velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
 
 
 def planned_starts(setup: FlightSetup, every: float) -> ReturnStarts:
-    """Places of the planned path every so many seconds, up to where it returns to launch itself; nothing was used.
+    """Sample the planned path at an interval in s, up to its own return to launch; no energy is used yet.
 
     >>> from logs.recording.example_log import example_log
     >>> starts = planned_starts(example_log().setup, 1.0)
@@ -150,7 +150,10 @@ def planned_starts(setup: FlightSetup, every: float) -> ReturnStarts:
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:
-    """On each leg in the mean wind, m/s; the airspeed where the wind leaves none."""
+    """Return the ground speed on each leg in the mean wind, m/s.
+
+    The airspeed if the wind leaves no ground speed.
+    """
     route, found = setup.route, []
     courses = leg_courses(route.waypoints)
     for leg, speed in enumerate(route.airspeed.tolist()):

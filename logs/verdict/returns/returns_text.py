@@ -1,4 +1,4 @@
-"""Returns in words."""
+"""Describe returns in words."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from logs.verdict.returns.suggest_returns import Remedy
 from world.frames import to_geo
 from world.scenario import Scenario
 
-# What one return does, and what several do.
+# Outcome of one return, and of several.
 _ONE: dict[Kind, str] = {
     "ground": "hits the ground",
     "threat": "enters a missile's sphere",
@@ -31,7 +31,7 @@ _MANY: dict[Kind, str] = {
     "unsure": "are flown too differently by the point mass and in JSBSim to be judged",
     "low": "come lower than {limit:.0f} m above ground",
 }
-# What the way is called where returns from it come to this.
+# Name of the path segment from which returns have this outcome.
 _WAY: dict[Kind, str] = {
     "ground": "a return hits the ground",
     "threat": "a return enters a missile's sphere",
@@ -67,7 +67,7 @@ _OPEN: dict[Open, str] = {
 
 
 def way_text(kind: Kind) -> str:
-    """What the way is called where returns from it come to this.
+    """Return the name of the path segment from which returns have this outcome.
 
     >>> way_text("ground")
     'a return hits the ground'
@@ -76,14 +76,14 @@ def way_text(kind: Kind) -> str:
 
 
 def outcome_text(one: ReturnFlown, limit: float) -> str:
-    """What one return comes to.  limit: least height above ground that is asked for, m."""
+    """Return the outcome of one return.  limit: required least height above ground, m."""
     return "is safe" if one.safe else _ONE[one.kind].format(limit=limit)
 
 
 def measured_text(one: ReturnFlown, limit: float, scenario: Scenario) -> str:
-    """Where one return goes, what it comes to, and how near it comes to ground and spheres.
+    """Return the destination of one return, its outcome, and its distances from ground and spheres.
 
-    limit: least height above ground that is asked for, m.
+    limit: required least height above ground, m.
     """
     east, north, _ = one.clearance_at
     where = f"{east:.0f} m east, {north:.0f} m north"
@@ -100,14 +100,14 @@ def measured_text(one: ReturnFlown, limit: float, scenario: Scenario) -> str:
 
 
 def counts_text(returns: Returns) -> str:
-    """How many returns come to what, the worst first; "" where all are safe."""
+    """Return the number of returns per outcome, the worst first; "" if all are safe."""
     counted = {kind: returns.count(kind) for kind in KINDS if kind != "safe"}
     texts = {kind: (_ONE if count == 1 else _MANY)[kind].format(limit=returns.limit) for kind, count in counted.items()}
     return ", ".join(f"{count} {texts[kind]}" for kind, count in counted.items() if count)
 
 
 def headline(returns: Returns) -> str:
-    """All returns in a line.
+    """Return a one-line summary of all returns.
 
     >>> from logs.verdict.measures.route_requirements import Airspace
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True))
@@ -128,7 +128,7 @@ def _judged(returns: Returns) -> str:
     if wrong:
         safe = returns.count("safe")
         return f"of {total} returns {wrong}; {safe} {'is' if safe == 1 else 'are'} safe"
-    # Those that begin lower than that, as after a take-off, say nothing of the way home.
+    # Returns that begin below the limit, as after a take-off, say nothing about the path home.
     aloft = [one for one in returns.each if not one.floor < returns.limit] or returns.each
     lowest = min(aloft, key=lambda one: one.clearance)
     left = min((one.left for one in returns.each if not math.isnan(one.left)), default=math.nan)
@@ -138,7 +138,7 @@ def _judged(returns: Returns) -> str:
 
 
 def no_return_text(returns: Returns) -> str:
-    """From where on the battery no longer brings the aircraft back with its reserve, a line.
+    """Return a line on the place from which the battery no longer lasts for a return with reserve.
 
     >>> no_return_text(Returns((), 1.0, (), 60.0, None, 0.0, True))
     'point of no return: not judged, for the energy in the battery is not known'
@@ -153,17 +153,17 @@ def no_return_text(returns: Returns) -> str:
         case "arrives":
             return f"{name}: not judged, for no return arrives"
         case "at once":
-            told = f"{name}: before the start, for no return leaves {reserve}"
+            text = f"{name}: before the start, for no return leaves {reserve}"
         case "later":
-            told = f"{name}: {point.time:.0f} s; a return from later on does not leave {reserve}"
+            text = f"{name}: {point.time:.0f} s; a return from later on does not leave {reserve}"
         case "never":
-            told = f"{name}: none, for every return leaves {reserve} ({point.left:.0f} Wh at the least)"
+            text = f"{name}: none, for every return leaves {reserve} ({point.left:.0f} Wh at the least)"
     does = "does" if point.skipped == 1 else "do"
-    return told + (f"; {point.skipped} that {does} not arrive left out" if point.skipped else "")
+    return text + (f"; {point.skipped} that {does} not arrive left out" if point.skipped else "")
 
 
 def causes_text(causes: tuple[Cause, ...]) -> list[str]:
-    """What makes the aircraft return, and what does not, two lines.
+    """Return two lines: what makes the aircraft return, and what does not.
 
     >>> from flight.autopilots.arduplane.failsafes import failsafe_causes
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -184,13 +184,15 @@ def causes_text(causes: tuple[Cause, ...]) -> list[str]:
         for cause in causes:
             if not cause.returns and (cause.does in ("land", "autoland")) == counted:
                 others.setdefault(_DOES[cause.does], []).append(f"{cause.name}{stated(cause)}")
-        told = [f"{', '.join(names)}: {does}" for does, names in others.items()]
-        lines += [f"{heading}: {'; '.join(told)}"] if told else []
+        text = [f"{', '.join(names)}: {does}" for does, names in others.items()]
+        lines += [f"{heading}: {'; '.join(text)}"] if text else []
     return lines
 
 
 def landing_text(returns: Returns) -> list[str]:
-    """What RTL_AUTOLAND has a return do at its end, and what a landing sequence changes; none of another autopilot.
+    """Return lines on how RTL_AUTOLAND ends a return, and on the landing sequence.
+
+    Another autopilot has no such lines.
 
     >>> landing_text(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
     ['RTL_AUTOLAND 0: a return stays in its circle']
@@ -201,27 +203,27 @@ def landing_text(returns: Returns) -> list[str]:
     where = f"item{'s' if len(returns.landings) > 1 else ''} {', '.join(str(one.item) for one in returns.landings)}"
     match returns.autoland, bool(returns.landings):
         case 0, True:
-            told = f"{stays}; with DO_LAND_START in the mission ArduPlane does not arm so"
+            text = f"{stays}; with DO_LAND_START in the mission ArduPlane does not arm so"
         case ((1 | 2), False):
-            told = f"the mission has no DO_LAND_START: {stays}"
+            text = f"the mission has no DO_LAND_START: {stays}"
         case 1, True:
-            told = f"from its circle a return goes on to the landing sequence at {where}"
+            text = f"from its circle a return goes on to the landing sequence at {where}"
         case 2, True:
-            told = f"a return flies straight to the landing sequence at {where}"
+            text = f"a return flies straight to the landing sequence at {where}"
         case 3, _:
-            told = f"the landing sequence is for go-arounds only: {stays}"
+            text = f"the landing sequence is for go-arounds only: {stays}"
         case 4, _:
-            told = "a return goes by the mission's return path, where it has one"
+            text = "a return goes by the mission's return path, where it has one"
         case _:
-            told = stays
-    lines = [f"RTL_AUTOLAND {returns.autoland}: {told}"]
+            text = stays
+    lines = [f"RTL_AUTOLAND {returns.autoland}: {text}"]
     if returns.landings:
         lines.append("within the landing sequence a lost transmitter or station changes nothing")
     return lines
 
 
 def range_text(found: ReturnRange, returns: Returns, scenario: Scenario) -> str:
-    """A range of seconds: where its returns go, what they come to, and the worst of them."""
+    """Return the text of a time range: destination and outcome of its returns, and the worst of them."""
     one = found.worst
     when = f"{found.first:.0f} s" if found.count == 1 else f"{found.first:.0f} to {found.last:.0f} s"
     reason = f" ({one.target.reason})" if one.target.reason else ""
@@ -259,7 +261,7 @@ def _outcome(one: ReturnFlown, found: ReturnRange, returns: Returns, scenario: S
 
 
 def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
-    """What is suggested, and what its returns come to."""
+    """Return a suggestion and the outcome of the returns with it."""
     changed = [f"{name} {value:g}" for name, value in remedy.parameters.items()]
     if remedy.rally is not None:
         many = "rally point" if len(remedy.rally) == 1 else "rally points"
@@ -268,7 +270,7 @@ def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
 
 
 def rally_texts(rally: Sequence[ReturnPlace], scenario: Scenario) -> list[str]:
-    """Latitude, longitude and height over home of rally points, as a ground station takes them."""
+    """Return latitude, longitude and height above home of rally points, as a ground station takes them."""
     out = []
     for point in rally:
         lat, lon = (float(value) for value in to_geo(scenario.origin, point.east, point.north))

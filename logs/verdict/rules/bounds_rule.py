@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 def bounds_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding: the least distance inside the area's box, its floor and its ceiling."""
+    """Judge the least distance inside the area's box, its floor and its ceiling: one finding."""
     scenario = requirements.setup.scenario
     if scenario.external:
         reason = "the mission came without a scenario, so there is no area to stay in"
@@ -55,7 +55,7 @@ def bounds_findings(
 
 
 def _inside_box(requirements: RouteRequirements, points: Floats) -> tuple[float, str, int]:
-    """Least distance inside the box (negative: outside), the side that is meant, and the row."""
+    """Return the least distance inside the box (negative: outside), the nearest side, and the row."""
     scenario = requirements.setup.scenario
     (west, east), (south, north) = scenario.bounds
     inside = {

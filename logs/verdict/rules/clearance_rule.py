@@ -38,7 +38,7 @@ def clearance_findings(
     low, _ = path_clearance(ground.heights, ground.to_pixel.record, points)
     out = []
     for leg in range(requirements.legs):
-        asked = _Asked(limit, near.get(leg, ()))
+        asked = _Requirement(limit, near.get(leg, ()))
         of_leg = np.flatnonzero(legs == leg)
         planned, least = asked.worst(low[of_leg], points[of_leg])
         if geometric:
@@ -50,7 +50,10 @@ def clearance_findings(
 
 
 def _below_home(requirements: RouteRequirements) -> list[Finding]:
-    """Leave the lowest leg open if it is below home: the ground is at home's height there, as far as anybody knows."""
+    """Report a lowest point below home as undecided.
+
+    Without terrain the ground is assumed at home's altitude.
+    """
     home = requirements.setup.mission.home
     if home is None:
         return []
@@ -65,7 +68,9 @@ def _below_home(requirements: RouteRequirements) -> list[Finding]:
 
 
 def _home_above_ground(requirements: RouteRequirements, ground: Terrain, legs: list[Finding]) -> list[Finding]:
-    """Leave a route over home open if it is too low once home is on the ground, where an autopilot takes it.
+    """Report a route over home as undecided if it is too low once home is on the ground.
+
+    An autopilot sets home on the ground when it is armed there.
 
     legs: the findings of the legs.
     """
@@ -75,7 +80,7 @@ def _home_above_ground(requirements: RouteRequirements, ground: Terrain, legs: l
         return []
     east, north = to_map(setup.scenario.origin, home.lat_deg, home.lon_deg)
     above = home.alt - float(ground.height(float(east), float(north)))
-    # NaN, where the terrain does not reach, says nothing.
+    # NaN, where the terrain does not reach, decides nothing.
     if not above > HOME_ERROR_M or not any(one.margin is not None and 0.0 <= one.margin < above for one in legs):
         return []
     least = min(one.margin + (one.limit or 0.0) for one in legs if one.margin is not None) - above
@@ -85,17 +90,17 @@ def _home_above_ground(requirements: RouteRequirements, ground: Terrain, legs: l
     return [make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
 
 
-class _Asked(NamedTuple):
-    """What height above ground a leg needs: less near a take-off or a landing that is flown.
+class _Requirement(NamedTuple):
+    """Required height above ground on a leg: less near a flown take-off or landing.
 
-    limit: m, elsewhere.  fields: east and north of homes and landing points that it is near, m.
+    limit: m, elsewhere.  fields: east and north of nearby homes and landing points, m.
     """
 
     limit: float
     fields: tuple[tuple[float, float], ...]
 
     def of(self, points: Floats) -> Floats:
-        """At places (n, 3), (n,) m."""
+        """Return the requirement at places (n, 3), (n,) m."""
         asked = np.full(len(points), self.limit)
         for east, north in self.fields:
             away = np.hypot(points[:, 0] - east, points[:, 1] - north)
@@ -103,9 +108,9 @@ class _Asked(NamedTuple):
         return asked
 
     def worst(self, low: Floats, points: Floats) -> tuple[float, float]:
-        """The height above ground, of some (n,) from places (n, 3) on, that is nearest to what is needed, and that, m.
+        """Return the height above ground with the least margin, and its requirement, m.
 
-        NaN for the height where one is not known, and where there is none.
+        low: heights (n,) at places (n, 3).  NaN for the height if one is unknown, or if there are none.
         """
         if not low.size or np.isnan(low).any():
             return math.nan, self.limit
@@ -113,7 +118,7 @@ class _Asked(NamedTuple):
         return float(low[k]), asked
 
     def least(self, low: Floats, points: Floats) -> tuple[int, float]:
-        """Which of some heights (n,), of which one is known, is nearest to what is needed, and that, m."""
+        """Return the index of the known height (n,) with the least margin, and the requirement there, m."""
         if not self.fields:
             return int(np.nanargmin(low)), self.limit
         asked = self.of(points)
@@ -122,10 +127,10 @@ class _Asked(NamedTuple):
 
 
 def _near_ground(requirements: RouteRequirements) -> dict[int, tuple[tuple[float, float], ...]]:
-    """Homes and landing points, m, by the legs that lead away from a take-off that is flown, and to a landing.
+    """Return homes and landing points, m, by the legs after a flown take-off and before a flown landing.
 
-    To a landing lead those from DO_LAND_START on, or else the last two; of them the final, and those from the last
-    waypoint on that is as high above ground as the limit asks.
+    The legs before a landing are those from DO_LAND_START on, or else the last two; of them the final, and the legs
+    from the last waypoint that meets the limit on height above ground.
     """
     setup, ground = requirements.setup, requirements.ground
     ways = setup.ground_ways if ground is None else ground.ways
@@ -140,13 +145,16 @@ def _near_ground(requirements: RouteRequirements) -> dict[int, tuple[tuple[float
             after = np.flatnonzero(setup.route.items > begun)
             first = max(0, int(after[0]) - 1) if after.size else first
         point = (float(ways.approach.point[0]), float(ways.approach.point[1]))
-        for leg in range(max(first, _last_high(requirements, ways.approach.leg)), ways.approach.leg + 1):
+        for leg in range(max(first, _last_clear_waypoint(requirements, ways.approach.leg)), ways.approach.leg + 1):
             near[leg] = (*near.get(leg, ()), point)
     return near
 
 
-def _last_high(requirements: RouteRequirements, final: int) -> int:
-    """The last waypoint up to where a final begins that is as high above ground as the limit asks; that for none."""
+def _last_clear_waypoint(requirements: RouteRequirements, final: int) -> int:
+    """Return the last waypoint up to the final's start that meets the limit above ground.
+
+    The final's start if none does.
+    """
     terrain, waypoints = requirements.setup.scenario.terrain, requirements.setup.route.waypoints[: final + 1]
     if terrain is None:
         return final
@@ -156,12 +164,12 @@ def _last_high(requirements: RouteRequirements, final: int) -> int:
 
 
 def _source(requirements: RouteRequirements, limit: float) -> str:
-    """Whose a limit (m) is."""
+    """Return the source of a limit (m)."""
     return "near the field" if limit < requirements.limits.min_clearance else requirements.limits_source
 
 
-def _less_error(clearance: float, limit: float, error: float | None) -> str:
-    """A clearance (m) less the terrain's stated error, in words; "" where none is stated."""
+def _terrain_error_text(clearance: float, limit: float, error: float | None) -> str:
+    """Return a clearance (m) less the terrain's stated error, in words; "" if none is stated."""
     if error is None or math.isnan(clearance):
         return ""
     short = f", less than the {limit:.0f} m required" if limit - CLEARANCE_TOLERANCE > clearance - error else ""
@@ -180,7 +188,7 @@ def _planned_clearance(
         "clearance",
         requirements.leg(leg),
         ok=None if math.isnan(planned) else planned >= limit - CLEARANCE_TOLERANCE,
-        reason=reason + _less_error(planned, limit, error),
+        reason=reason + _terrain_error_text(planned, limit, error),
         planned=planned,
         limit=limit,
         source=_source(requirements, limit),
@@ -196,13 +204,13 @@ def _flown_clearance(
     aligned: AlignedTrack | None,
     leg: int,
     planned: float,
-    asked: _Asked,
+    asked: _Requirement,
     *,
     planned_short: bool,
 ) -> Finding:
     least, ok, reason, limit = math.nan, None, "the leg was not flown", asked.limit
     if aligned is not None and aligned.flew(leg):
-        # The first leg has what came before it, the last what came after.
+        # The first leg includes what came before it, the last leg what came after.
         first = 0 if leg == 0 else int(aligned.rows[leg])
         last = len(aligned.track) - 1 if leg + 1 == requirements.legs else int(aligned.rows[leg + 1])
         span = aligned.low[first:last]
@@ -221,7 +229,7 @@ def _flown_clearance(
         if ok is False:
             reason += f"; {limit:.0f} m are required"
         ground = requirements.setup.scenario.terrain
-        reason += _less_error(least, limit, None if ground is None else ground.vertical_error)
+        reason += _terrain_error_text(least, limit, None if ground is None else ground.vertical_error)
     if planned_short:
         reason += f"; the planned path comes down to {planned:.1f} m"
     return make_finding(
@@ -241,7 +249,7 @@ def _flown_clearance(
 
 
 def _when_and_where(aligned: AlignedTrack, k: int, fraction: float) -> str:
-    """When and where the aircraft was at this fraction of a segment, in words."""
+    """Return when and where the aircraft was at this fraction of a segment, in words."""
     time = aligned.track.time
     return f"at {time[k] + fraction * (time[k + 1] - time[k]):.1f} s, {aligned.where(k, fraction)}"
 

@@ -1,4 +1,4 @@
-"""The completion rule: planned feasibly, flown to the last waypoint, recorded in full and without contradiction."""
+"""The completion rule: planned feasibly, flown to the last waypoint, recorded whole and consistently."""
 
 from collections.abc import Iterable, Sequence
 
@@ -19,7 +19,7 @@ from logs.verdict.wording import place_text_within
 def completion_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
 ) -> list[Finding]:
-    """One finding: planned feasibly, flown to the last waypoint, recorded whole and without contradiction."""
+    """Judge completion: planned feasibly, flown to the last waypoint, recorded whole and consistently."""
     plan = requirements.setup.plan
     faults = []
     if plan is not None and not plan.feasible:
@@ -60,7 +60,7 @@ def completion_findings(
 
 
 def _ending_place(requirements: RouteRequirements, aligned: AlignedTrack | None) -> str:
-    """On which leg and at which place a flight ended before its last waypoint, in words."""
+    """Return on which leg and at which place a flight ended before its last waypoint, in words."""
     if aligned is None or aligned.passed[-1]:
         return ""
     row = len(aligned.track) - 1
@@ -68,13 +68,13 @@ def _ending_place(requirements: RouteRequirements, aligned: AlignedTrack | None)
 
 
 def _record_faults(aligned: AlignedTrack) -> list[Message]:
-    """Pauses in the record, and places where position and velocity contradict each other."""
+    """Return faults for pauses in the record, and for contradictions between position and velocity."""
     track, out = aligned.track, []
     step = np.diff(track.time)
     gap = int(np.argmax(step))
     if step[gap] > max(LONGEST_GAP, GAP_STEPS * float(np.median(step))):
         out.append(message(f"rows are missing from {track.time[gap]:.1f} s to {track.time[gap + 1]:.1f} s"))
-    # Where rows are missing the mean velocity says nothing.
+    # Across missing rows the mean velocity is meaningless.
     short = step <= LONGEST_GAP
     moved = np.diff(track.position, axis=0)[short] / step[short, None]
     mean = 0.5 * (track.velocity[1:].astype(np.float64) + track.velocity[:-1])[short]
@@ -85,12 +85,12 @@ def _record_faults(aligned: AlignedTrack) -> list[Message]:
     return out
 
 
-# What the mode is called that flies a return to launch.
-_RETURN = "RTL"
+# Name of the mode that flies a return to launch.
+_RETURN_MODE = "RTL"
 
 
 def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_complete: bool) -> Finding:
-    """How much of the mission the log shows; a log that ends on the way says nothing of what came after."""
+    """Judge how much of the mission the log shows; a log that ends en route says nothing about the rest."""
     last_leg, faults, unknown, known = setup.route.legs - 1, [], [], []
     done = {leg for one in flown for leg in range(one.first, one.last - one.partial)}
     every = len(set(setup.route.leg_numbers.tolist()))
@@ -101,18 +101,18 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
     if not flown:
         stretches = () if setup.source is None else setup.source.stretches
         why = "none of the mission's legs was flown" if stretches else "no stretch of it followed the mission"
-        # It may have flown legs that the log does not hold.
+        # The flight may have included legs that the log does not hold.
         if missing is not None and stretches:
-            unknown.append(f"none of the legs that the log holds was flown: {_lacking(missing)}")
+            unknown.append(f"none of the legs that the log holds was flown: {_absent_text(missing)}")
         else:
             faults.append(message(why))
     elif last_leg in done and missing is not None and missing.beyond:
         unknown.append(
-            f"{finished} of {every} legs flown that the log holds, the last of them to its end: {_lacking(missing)}"
+            f"{finished} of {every} legs flown that the log holds, the last of them to its end: {_absent_text(missing)}"
         )
     elif last_leg in done:
         counted = f"{finished} of {every} legs flown, the last of them to its end"
-        absent, doubts = _not_flown(setup, flown, done)
+        absent, doubts = _unflown_legs(setup, flown, done)
         faults += (
             [message(f"{_legs_text(setup, absent)} not flown along the mission", f": {counted}")] if absent else []
         )
@@ -121,13 +121,17 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
     else:
         last = flown[-1]
         what = f"{finished} of {every} legs flown"
-        if _returns(setup, last):
+        if _ends_in_return(setup, last):
             known.append(f"{what}, and the return that the mission ends with begun at {last.stretch.end:.1f} s")
         elif last.stretch.ended == "log":
-            unknown.append(f"{stretch_end_text(last.stretch)}, on the way to {_named(setup, last)}: {what}")
+            unknown.append(
+                f"{stretch_end_text(last.stretch)}, on the way to {_next_waypoint_text(setup, last)}: {what}"
+            )
         else:
             faults.append(
-                message(f"{stretch_end_text(last.stretch)}, on the way to {_named(setup, last)}", f": {what}")
+                message(
+                    f"{stretch_end_text(last.stretch)}, on the way to {_next_waypoint_text(setup, last)}", f": {what}"
+                )
             )
     unknown += [f"the way to item {stop.item} is not judged: it is not laid out" for stop in setup.route.unjoined]
     known += _gaps_text(flown)
@@ -148,8 +152,8 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
     )
 
 
-def _not_flown(setup: FlightSetup, flown: Sequence[FlownLegs], done: set[int]) -> tuple[list[int], list[str]]:
-    """Legs that no stretch flew, and what the log does not show of others, in words."""
+def _unflown_legs(setup: FlightSetup, flown: Sequence[FlownLegs], done: set[int]) -> tuple[list[int], list[str]]:
+    """Return legs that no stretch flew, and what the log does not show of others, in words."""
     absent = [leg for leg in range(setup.route.legs) if leg not in done]
     unseen = setup.source is not None and setup.source.begins_in_flight
     before = [leg for leg in absent if unseen and leg < flown[0].first]
@@ -187,24 +191,24 @@ def _legs_text(setup: FlightSetup, legs: Iterable[int]) -> str:
     return f"{several} are"
 
 
-def _lacking(missing: MissingItems) -> str:
+def _absent_text(missing: MissingItems) -> str:
     return f"{len(missing.numbers)} {'item' if len(missing.numbers) == 1 else 'items'} of the mission not in the log"
 
 
-def _returns(setup: FlightSetup, legs: FlownLegs) -> bool:
-    """Whether a stretch ended with the return to launch that the mission has next: autopilots have a mode for that."""
-    item = int(setup.route.items[_ahead(setup, legs)])
+def _ends_in_return(setup: FlightSetup, legs: FlownLegs) -> bool:
+    """Return True if a stretch ended in the return mode and the mission's next item is that return."""
+    item = int(setup.route.items[_next_waypoint(setup, legs)])
     commands = {one.seq: one.command for one in setup.mission.items}
-    return legs.stretch.next_mode == _RETURN and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH
+    return legs.stretch.next_mode == _RETURN_MODE and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH
 
 
-def _ahead(setup: FlightSetup, legs: FlownLegs) -> int:
-    """The waypoint that a stretch was on the way to when it ended."""
+def _next_waypoint(setup: FlightSetup, legs: FlownLegs) -> int:
+    """Return the waypoint to which a stretch was flying when it ended."""
     return min(setup.route.legs, legs.last if legs.partial else legs.last + 1)
 
 
-def _named(setup: FlightSetup, legs: FlownLegs) -> str:
-    ahead = _ahead(setup, legs)
+def _next_waypoint_text(setup: FlightSetup, legs: FlownLegs) -> str:
+    ahead = _next_waypoint(setup, legs)
     item = int(setup.route.items[ahead])
     return f"waypoint {setup.route.stops[ahead]}" + (f" (item {item})" if item >= 0 else "")
 

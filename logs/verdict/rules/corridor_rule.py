@@ -15,20 +15,20 @@ from logs.verdict.tolerances import ON_COURSE, ROUNDING
 def corridor_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge how far from the legs the flight of each leg got; ``geometric``: how far its planned turns lead.
+    """Judge the distance of each leg's flight from the legs; ``geometric``: that of its planned turns.
 
-    In a survey, and on the legs to it and from it, only a corridor that somebody stated counts: how far from its lines
-    a flight was the survey rule tells, and the turns onto the first and off the last are the autopilot's own.
+    In a survey, and on the legs to it and from it, only an explicitly stated corridor applies: the survey rule judges
+    the distance from its lines, and the turns onto the first line and off the last are the autopilot's own.
     """
     stated = requirements.setup.scenario.limits.corridor_m is not None
     return [
-        _corridor(requirements, aligned, leg, geometric)
+        _leg_finding(requirements, aligned, leg, geometric)
         for leg in range(requirements.legs)
         if stated or not any(one.has_leg(leg) for one in requirements.surveys)
     ]
 
 
-def _corridor(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
+def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
     limit, source = corridor_limit(requirements, leg)
     planned, flown, ok = float(corner_depths(requirements)[leg : leg + 2].max()), math.nan, None
     faults, facts = [], []
@@ -40,7 +40,7 @@ def _corridor(requirements: RouteRequirements, aligned: AlignedTrack | None, leg
     elif aligned is None or not aligned.flew(leg):
         facts.append("the leg was not flown")
     else:
-        rows = _after_take_off(requirements, aligned, leg, limit)
+        rows = _rows_after_takeoff(requirements, aligned, leg, limit)
         near = slice(max(0, leg - 1), min(requirements.legs, leg + 2) + 1)
         flown, row = farthest_from_legs(aligned.track.position[rows], requirements.points[near])
         ok = flown <= limit
@@ -65,10 +65,11 @@ def _corridor(requirements: RouteRequirements, aligned: AlignedTrack | None, leg
     )
 
 
-def _after_take_off(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, limit: float) -> slice:
-    """A leg's rows; of one that follows a take-off, from where the aircraft first flies along it within the limit (m).
+def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, limit: float) -> slice:
+    """Return a leg's rows; after a take-off, from where the aircraft first flies along it.
 
-    A take-off ends on the course of its launch, wherever the leg leads from there.
+    Along it means within the limit (m) of the leg.  A take-off ends on its launch course, whatever the course of the
+    leg from there.
     """
     rows, ground = aligned.leg_rows(leg), requirements.ground
     if ground is None or ground.ways.take_off is None or ground.ways.take_off.waypoint != leg:

@@ -1,4 +1,4 @@
-"""The energy rule: what the flight takes from the battery or the tank, predicted and flown, against what it may."""
+"""The energy rule: energy from battery or tank, predicted and flown, against the usable energy."""
 
 import math
 
@@ -18,10 +18,10 @@ from logs.verdict.tolerances import RESERVE, UNDECIDED
 def energy_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding: the energy used against the battery less its reserve; a jump without end needs more than any.
+    """Judge the energy used against the battery less its reserve.
 
-    A battery that was guessed is not judged, and energy that is not surely within the limit is left open where the
-    aircraft's power is not known for certain; an imported log has it measured.
+    An endless jump needs more than any battery.  A guessed battery is not judged, and energy that is not certainly
+    within the limit is undecided if the aircraft's power is uncertain; an imported log has it measured.
     """
     setup = requirements.setup
     usable = (1.0 - RESERVE) * setup.battery
@@ -30,7 +30,7 @@ def energy_findings(
     guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     used, current = predicted, peak
     if not geometric:
-        # Of a flight that took off and landed that counts, too.
+        # The energy of a flown take-off and landing is included.
         track = None if aligned is None else aligned.track
         if requirements.ground is not None:
             track = requirements.ground.track
@@ -74,13 +74,13 @@ def energy_findings(
 
 
 def _never_ends(requirements: RouteRequirements, usable: float) -> Message:
-    """That a jump without end is flown until nothing is left, and how many of its rounds the usable energy lasts."""
+    """Report that an endless jump is flown until the energy is used up, and how many rounds that lasts."""
     route = requirements.setup.route
     last = len(route.items) - 1
     begin = last
     while begin > 0 and route.items[begin] == route.items[last]:
         begin -= 1
-    # Where the round that ends the route began: at the item that it ends at.
+    # Find where the round that ends the route began: at the item where the route ends.
     while begin > 0 and route.items[begin] != route.items[last]:
         begin -= 1
     one = sum(leg_energies(requirements)[0][begin:]) if route.items[begin] == route.items[last] else math.nan
@@ -89,7 +89,7 @@ def _never_ends(requirements: RouteRequirements, usable: float) -> Message:
 
 
 def _used_text(requirements: RouteRequirements, used: float, current: float) -> str:
-    """Energy used (Wh) and the peak current (A), or what an aircraft without a battery has instead."""
+    """Return energy used (Wh) and the peak current (A), or the fuel used by an aircraft without a battery."""
     capacity = requirements.setup.battery
     if requirements.setup.envelope.power_level.size and not requirements.setup.envelope.volts:
         share = used / capacity
@@ -101,10 +101,10 @@ def _used_text(requirements: RouteRequirements, used: float, current: float) -> 
 
 
 def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
-    """Energy (Wh) and peak current (A) of steady flight along a route, NaN where the envelope knows no power.
+    """Return energy (Wh) and peak current (A) of steady flight along a route.
 
-    Each leg at its commanded airspeed, its slope over the ground in the mean wind, and its middle height; what turns
-    and gusts take beside that is a few per cent.
+    NaN if the envelope has no power.  Each leg at its commanded airspeed, its slope over the ground in the mean wind,
+    and its mean altitude; turns and gusts take a few per cent more.
     """
     volts = requirements.setup.envelope.volts
     energies, most = leg_energies(requirements)
@@ -112,7 +112,7 @@ def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
 
 
 def needed_energy(setup: FlightSetup) -> float:
-    """Energy (Wh) of steady flight along a setup's route, NaN where the envelope knows no power.
+    """Return the energy (Wh) of steady flight along a setup's route, NaN if the envelope has no power.
 
     >>> from logs.recording.example_log import example_log
     >>> needed_energy(example_log().setup)
@@ -122,7 +122,10 @@ def needed_energy(setup: FlightSetup) -> float:
 
 
 def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
-    """Energy (Wh) of steady flight on each leg, and the highest power (W); NaN where the envelope knows none."""
+    """Return energy (Wh) of steady flight on each leg, and the highest power (W).
+
+    NaN if the envelope has no power.
+    """
     envelope, route = requirements.setup.envelope, requirements.route
     if not np.isfinite(requirements.ground_speed).all():
         return [math.nan] * requirements.legs, math.nan
@@ -142,7 +145,10 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
 
 
 def air_angle(requirements: RouteRequirements, leg: int, speed: float, up: float) -> float:
-    """Path angle to the air of a leg's slope over the ground in the mean wind at a height (m), rad."""
+    """Return the path angle through the air, rad, for a leg's slope over ground.
+
+    In the mean wind at an altitude (m).
+    """
     tail, cross = requirements.setup.scenario.wind.along(float(requirements.courses[leg]), up)
     rise, angle = math.tan(float(requirements.slopes[leg])), 0.0
     for _ in range(4):

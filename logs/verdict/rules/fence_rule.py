@@ -1,7 +1,7 @@
-"""The fence rule: how far planned path and flight go into zones to keep out of, or out of zones to stay in.
+"""The fence rule: how far planned path and flight go into exclusion zones, or out of inclusion zones.
 
-The zones are the scenario's and the mission's own fence.  The path's line is judged, its arcs, circles and jumps
-included; that the corridor about it reaches further is reported beside it.
+The zones are the scenario's and the mission's own fence.  The path's line is judged, including its arcs, loiters and
+jumps; a corridor that reaches into a zone is only reported.
 """
 
 import math
@@ -28,7 +28,7 @@ _METHOD = "every point of each piece, arc and row"
 
 
 def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
-    """Make what tells whether a setup's planned path goes into an exclusion, or out of an inclusion, beyond rounding.
+    """Return a test for whether a setup's planned path violates a zone beyond rounding.
 
     >>> from logs.recording.example_log import example_log
     >>> from world.airspace.zones import Cylinder
@@ -47,7 +47,7 @@ def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
 def fence_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each zone that plan or flight violates, or say that there is none; nothing where there are no zones."""
+    """Judge each zone that plan or flight violates, or report that none is; empty without zones."""
     airspace = requirements.airspace
     out = []
     if airspace.fault:
@@ -64,26 +64,27 @@ def fence_findings(
     sides = [planned] if flown is None else [planned, flown]
     met = np.any([(side["depth"] > 0.0) | side["unknown"] for side in sides], axis=0)
     touched = [
-        _touched(requirements, z, planned[z], None if flown is None else flown[z]) for z in np.flatnonzero(met).tolist()
+        _zone_finding(requirements, z, planned[z], None if flown is None else flown[z])
+        for z in np.flatnonzero(met).tolist()
     ]
     if not any(item.ok is False for item in touched):
-        touched.insert(0, _kept(requirements, planned, flown))
+        touched.insert(0, _compliance_finding(requirements, planned, flown))
     return out + touched
 
 
 def _violated_zones(requirements: RouteRequirements, first: int, last: int) -> list[Finding]:
-    """Each zone that the planned path violates or touches on some legs, with nothing said of the others."""
+    """Return findings on zones that the planned path violates or touches on some legs, and on no others."""
     airspace, path = requirements.airspace, requirements.path
     begin, end = np.searchsorted(path.legs, [first, last + 1]).tolist()
     numbers = airspace.about(path.points[begin : end + 1])
     records = ZoneRecords(airspace.records.zones[numbers], airspace.records.edges)
     planned = path_zones(planned_moves(requirements, first, last), records, requirements.setup.scenario.terrain)
     met = np.flatnonzero((planned["depth"] > 0.0) | planned["unknown"])
-    return [_touched(requirements, int(numbers[k]), planned[k], None) for k in met.tolist()]
+    return [_zone_finding(requirements, int(numbers[k]), planned[k], None) for k in met.tolist()]
 
 
-def _kept(requirements: RouteRequirements, planned: Records, flown: Records | None) -> Finding:
-    """Every zone that could be judged was kept to."""
+def _compliance_finding(requirements: RouteRequirements, planned: Records, flown: Records | None) -> Finding:
+    """Report that no zone that could be judged is violated."""
     airspace, corridor = requirements.airspace, requirements.setup.corridor
     count, visits = len(airspace.zones), planned if flown is None else flown
     nearest = int(visits["depth"].argmax())
@@ -113,7 +114,7 @@ def _kept(requirements: RouteRequirements, planned: Records, flown: Records | No
     )
 
 
-def _touched(requirements: RouteRequirements, z: int, planned: Record, flown: Record | None) -> Finding:
+def _zone_finding(requirements: RouteRequirements, z: int, planned: Record, flown: Record | None) -> Finding:
     airspace = requirements.airspace
     zone = airspace.zones[z]
     visit = planned if flown is None else flown
@@ -157,7 +158,7 @@ def _touched(requirements: RouteRequirements, z: int, planned: Record, flown: Re
 
 
 def _facts(visit: Record) -> list[Fact]:
-    """When and where a path goes wrong and is right again, in numbers."""
+    """Return when and where a path violates a zone and complies again, in numbers."""
     facts = [Fact("time beyond", visit.beyond, "s"), Fact("entries", float(visit.entries), "1")]
     for event in ("entry", "exit"):
         for what, unit in (("time", "s"), ("east", "m"), ("north", "m"), ("up", "m"), ("leg", "1")):
@@ -166,14 +167,17 @@ def _facts(visit: Record) -> list[Fact]:
 
 
 def _source(requirements: RouteRequirements, z: int) -> str:
-    """Whose a zone is: zones of a mission without a scenario are those that were named beside it."""
+    """Return the source of a zone.
+
+    For a mission without a scenario, "fence" is a zone given with the command.
+    """
     if z >= requirements.airspace.of_scenario:
         return "mission"
     return "fence" if requirements.setup.scenario.external else "scenario"
 
 
 def _where(requirements: RouteRequirements, visit: Record, event: str) -> str:
-    """When and where a path was at an event of a visit, in words."""
+    """Return when and where a path was at an event of a visit, in words."""
     leg = place_text(requirements.leg(int(visit[f"{event}_leg"])))
     time, east, north, up = (visit[f"{event}_{name}"] for name in ("time", "east", "north", "up"))
     return f"{time:.1f} s, east {east:.0f} m, north {north:.0f} m, {up:.0f} m AMSL ({leg})"

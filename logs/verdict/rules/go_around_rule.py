@@ -1,11 +1,11 @@
-"""The go-around rule: where a landing by ArduPlane's law leads that is aborted.
+"""The go-around rule: the path of an aborted landing by ArduPlane's control law.
 
-A go-around is no item of the mission: it comes when somebody commands it, anywhere on the glide.  So it is flown from
-several places of the glide that the autopilot lays out, by ArduPlane's law on a point mass
-(`flight.autopilots.arduplane.swift_go_around`), back to the last place before the glide, and what it meets is judged as
-flown.  One that never gets there fails, and one whose way is not known in full is left open.  It climbs on the landing
-course to a height over home, whatever the height of the field, and only then turns: from a field that lies higher than
-home it may turn into a hill at once.
+A go-around is no item of the mission: it can be commanded anywhere on the glide.  So it is simulated from several
+places of the glide that the autopilot lays out, by ArduPlane's law on a point mass
+(`flight.autopilots.arduplane.swift_go_around`), back to the last place before the glide, and judged as flown.  A
+go-around that never gets there fails, and one whose path is not fully known is undecided.  It climbs on the landing
+course to a height above home, whatever the altitude of the field, and only then turns: from a field higher than home it
+may turn into a hill at once.
 """
 
 import math
@@ -37,24 +37,28 @@ from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
-# Heights over home that a go-around is tried with, m.
-_HEIGHT_STEP, _HIGHEST = 5.0, 1000.0
-# Places of a glide that it is aborted at: so far apart (m), and this many at the most.
-_APART, _MAX_PLACES = 50.0, 12
-_NONE_DO = "no height would do"
-# Pitch of the climb where the mission has no take-off, rad (`Plane::do_land`, ArduPlane/commands_logic.cpp).
-_PITCH = math.radians(10.0)
+# Step of the heights above home that are tried, m.
+_HEIGHT_STEP_M = 5.0
+# Greatest height above home that is tried, m.
+_MAX_HEIGHT_M = 1000.0
+# Distance between the places on a glide where it is aborted, m.
+_ABORT_SPACING_M = 50.0
+# Largest number of such places.
+_MAX_ABORT_PLACES = 12
+_NO_HEIGHT_TEXT = "no height would do"
+# Pitch of the climb if the mission has no take-off, rad (`Plane::do_land`, ArduPlane/commands_logic.cpp).
+_CLIMB_PITCH_RAD = math.radians(10.0)
 
 
 @dataclass(frozen=True, slots=True)
 class _Landing:
-    """A landing that may be aborted.
+    """Landing that may be aborted.
 
-    at: its waypoint.  glide: to the point (3,) m, its height that of the mission; ground: m AMSL, under the point.
-    course: rad.  run: of the last leg, m.  high: at which the glide begins, m AMSL.  airspeed: on it, true, m/s.
-    pitch: of the climb, rad.  height: that it goes to over home, m; home: m AMSL.
-    landings: the landing sequences, of which one is flown to after it, or else the place before.
-    item: of the landing.  open: why its go-around is not known, "" where it is.
+    at: its waypoint.  glide: to the point (3,) m, at the mission's altitude; ground: m AMSL, under the point.
+    course: rad.  run: of the last leg, m.  high: altitude where the glide begins, m AMSL.  airspeed: on it, true, m/s.
+    pitch: of the climb, rad.  height: of the climb's end above home, m; home: m AMSL.
+    landings: the landing sequences to one of which the go-around flies, or else the place before.
+    item: of the landing.  open: why its go-around is unknown, "" if it is known.
     """
 
     at: int
@@ -73,7 +77,7 @@ class _Landing:
     open: str
 
     def place(self, before: float) -> tuple[float, float, float]:
-        """East, north and up of the glide so far before the landing point, m."""
+        """Return east, north and up of the glide at a distance before the landing point, m."""
         low = float(self.point[2])
         up = low + self.glide.flare_height + self.glide.slope * (before - self.glide.flare_distance)
         east = float(self.point[0]) - before * math.sin(self.course)
@@ -82,17 +86,17 @@ class _Landing:
 
 
 class _Aborted(NamedTuple):
-    """A landing that was aborted.
+    """Aborted landing.
 
     before: where, m before the landing point.  over: height above ground there, m.
-    at_once: whether it is as high there as its climb goes.
-    room: height above ground where it is nearest to what is asked of it, once the climb is over, or the least of all of
-        it where it meets the ground; inf where none is known, m.  needed: asked there, m.
-    climb: least height above ground of its climb beyond the landing point, m; inf for none.
-    after: s from the abort to where it meets the ground, NaN where it does not.
+    at_once: True if it is already as high as its climb goes.
+    room: height above ground at the place with the least margin after the climb, or the least height anywhere if it
+        hits the ground; inf if unknown, m.  needed: required height there, m.
+    climb: least height above ground in its climb beyond the landing point, m; inf without one.
+    after: s from the abort to ground impact, NaN without one.
     entered: the sphere or zone that it enters, "" for none.
-    lost: whether it does not get back to the line-up.
-    open: what of it is not known, "" for nothing.
+    lost: True if it does not get back to the line-up.
+    open: the unknown part, "" for none.
     """
 
     before: float
@@ -108,21 +112,21 @@ class _Aborted(NamedTuple):
 
     @property
     def is_free(self) -> bool:
-        """Whether nothing that is known of it is wrong."""
+        """True if no known part of it is wrong."""
         return math.isnan(self.after) and not self.entered and not self.lost and self.room >= self.needed
 
     @property
     def badness(self) -> tuple[bool, bool, bool, float]:
-        """By what they are ordered, the worst last."""
+        """Sort key, the worst last."""
         return not math.isnan(self.after), bool(self.entered), self.lost, self.needed - self.room
 
 
 def go_around_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding of a mission that lands and has a home: a warning where a go-around comes near to the ground.
+    """Judge the go-around of a mission that lands and has a home; warn if it is too low.
 
-    Where the scenario requires that it may be aborted, it fails there, and is left open where it is not judged.
+    If the scenario requires that a landing may be aborted, a low go-around fails, and an unjudged one is undecided.
     """
     requirements = requirements if requirements.ground is None else requirements.ground.whole
     setup = requirements.setup
@@ -143,7 +147,7 @@ def go_around_findings(
 
 
 def _landing(requirements: RouteRequirements, ground: Terrain, at: int, item: MissionItem) -> _Landing | None:
-    """The landing at a waypoint; None where its glide or its go-around is not known."""
+    """Return the landing at a waypoint, or None if its glide or its go-around is not known."""
     setup, leg = requirements.setup, at - 1
     begin, end = requirements.points[leg], requirements.points[at]
     run, course = float(requirements.runs[leg]), float(requirements.courses[leg])
@@ -167,17 +171,17 @@ def _landing(requirements: RouteRequirements, ground: Terrain, at: int, item: Mi
         run=run,
         high=float(begin[2]),
         airspeed=setup.autopilot.landing_airspeed(setup.airspeed, wind, low),
-        pitch=_PITCH if takeoff is None else climb_pitch(takeoff),
+        pitch=_CLIMB_PITCH_RAD if takeoff is None else climb_pitch(takeoff),
         home=home,
         height=height,
         landings=landings,
         item=item,
-        open=_left_open(requirements, item, landings),
+        open=_unknown_path_text(requirements, item, landings),
     )
 
 
 def _landings(requirements: RouteRequirements, at: int) -> tuple[LandingStart, ...]:
-    """What a go-around flies to: one of the landing sequences, or the place before the landing where there are none."""
+    """Return the places to which a go-around flies: landing sequences, or the place before the landing."""
     setup = requirements.setup
     mission, origin, terrain = setup.mission, setup.scenario.origin, setup.scenario.terrain
     before = int(setup.route.items[at - 1])
@@ -185,10 +189,10 @@ def _landings(requirements: RouteRequirements, at: int) -> tuple[LandingStart, .
     return landing_starts(mission, origin, terrain) or back
 
 
-def _left_open(requirements: RouteRequirements, item: MissionItem, landings: tuple[LandingStart, ...]) -> str:
-    """Why it is not known where a go-around of a landing leads; "" where it is."""
+def _unknown_path_text(requirements: RouteRequirements, item: MissionItem, landings: tuple[LandingStart, ...]) -> str:
+    """Return why the path of a go-around is not known; "" if it is known."""
     after = next((one for one in requirements.setup.mission.items if one.seq == item.seq + 1), None)
-    # Before any landing sequence (`AP_Landing::restart_landing_sequence`).
+    # This takes precedence over landing sequences (`AP_Landing::restart_landing_sequence`).
     if after is not None and after.command == Command.NAV_CONTINUE_AND_CHANGE_ALT and int(after.params[0]) in (0, 1):
         return f"{command_name(after.command)} (item {after.seq}) follows the landing, and is flown instead"
     return "" if landings else "no place before the landing is known to fly back to"
@@ -198,10 +202,10 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
     place, height = requirements.waypoint(landing.at), landing.height
     said = f"it climbs to {height:.0f} m over home"
     said += f", which is {landing.home + height - landing.ground:.0f} m over the landing point"
-    # No rally point is flown to, wherever they are.
+    # A go-around flies to no rally point.
     setup = requirements.setup
     world = return_world(replace(setup, mission=replace(setup.mission, rally=())))
-    flown = [] if landing.open else _fly(requirements, ground, world, landing, height, _places(landing))
+    flown = [] if landing.open else _simulate(requirements, ground, world, landing, height, _abort_places(landing))
     worst = max(flown, key=lambda one: one.badness, default=None)
     unknown = landing.open or next((one.open for one in flown if one.open), "")
     climb = Fact("climb above ground", min((one.climb for one in flown), default=math.inf), "m")
@@ -215,9 +219,11 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
     if worst.is_free:
         fault = message(f"{said}; {worst.room:.0f} m above ground or more on the way back")
     else:
-        enough = _enough(requirements, ground, world, landing, worst.before)
+        enough = _next_sufficient_height(requirements, ground, world, landing, worst.before)
         would = f"{enough:.0f} m would do (the first number of item {landing.item.seq})"
-        fault = message(_brief(worst), f": {said}, and {_described(worst)}; {would if enough > 0.0 else _NONE_DO}")
+        fault = message(
+            _brief_outcome(worst), f": {said}, and {_outcome_text(worst)}; {would if enough > 0.0 else _NO_HEIGHT_TEXT}"
+        )
     ok = worst.is_free or (False if required else None)
     return make_finding(
         "go_around",
@@ -236,14 +242,14 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
     )
 
 
-def _places(landing: _Landing) -> Floats:
-    """Where on the glide it is aborted: (n,) m before the landing point, to where the flare begins or it lands."""
+def _abort_places(landing: _Landing) -> Floats:
+    """Return where a glide is aborted: (n,) m before the landing point, up to its flare or touchdown."""
     last = min(landing.run, max(landing.glide.flare_distance, EARLY_TOUCH))
-    count = min(_MAX_PLACES, max(2, math.ceil((landing.run - last) / _APART) + 1))
+    count = min(_MAX_ABORT_PLACES, max(2, math.ceil((landing.run - last) / _ABORT_SPACING_M) + 1))
     return np.linspace(landing.run, last, count)
 
 
-def _fly(
+def _simulate(
     requirements: RouteRequirements,
     ground: Terrain,
     world: ReturnWorld,
@@ -251,7 +257,9 @@ def _fly(
     height: float,
     places: Sequence[float] | Floats,
 ) -> list[_Aborted]:
-    """Go-arounds to a height over home (m) from places (m before the landing point) that are above the ground."""
+    """Simulate go-arounds from places on the glide that are above the ground.
+
+    height: above home, m.  places: m before the landing point."""
     top = landing.home + height
     begins = [(float(before), landing.place(float(before))) for before in places]
     over = [up - float(ground.height(east, north)) for _, (east, north, up) in begins]
@@ -266,12 +274,14 @@ def _fly(
     )
     flown = fly_go_arounds(starts, top, landing.pitch, landing.landings, world.parameters, world.aircraft, world.around)
     return [
-        _judged(requirements, ground, landing, _Aborted(before, high, at_once=place[2] > top), row, way, goal, top)
+        _judge_go_around(
+            requirements, ground, landing, _Aborted(before, high, at_once=place[2] > top), row, way, goal, top
+        )
         for (before, place, high), row, way, goal in zip(kept, flown.flown, flown.ways, flown.landings, strict=True)
     ]
 
 
-def _judged(
+def _judge_go_around(
     requirements: RouteRequirements,
     ground: Terrain,
     landing: _Landing,
@@ -281,15 +291,15 @@ def _judged(
     goal: LandingStart,
     top: float,
 ) -> _Aborted:
-    """What a go-around comes to.
+    """Judge a simulated go-around.
 
     flown: of `flight.autopilots.arduplane.swift_return.RETURN_FLOWN`.  positions: (n, 3) m, a second apart.
-    goal: what it flies to.  top: height above which its climb is over, m AMSL.
+    goal: its destination.  top: altitude above which its climb is over, m AMSL.
     """
     rows, ended = climb_rows(positions, top), int(flown["ended"])
-    begun = begun._replace(lost=ended == NEVER, open=_unknown(ended, climbs=rows < len(positions)))
+    begun = begun._replace(lost=ended == NEVER, open=_unknown_part_text(ended, climbs=rows < len(positions)))
     if goal.lands and rows < len(positions):
-        # What it does on a glide that begins anywhere is not known; what it met before is.
+        # Its path on a glide that begins anywhere is unknown; the path before is known.
         positions, ended = positions[: rows + 1], 0
         begun = begun._replace(lost=False, open=f"its landing sequence begins with the landing (item {goal.item})")
     if len(positions) < 2:
@@ -309,7 +319,7 @@ def _judged(
             f"aborted {begun.before:.0f} m before the landing point it passes the ground in its climb by {climb:.0f} m"
         )
         begun = begun._replace(open=f"{passes}, and may be flown {GO_AROUND_ERROR:.0f} m lower")
-    asked = _asked(ground, goal, 0.5 * (positions[:-1] + positions[1:]))[rows:]
+    asked = _required_heights(ground, goal, 0.5 * (positions[:-1] + positions[1:]))[rows:]
     back = np.where(np.isnan(low[rows:]), math.inf, low[rows:])
     if not back.size:
         return begun._replace(climb=climb)
@@ -317,15 +327,21 @@ def _judged(
     return begun._replace(climb=climb, room=float(back[k]), needed=float(asked[k]))
 
 
-def _unknown(ended: int, *, climbs: bool) -> str:
-    """What is not known of a go-around that ended somehow, and climbs to its height or not; "" for nothing."""
+def _unknown_part_text(ended: int, *, climbs: bool) -> str:
+    """Return the unknown part of a go-around, "" for none.
+
+    It follows from how it ended, and whether it climbs to its height.
+    """
     if ended != OFF_GROUND:
         return ""
     return "it leads to where the ground is not known" if climbs else "it does not reach its height on known ground"
 
 
-def _asked(ground: Terrain, goal: LandingStart, points: Floats) -> Floats:
-    """Height above ground (n,) that is asked at places (n, 3) of the way back, m: less near lower places to fly to."""
+def _required_heights(ground: Terrain, goal: LandingStart, points: Floats) -> Floats:
+    """Return the required height above ground (n,) at points (n, 3) of the path back, m.
+
+    Less near lower goals.
+    """
     asked = np.full(len(points), GO_AROUND_ROOM)
     for east, north, up in (one.place for one in (goal, *goal.onward)):
         high = up - float(ground.height(east, north))
@@ -335,17 +351,20 @@ def _asked(ground: Terrain, goal: LandingStart, points: Floats) -> Floats:
     return asked
 
 
-def _enough(
+def _next_sufficient_height(
     requirements: RouteRequirements, ground: Terrain, world: ReturnWorld, landing: _Landing, worst: float
 ) -> float:
-    """The next height over home (m) that would do, in steps; NaN where none does.  worst: place to be tried first."""
-    first = _HEIGHT_STEP * math.ceil(landing.height / _HEIGHT_STEP + 1e-9)
-    order = [worst, *_places(landing).tolist()]
-    for up in np.arange(first, _HIGHEST + 1.0, _HEIGHT_STEP).tolist():
+    """Return the next height above home (m) that is enough, in steps; NaN if none is.
+
+    worst: the place that is tried first, m before the landing point.
+    """
+    first = _HEIGHT_STEP_M * math.ceil(landing.height / _HEIGHT_STEP_M + 1e-9)
+    order = [worst, *_abort_places(landing).tolist()]
+    for up in np.arange(first, _MAX_HEIGHT_M + 1.0, _HEIGHT_STEP_M).tolist():
         for before in order:
-            flown = _fly(requirements, ground, world, landing, up, [before])
+            flown = _simulate(requirements, ground, world, landing, up, [before])
             if not all(one.is_free and not one.open for one in flown):
-                # Where one height does not do, the next is tried first.
+                # Try the next height first at the place where this one was not enough.
                 order[0] = before
                 break
         else:
@@ -353,8 +372,8 @@ def _enough(
     return math.nan
 
 
-def _brief(worst: _Aborted) -> str:
-    """What becomes of the worst, in a few words."""
+def _brief_outcome(worst: _Aborted) -> str:
+    """Return the outcome of the worst go-around, in a few words."""
     if not math.isnan(worst.after):
         return "a go-around meets the ground"
     if worst.entered:
@@ -362,8 +381,8 @@ def _brief(worst: _Aborted) -> str:
     return "a go-around does not get back to the line-up" if worst.lost else "a go-around comes too near to the ground"
 
 
-def _described(worst: _Aborted) -> str:
-    """What becomes of the worst, in words."""
+def _outcome_text(worst: _Aborted) -> str:
+    """Return the outcome of the worst go-around, in words."""
     where = f"aborted {worst.before:.0f} m before the landing point, {worst.over:.0f} m above ground,"
     turns = " is so high already, turns at once" if worst.at_once else ""
     if not math.isnan(worst.after):

@@ -1,13 +1,13 @@
-"""The climb-out and approach rules: what stands in the way up from home, and down to the landing point.
+"""The climb-out and approach rules: obstacles on the path up from home, and down to the landing point.
 
-A flight of ours begins and ends in the air, but where its scenario has a launch or a strip: what is flown of that, the
-launch rule and the touchdown rule judge.  Other ways are not flown: they are laid out from the mission's items and
-judged against ground, missile spheres and zones, whether the mission was flown or not.
+A planfly flight begins and ends in the air, unless its scenario has a launch or a strip: the launch rule and the
+touchdown rule judge what is flown there.  Other departures and approaches are not flown: they are laid out from the
+mission's items and judged against ground, missile spheres and zones, whether the mission was flown or not.
 
-Where a mission takes off, the aircraft climbs from the ground at home towards the next place, or on the course that the
-scenario's `[launch]` states.  What it hits at its
-steepest climb fails; what it would hit at `MIN_CLIMB` of it is left open.  Where it does not take off, somebody flies
-the aircraft to its first waypoint, perhaps by another way: what is hit on the straight one is left open.
+If a mission takes off, the aircraft climbs from the ground at home towards the next place, or on the course that the
+scenario's `[launch]` states.  An obstacle at its steepest climb fails; an obstacle only at `MIN_CLIMB` of that climb
+leaves the finding undecided.  If the mission does not take off, a pilot flies the aircraft to its first waypoint,
+perhaps on another path: an obstacle on the straight path leaves the finding undecided.
 
 The approach is the glide that the autopilot lays out (`Autopilot.landing_glide`).
 """
@@ -53,19 +53,19 @@ from world.geometry import wrap
 
 Floats = NDArray[np.float64]
 
-# Degrees between two courses that a launch is tried on.
-_COURSE_STEP = 10
+# Step between the launch courses that are tried, deg.
+_COURSE_STEP_DEG = 10
 
 
 # ----------------------------------------------------------------------
-# What a way meets.
+# Obstacles on a path.
 
 
-class _Met(NamedTuple):
-    """What a way meets.
+class _Obstacles(NamedTuple):
+    """Obstacles on a path.
 
-    clearance: least height above ground, m; NaN where that is not known.  at: the run where that is, m.
-    entered: the sphere or zone that it enters, "" for none.
+    clearance: least height above ground, m; NaN if unknown.  at: the run at which it occurs, m.
+    entered: the sphere or zone that the path enters, "" for none.
     """
 
     clearance: float
@@ -74,18 +74,18 @@ class _Met(NamedTuple):
 
     @property
     def free(self) -> bool:
-        """Whether it meets neither ground nor sphere nor zone; False where the ground is not known."""
+        """True if the path hits neither ground nor sphere nor zone; False if the ground is unknown."""
         return self.clearance >= 0.0 and not self.entered
 
-    def told(self, subject: str, where: str) -> Message:
-        """What it meets, in words.  where: what its runs count from."""
+    def obstacle_message(self, subject: str, where: str) -> Message:
+        """Return the obstacle in words.  where: the origin of its runs."""
         if self.entered:
             return message(f"{subject} enters {self.entered}")
         return message(f"{subject} meets the ground", f", {-self.clearance:.0f} m into it {self.at:.0f} m {where}")
 
 
 def _climb(requirements: RouteRequirements, leg: int, course: float, amsl: float) -> tuple[float, float]:
-    """Steepest climb on a course (rad) at a height (m AMSL), and what of it is certain: m of height per m of way."""
+    """Return the steepest and the certain climb on a course (rad) at an altitude (m AMSL), m per m of run."""
     speed, limits = float(requirements.route.airspeed[leg]), requirements.limits
     steepest, certain = (one.slopes(course, amsl, speed)[0] for one in (limits, limits.surely()))
     return math.tan(steepest), math.tan(certain)
@@ -98,9 +98,9 @@ def _climb(requirements: RouteRequirements, leg: int, course: float, amsl: float
 def climbout_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding of a mission with a home: of the way from the ground there to its first place.
+    """Judge the path from the ground at home to the first place, for a mission with a home: one finding.
 
-    Nothing where that place is over home, or the aircraft takes off straight up.
+    No finding if that place is over home, or the aircraft takes off vertically.
     """
     home, ground = requirements.setup.mission.home, requirements.setup.scenario.terrain
     if not is_laid_out(requirements) or home is None or ground is None:
@@ -128,21 +128,21 @@ def climbout_findings(
         reason = "the aircraft cannot climb there at this speed and in this wind"
         return [_unjudged("climbout", place, reason, opens=takeoff is not None)]
     if takeoff is None:
-        way = straight_way(begin, course, _way_up(low, float(here[2]), run, steepest))
-        return [_by_hand(place, _look(requirements, way))]
+        way = straight_way(begin, course, _climb_profile(low, float(here[2]), run, steepest))
+        return [_unflown_start_finding(place, _find_obstacles(requirements, way))]
     up = float(requirements.points[0, 2])
     if up <= low:
         reason = f"the take-off's height is not above the ground at home, which is at {low:.0f} m AMSL"
         return [_unjudged("climbout", place, reason, opens=True)]
     met, least = (
-        _look(requirements, straight_way(begin, course, _take_off(low, up, run, slope, climb)))
+        _find_obstacles(requirements, straight_way(begin, course, _takeoff_profile(low, up, run, slope, climb)))
         for climb in (steepest, max(1e-3, MIN_CLIMB * certain))
     )
-    return [_launched(requirements, launch.way, place, met, least, (begin, low, up), certain == steepest)]
+    return [_launch_finding(requirements, launch.way, place, met, least, (begin, low, up), certain == steepest)]
 
 
 def _unjudged(rule: str, place: Place, reason: str, *, opens: bool) -> Finding:
-    """Return a finding of a way that is not judged.  opens: whether the mission holds it, which opens the verdict."""
+    """Return a finding on a path that is not judged.  opens: True if it leaves the verdict undecided."""
     title = "climb-out" if rule == "climbout" else rule
     fault = message(f"the {title} at {place_text(place)} is not judged: {reason}")
     return make_finding(
@@ -151,7 +151,10 @@ def _unjudged(rule: str, place: Place, reason: str, *, opens: bool) -> Finding:
 
 
 class _Launch(NamedTuple):
-    """A launch: its course (rad), how far it is flown (m), the slope of the leg along it (m per m), and it in words."""
+    """Launch and its description.
+
+    course: rad.  run: flown on it, m.  slope: of its leg, m per m.
+    """
 
     course: float
     run: float
@@ -160,7 +163,10 @@ class _Launch(NamedTuple):
 
 
 def _launch(requirements: RouteRequirements) -> _Launch:
-    """Along the first leg, or on the course that the scenario states; the leg counts where it is on that course."""
+    """Return the launch along the first leg, or on the scenario's course.
+
+    The leg's run and slope apply if the leg is on that course.
+    """
     stated = requirements.setup.scenario.launch
     along = _Launch(
         float(requirements.courses[0]), float(requirements.runs[0]), math.tan(float(requirements.slopes[0]))
@@ -173,8 +179,11 @@ def _launch(requirements: RouteRequirements) -> _Launch:
     return _Launch(stated.course, math.inf, 0.0, way)
 
 
-def _way_up(low: float, up: float, run: float, climb: float) -> Profile:
-    """Profile from the ground (m AMSL) to a place so high (m AMSL) and so far away (m): at once up, and then on."""
+def _climb_profile(low: float, up: float, run: float, climb: float) -> Profile:
+    """Return the climb profile from the ground to a place: climb first, then straight on.
+
+    low: ground, up: place, m AMSL.  run: distance of the place, m.
+    """
     top = max(up, low + FIRST_CLIMB)
     reached = (top - low) / climb
     if reached >= run:
@@ -182,11 +191,11 @@ def _way_up(low: float, up: float, run: float, climb: float) -> Profile:
     return [(0.0, low), (reached, top), (run, up)]
 
 
-def _take_off(low: float, up: float, run: float, slope: float, climb: float) -> Profile:
-    """Profile from the ground until it is on the first leg.
+def _takeoff_profile(low: float, up: float, run: float, slope: float, climb: float) -> Profile:
+    """Return the profile from the ground until the aircraft is on the first leg.
 
-    low: of the ground, up: that the leg begins at over home and the take-off climbs to, m AMSL.  run: of the leg, m.
-    slope: of the leg, climb: m per m.
+    low: altitude of the ground, up: altitude where the leg begins over home, to which the take-off climbs, m AMSL.
+    run: of the leg, m.  slope: of the leg, climb: m per m.
     """
     reached = (up - low) / climb
     if reached < run:
@@ -195,43 +204,43 @@ def _take_off(low: float, up: float, run: float, slope: float, climb: float) -> 
     return [(0.0, low), (reached, low + climb * reached)]
 
 
-def _look(requirements: RouteRequirements, way: Way) -> _Met:
-    """What a way up from home meets, beyond `LAUNCH_RUN` of ground."""
+def _find_obstacles(requirements: RouteRequirements, way: Way) -> _Obstacles:
+    """Return the obstacles on a path up from home, beyond `LAUNCH_RUN` of ground."""
     ground, end = requirements.setup.scenario.terrain, float(way.run[-1])
     entered = entered_by_way(requirements, way)
     if ground is None or end <= LAUNCH_RUN:
-        return _Met(math.inf, 0.0, entered)
-    return _Met(*way_clearance(ground, way.between(LAUNCH_RUN, end)), entered)
+        return _Obstacles(math.inf, 0.0, entered)
+    return _Obstacles(*way_clearance(ground, way.between(LAUNCH_RUN, end)), entered)
 
 
-def _by_hand(place: Place, met: _Met) -> Finding:
-    """Of a mission that begins in the air: the way to its first waypoint."""
+def _unflown_start_finding(place: Place, met: _Obstacles) -> Finding:
+    """Return the finding for a mission that begins in the air: the path to its first waypoint."""
     subject = f"the way up from home to {_item_text(place)}"
     if math.isnan(met.clearance) and not met.entered:
         reason, check, ok = f"the ground below {subject} is not known", "", None
     elif met.free:
-        reason, check, ok = f"straight from home: {_room(met)}; not flown: the flight begins in the air", "", True
+        reason, check, ok = f"straight from home: {_room_text(met)}; not flown: the flight begins in the air", "", True
     else:
-        fault = met.told(subject, "from home, at the steepest climb")
+        fault = met.obstacle_message(subject, "from home, at the steepest climb")
         return _finding("climbout", place, met, None, fault, GROUND_WAY)
     return _finding("climbout", place, met, ok, message(reason), check)
 
 
-def _launched(
+def _launch_finding(
     requirements: RouteRequirements,
     way: str,
     place: Place,
-    met: _Met,
-    least: _Met,
+    met: _Obstacles,
+    least: _Obstacles,
     launch: tuple[tuple[float, float], float, float],
     is_known: bool,
 ) -> Finding:
-    """Of a mission that takes off: the climb towards its next place, or on its launch course.
+    """Return the finding for a mission that takes off: the climb to its next place, or on a course.
 
-    way: of the launch in words, "" for along the first leg.
-    met, least: at the steepest climb, and at the least.
-    launch: where (east, north, m), from which ground and to which height (m AMSL).
-    is_known: whether the aircraft's climb is certain.
+    way: the launch course in words, "" along the first leg.
+    met, least: obstacles at the steepest climb, and at the least climb.
+    launch: place (east, north, m), altitude of the ground there and altitude at the end of the climb (m AMSL).
+    is_known: True if the aircraft's climb is certain.
     """
     to_item = requirements.leg(0).to_item
     towards = f"towards {'the next place' if to_item is None else f'item {to_item}'}"
@@ -240,7 +249,7 @@ def _launched(
         reason = message(f"the ground below {subject} is not known")
         return _finding("climbout", place, met, None, reason)
     if not met.free:
-        fault = met.told(subject, "from home, at the steepest climb")
+        fault = met.obstacle_message(subject, "from home, at the steepest climb")
         other = _other_courses(requirements, *launch)
         fault = message(fault.brief, fault.text[len(fault.brief) :] + other)
         return _finding("climbout", place, met, False if is_known else None, fault, "" if is_known else GROUND_WAY)
@@ -248,26 +257,26 @@ def _launched(
     if math.isnan(least.clearance) and not least.entered:
         return _finding("climbout", place, met, None, message(f"{at_least} leads to where the ground is not known"))
     if not least.free:
-        return _finding("climbout", place, met, None, least.told(at_least, "from home"), GROUND_WAY)
+        return _finding("climbout", place, met, None, least.obstacle_message(at_least, "from home"), GROUND_WAY)
     return _finding(
-        "climbout", place, met, True, message(f"{subject.removeprefix('the climb from home ')}: {_room(met)}")
+        "climbout", place, met, True, message(f"{subject.removeprefix('the climb from home ')}: {_room_text(met)}")
     )
 
 
 def _other_courses(requirements: RouteRequirements, begin: tuple[float, float], low: float, up: float) -> str:
-    """Courses on which a launch climbs to the take-off's height and meets nothing, in words; "" for none."""
+    """Return courses on which a launch climbs to the take-off's altitude without obstacles, in words."""
 
     def is_free(course: float) -> bool:
         climb, _ = _climb(requirements, 0, course, low)
         if not climb > 0.0:
             return False
-        return _look(requirements, straight_way(begin, course, [(0.0, low), ((up - low) / climb, up)])).free
+        return _find_obstacles(requirements, straight_way(begin, course, [(0.0, low), ((up - low) / climb, up)])).free
 
-    courses = list(range(0, 360, _COURSE_STEP))
+    courses = list(range(0, 360, _COURSE_STEP_DEG))
     free = [is_free(math.radians(course)) for course in courses]
     if not any(free):
         return "; no launch course climbs free"
-    # Begin behind a course that is not free, so that no range is cut at north.
+    # Begin after a course with obstacles, so that no range is cut at north.
     start = free.index(False) if False in free else 0
     turned = [(courses[k % len(courses)], free[k % len(courses)]) for k in range(start, start + len(courses))]
     ranges = [[course for course, _ in group] for is_one, group in groupby(turned, key=lambda one: one[1]) if is_one]
@@ -284,7 +293,7 @@ def _other_courses(requirements: RouteRequirements, begin: tuple[float, float], 
 def approach_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding of a mission that lands: of the glide from the last waypoint to the landing point."""
+    """Judge the glide from the last waypoint to the landing point, for a mission that lands: one finding."""
     found, ground, setup = landing_item(requirements), requirements.setup.scenario.terrain, requirements.setup
     if found is None or ground is None or not is_laid_out(requirements):
         return []
@@ -307,16 +316,18 @@ def approach_findings(
     last, room, at_run = run - EARLY_TOUCH, math.inf, 0.0
     if last > 0.0:
         room, at_run = way_clearance(ground, way.between(0.0, last))
-    met = _Met(room, run - at_run, entered_by_way(requirements, way))
+    met = _Obstacles(room, run - at_run, entered_by_way(requirements, way))
     subject = f"the glide to {item}"
     if math.isnan(met.clearance) and not met.entered:
         return [_finding("approach", place, met, None, message(f"the ground below {subject} is not known"))]
-    told = met.told(subject, "before the landing point")
-    # A landing point below the ground has the glide meet that early: by some metres the elevation file may be wrong.
+    obstacle_message = met.obstacle_message(subject, "before the landing point")
+    # With a landing point below the ground the glide hits the ground early: the elevation file may be some metres off.
     if met.entered or met.clearance + min(POINT_ERROR, max(0.0, under - low)) < 0.0:
-        return [_finding("approach", place, met, False, told)]
+        return [_finding("approach", place, met, False, obstacle_message)]
     if met.clearance < 0.0:
-        fault = message(f"the landing point of {item} is {under - low:.0f} m below the ground", f": {told.text}")
+        fault = message(
+            f"the landing point of {item} is {under - low:.0f} m below the ground", f": {obstacle_message.text}"
+        )
         return [_finding("approach", place, met, None, fault, GROUND_WAY)]
     if low - under > POINT_ERROR:
         fault = message(f"the landing point of {item} is {low - under:.0f} m above the ground")
@@ -334,7 +345,7 @@ def approach_findings(
         reason += (
             f", flares {glide.flare_height:.1f} m over the landing point and {glide.flare_distance:.0f} m before it"
         )
-    reason += f"; {_room(met)} until {EARLY_TOUCH:.0f} m before it"
+    reason += f"; {_room_text(met)} until {EARLY_TOUCH:.0f} m before it"
     reason += "" if setup.ground_ways.approach is not None else "; not flown: the flight ends in the air"
     return [_finding("approach", place, met, True, message(reason))]
 
@@ -343,15 +354,15 @@ def approach_findings(
 
 
 def _item_text(place: Place) -> str:
-    """The item of a waypoint, in words."""
+    """Return the item of a waypoint, in words."""
     return "the first place" if place.item is None else f"item {place.item}"
 
 
-def _room(met: _Met) -> str:
+def _room_text(met: _Obstacles) -> str:
     return "nothing is in the way" if math.isinf(met.clearance) else f"{met.clearance:.0f} m above ground or more"
 
 
-def _finding(rule: str, place: Place, met: _Met, ok: bool | None, said: Message, check: str = "") -> Finding:
+def _finding(rule: str, place: Place, met: _Obstacles, ok: bool | None, said: Message, check: str = "") -> Finding:
     return make_finding(
         rule,
         place,

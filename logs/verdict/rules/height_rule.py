@@ -1,6 +1,6 @@
-"""The height rule: the greatest height above ground on each leg, and the scenario's ceiling, planned and flown.
+"""The height rule: greatest height above ground on each leg, and the ceiling, planned and flown.
 
-It stands where the scenario has a `max_height_m`; a ceiling alone is the bounds rule's.
+It applies if the scenario has a `max_height_m`; a ceiling alone is judged by the bounds rule.
 """
 
 import math
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 def height_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the greatest height above ground on each leg; nothing where the scenario has no limit of it."""
+    """Judge the greatest height above ground on each leg; empty if the scenario does not limit it."""
     scenario = requirements.setup.scenario
     limit, ground = scenario.limits.max_height_m, scenario.terrain
     if limit is None:
@@ -38,7 +38,7 @@ def height_findings(
             )
         ]
     path = requirements.path
-    way = _Way(path.points, path.times, *greatest_heights(ground, path.points))
+    way = _Path(path.points, path.times, *greatest_heights(ground, path.points))
     planned = [_highest(way, np.flatnonzero(path.legs == leg)) for leg in range(requirements.legs)]
     if geometric:
         return [
@@ -48,7 +48,7 @@ def height_findings(
     flown: list[_Highest | None] = [None] * requirements.legs
     if aligned is not None:
         track = aligned.track
-        way = _Way(track.position, track.time, *greatest_heights(ground, track.position))
+        way = _Path(track.position, track.time, *greatest_heights(ground, track.position))
         flown = [
             _highest(way, _segments(requirements, aligned, leg)) if aligned.flew(leg) else None
             for leg in range(requirements.legs)
@@ -59,10 +59,10 @@ def height_findings(
 
 
 def greatest_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Greatest height above ground on each segment of points (n, 3), m, and the fraction of it there; (n - 1,) each.
+    """Return the greatest height above ground on each segment, m, and its fraction; (n - 1,) each.
 
-    Exact for the bilinear ground, as the least height is: it is the least of the same world upside down.  NaN where a
-    segment leaves the raster or its data.
+    points: (n, 3).  Exact for the bilinear ground, like the least height: it is the least height of the same world
+    upside down.  NaN if a segment leaves the raster or its data.
     """
     upside_down = points * np.array([1.0, 1.0, -1.0])
     low, at = path_clearance(-terrain.heights, terrain.to_pixel.record, upside_down)
@@ -70,8 +70,8 @@ def greatest_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Way:
-    """Points (n, 3) m with their times (n,) s; of each segment the greatest height above ground, and where it is."""
+class _Path:
+    """Points (n, 3) m with times (n,) s; each segment's greatest height above ground, and its fraction."""
 
     points: Floats
     times: Floats
@@ -81,9 +81,9 @@ class _Way:
 
 @dataclass(frozen=True, slots=True)
 class _Highest:
-    """Of a leg, m: the greatest height above ground, NaN where none is known, and above the sea.
+    """Greatest height of a leg above ground, NaN if unknown, and greatest altitude AMSL, m.
 
-    where: when and where the first is, in words.  known: whether the ground is, all along.
+    where: time and place of the first, in words.  known: True if the ground is known all along.
     """
 
     height: float
@@ -92,8 +92,8 @@ class _Highest:
     known: bool
 
 
-def _highest(way: _Way, segments: NDArray[np.intp]) -> _Highest | None:
-    """What some segments of a way come to; None for none."""
+def _highest(way: _Path, segments: NDArray[np.intp]) -> _Highest | None:
+    """Return the greatest heights on some segments of a path, or None without segments."""
     if not segments.size:
         return None
     amsl = float(max(way.points[segments, 2].max(), way.points[segments + 1, 2].max()))
@@ -108,7 +108,7 @@ def _highest(way: _Way, segments: NDArray[np.intp]) -> _Highest | None:
 
 
 def _segments(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> NDArray[np.intp]:
-    """Segments of the track on a leg: the first leg has what came before it, the last what came after."""
+    """Return the track's segments on a leg; the first and last legs include what is before and after."""
     first = 0 if leg == 0 else int(aligned.rows[leg])
     last = len(aligned.track) - 1 if leg + 1 == requirements.legs else int(aligned.rows[leg + 1])
     return np.arange(first, last)

@@ -1,9 +1,8 @@
-"""The launch rule: a take-off that was flown, from rail, hand or runway to where the first leg begins.
+"""The launch rule: a flown take-off, from rail, hand or runway to where the first leg begins.
 
-Judged are the acceleration of the launch against the one that starts the motor, whether height is lost after it, what
-of a runway is left where the aircraft leaves the ground, and what the climb meets on the course that the autopilot
-holds: ground, missile spheres and zones.  A take-off that is not flown is judged by the take-off and climb-out rules,
-by the mission's items.
+It judges the launch acceleration against the one that starts the motor, the loss of height after the launch, the runway
+left at lift-off, and hazards to the climb on the course that the autopilot holds: ground, missile spheres and zones.  A
+take-off that is not flown is judged by the take-off and climb-out rules, from the mission's items.
 """
 
 import math
@@ -27,7 +26,7 @@ Floats = NDArray[np.float64]
 def launch_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding of a take-off that was flown."""
+    """Judge a flown take-off with one finding."""
     ground = requirements.ground
     if ground is None or ground.ways.take_off is None:
         return []
@@ -39,7 +38,7 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
     way = track_way(track)
     position, run = way
     lost = float(position[0, 2] - position[:, 2].min())
-    room, where = _room(requirements, way)
+    room, where = _climb_clearance(requirements, way)
     trigger = requirements.setup.autopilot.launch_trigger
     faults = []
     if trigger is not None and take_off.acceleration < trigger[0]:
@@ -60,7 +59,7 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
     entered = entered_by_way(requirements, way)
     if entered:
         faults.append(message(f"the climb enters {entered}"))
-    known = _described(take_off, track, run, room)
+    known = _description(take_off, track, run, room)
     open_ = []
     if not faults and LAUNCH_ROOM <= room < LAUNCH_ROOM + CLIMB_ERROR:
         brief = f"the launch passes {room:.1f} m above ground {where:.0f} m from home"
@@ -85,15 +84,15 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
     )
 
 
-def _room(requirements: RouteRequirements, way: Way) -> tuple[float, float]:
-    """Least height above ground beyond the launch itself, and how far from home that is, m.
+def _climb_clearance(requirements: RouteRequirements, way: Way) -> tuple[float, float]:
+    """Return the least height above ground beyond the launch itself, and its distance from home, m.
 
-    inf for a take-off that ends before that, NaN where the ground is not known.
+    inf for a take-off that ends before that, NaN if the ground is unknown.
     """
     terrain, (position, run) = requirements.setup.scenario.terrain, way
     if terrain is None:
         return math.nan, math.nan
-    # On a runway it is on the ground: what counts begins where it has left that.
+    # On a runway the aircraft is on the ground: heights apply from lift-off on.
     first = LAUNCH_RUN
     take_off = None if requirements.ground is None else requirements.ground.ways.take_off
     if take_off is not None and take_off.launch.method == "runway":
@@ -107,7 +106,7 @@ def _room(requirements: RouteRequirements, way: Way) -> tuple[float, float]:
 
 
 def _runway_left(requirements: RouteRequirements, take_off: TakeOff, position: Floats) -> float:
-    """How much of the runway is left where the aircraft last stands on it, m; inf for a launch from none."""
+    """Return the runway left where the aircraft last stands on it, m; inf for a launch without a runway."""
     terrain = requirements.setup.scenario.terrain
     if take_off.launch.method != "runway" or terrain is None:
         return math.inf
@@ -117,8 +116,8 @@ def _runway_left(requirements: RouteRequirements, take_off: TakeOff, position: F
     return take_off.launch.run - math.dist(last[:2], take_off.home[:2])
 
 
-def _described(take_off: TakeOff, track: Track, run: Floats, room: float) -> list[str]:
-    """The take-off in words."""
+def _description(take_off: TakeOff, track: Track, run: Floats, room: float) -> list[str]:
+    """Describe the take-off in words."""
     course, method = round(math.degrees(take_off.course)) % 360, take_off.launch.method
     known = [f"launched on a runway on {course}°"]
     if method != "runway":

@@ -1,7 +1,7 @@
-"""The loiter rule: can a circle be held with this bank in this wind, and was it flown around to its end.
+"""The loiter rule: whether a loiter can be held with this bank in this wind, and was flown to its end.
 
-A loiter is flown as corners around its circle.  Each is judged like any turn; their findings become one a loiter, and
-those of the legs between them the worst of each rule.
+A loiter is flown as corners around its circle.  Each is judged like any turn; their findings are merged into one per
+loiter, and the findings on the legs between them are reduced to the worst of each rule.
 """
 
 import math
@@ -29,10 +29,10 @@ Floats = NDArray[np.float64]
 class Circle:
     """One loiter of a route.
 
-    first, last: its corners' waypoints, none of them an end of the route: a circle is joined and left there.
-    middle: (2,) m.
+    first, last: waypoints of its corners, none of them an end of the route: a loiter is joined and left there.
+    middle: (2,) m, its center.
     radius: m.
-    turns: how often it is flown around.
+    turns: number of laps.
     """
 
     first: int
@@ -43,7 +43,7 @@ class Circle:
 
 
 def circles(requirements: RouteRequirements) -> list[Circle]:
-    """Loiters of a route, in flying order."""
+    """Return the loiters of a route, in flying order."""
     arcs, items = requirements.setup.route.arcs, requirements.setup.route.items
     found: list[Circle] = []
     i = 0
@@ -53,14 +53,14 @@ def circles(requirements: RouteRequirements) -> list[Circle]:
             last += 1
         if arcs[i] > 0.0:
             angle = float(np.abs(requirements.turns[i : last + 1]).sum())
-            found.append(Circle(i, last, _middle(requirements, i), float(arcs[i]), angle / (2.0 * math.pi)))
+            found.append(Circle(i, last, _center(requirements, i), float(arcs[i]), angle / (2.0 * math.pi)))
             i = last
         i += 1
     return found
 
 
-def _middle(requirements: RouteRequirements, i: int) -> Floats:
-    """Middle of the circle that a corner's arc is part of, (2,) m."""
+def _center(requirements: RouteRequirements, i: int) -> Floats:
+    """Return the center of the circle to which a corner's arc belongs, (2,) m."""
     ux, uy = requirements.leg_unit(i - 1)
     side = math.copysign(1.0, requirements.turns[i])
     tangent = tangent_length(abs(float(requirements.turns[i])), float(requirements.radius[i]))
@@ -72,33 +72,33 @@ def _middle(requirements: RouteRequirements, i: int) -> Floats:
 def fold_loiters(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Findings with those at a loiter's corners replaced by one, and those of its legs by the worst of each rule."""
+    """Merge the findings at a loiter's corners into one, and keep the worst of each rule on its legs."""
     at_once = requirements.setup.autopilot.loiter_rules.at_middle
     kept: list[Finding | None] = list(findings)
-    # Looked up by rule and place: a mission of jumps has hundreds of circles, and each thousands of findings.
+    # Indexed by rule and place: a mission of jumps has hundreds of loiters, and each thousands of findings.
     positions: dict[tuple[str, Place], list[int]] = {}
     for k, item in enumerate(findings):
         positions.setdefault((item.rule, item.place), []).append(k)
 
     def left(rules: Sequence[str], places: Sequence[Place]) -> list[tuple[int, Finding]]:
-        """Positions and findings of these rules at these places, in order, but for those that were replaced."""
+        """Return positions and findings of these rules at these places, in order, except replaced ones."""
         every = sorted(k for rule in rules for place in places for k in positions.get((rule, place), ()))
         return [(k, item) for k in every if (item := kept[k]) is not None and item.rule in rules]
 
     for circle in circles(requirements):
-        # Where the mission ends on its circle, that end is on it too.
+        # If the mission ends on its loiter, that end is on it too.
         here = requirements.setup.route.items[circle.last : circle.last + 2]
         last = circle.last + 1 if at_once and len(here) == 2 and here[0] == here[1] else circle.last
         at = left(("turn", "waypoint"), [requirements.waypoint(i) for i in range(circle.first, last + 1)])
         for k, _ in at:
             kept[k] = None
         if at:
-            kept[at[0][0]] = _loiter(requirements, aligned, circle, [item for _, item in at])
+            kept[at[0][0]] = _loiter_finding(requirements, aligned, circle, [item for _, item in at])
         legs = [requirements.leg(leg) for leg in range(circle.first, circle.last)]
         for rule in ("slope", "speed", "clearance", "corridor"):
             mine = left((rule,), legs)
             if at_once and any(item.ok is not None for _, item in mine):
-                # Left before it came to the others: what was flown there is judged on these.
+                # The loiter was left before the other legs: only the flown ones are judged.
                 for k, item in mine:
                     kept[k] = item if item.ok is not None else None
                 mine = [one for one in mine if one[1].ok is not None]
@@ -114,7 +114,7 @@ def fold_loiters(
 def end_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge before a flight what stands beside the end of a mission where its autopilot circles; a flight goes around.
+    """Judge before a flight the hazards near the end of a mission where its autopilot loiters.
 
     aligned: not read.
     """
@@ -137,7 +137,7 @@ def end_findings(
     ]
 
 
-def _loiter(
+def _loiter_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, circle: Circle, at: list[Finding]
 ) -> Finding:
     inner = slice(circle.first, circle.last + 1)
@@ -146,19 +146,23 @@ def _loiter(
     bad = [item for item in at if item.ok is False]
     at_middle = requirements.setup.autopilot.loiter_rules.at_middle
     if at_middle:
-        missed = not _is_own(requirements, circle) if aligned is None else not _came_to(requirements, aligned, circle)
+        missed = (
+            not _uses_parameter_radius(requirements, circle)
+            if aligned is None
+            else not _reached(requirements, aligned, circle)
+        )
         bad = bad if missed else []
     faults = _too_small(requirements, circle, tightest) if known else []
-    own = _is_own(requirements, circle)
+    own = _uses_parameter_radius(requirements, circle)
     facts = [f"{circle.turns:.2f} turns with {circle.radius:.0f} m"]
     open_text, name = "", requirements.setup.autopilot.loiter_rules.radius_name
     if own and faults and math.isfinite(tightest):
-        # What its parameter makes too tight it flies wider, as it does at the end of a return.
+        # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
         bank = _bank_held(requirements, circle, tightest, at)
         if bank <= requirements.limits.max_bank + BANK_TOLERANCE + 1e-9:
             facts.append(f"{name} asks for less than the {tightest:.0f} m of the bank limit: flown wider")
             faults = []
-            open_text = "" if aligned is not None else _in_the_way(requirements, circle, tightest)
+            open_text = "" if aligned is not None else _hazards_text(requirements, circle, tightest)
         else:
             facts.append(f"{name}, held with {math.degrees(bank):.0f}° of bank")
     if aligned is not None and bad:
@@ -166,8 +170,8 @@ def _loiter(
     elif bad and not faults:
         first = bad[0]
         text, placed = f"{place_text(first.place)}: {first.reason}", first.place == requirements.waypoint(circle.first)
-        faults.append(Message(text, _bare(first.place), placed))
-    radii = np.zeros(0) if aligned is None else _radii_flown(aligned, circle)
+        faults.append(Message(text, _corner_text(first.place), placed))
+    radii = np.zeros(0) if aligned is None else _flown_radii(aligned, circle)
     mean = float(radii.mean()) if radii.size else math.nan
     if radii.size:
         facts.append(f"flown with {radii.min():.1f} to {radii.max():.1f} m")
@@ -198,8 +202,11 @@ def _loiter(
     )
 
 
-def _radii_flown(aligned: AlignedTrack, circle: Circle) -> Floats:
-    """Distances from a circle's middle from its first corner to its last, (n,) m; none where it was not flown to it."""
+def _flown_radii(aligned: AlignedTrack, circle: Circle) -> Floats:
+    """Return distances from a loiter's center from first to last corner, (n,) m.
+
+    Empty if not flown to its end.
+    """
     first, last = int(aligned.rows[circle.first]), int(aligned.rows[circle.last])
     if not aligned.passed[circle.last] or last <= first:
         return np.zeros(0)
@@ -207,17 +214,20 @@ def _radii_flown(aligned: AlignedTrack, circle: Circle) -> Floats:
     return np.asarray(np.hypot(off[:, 0], off[:, 1]))
 
 
-def _is_own(requirements: RouteRequirements, circle: Circle) -> bool:
-    """Whether a circle's radius is that of the autopilot's parameter, for want of one that it reads in the item."""
+def _uses_parameter_radius(requirements: RouteRequirements, circle: Circle) -> bool:
+    """Return True if a loiter's radius is the autopilot's parameter.
+
+    The item then states none that the autopilot reads.
+    """
     rules, seq = requirements.setup.autopilot.loiter_rules, int(requirements.setup.route.items[circle.first])
     asked = next((loiter_of(item) for item in requirements.setup.mission.items if item.seq == seq), None)
     return rules.lines_up and rules.radius != 0.0 and asked is not None and rules.radius_of(asked) == 0.0
 
 
 def _bank_held(requirements: RouteRequirements, circle: Circle, tightest: float, at: list[Finding]) -> float:
-    """Bank that a circle tighter than the bank limit's (m) was held with, rad: the largest mean over a second.
+    """Return the bank with which a loiter tighter than the bank limit's radius (m) was held, rad.
 
-    Of the route alone, and where none was measured, that which holding it takes, within the autopilot's limit.
+    The largest mean over a second.  Without a flight or a measurement, the bank needed to hold it, up to the autopilot's limit.
     """
     measured = [fact.value for item in at for fact in item.facts if fact.what == "bank"]
     if measured:
@@ -226,8 +236,8 @@ def _bank_held(requirements: RouteRequirements, circle: Circle, tightest: float,
     return min(requirements.setup.autopilot.bank_limit, needed)
 
 
-def _in_the_way(requirements: RouteRequirements, circle: Circle, tightest: float) -> str:
-    """What a circle that is flown wider than it is drawn could come too near to, in words; "" for nothing."""
+def _hazards_text(requirements: RouteRequirements, circle: Circle, tightest: float) -> str:
+    """Return the hazards too close to a loiter that is flown wider than drawn, in words; "" for none."""
     heights = requirements.points[circle.first : circle.last + 1, 2]
     reach = SWING * tightest
     found = within_reach(requirements, circle.middle, float(heights.min()), float(heights.max()), reach)
@@ -237,15 +247,18 @@ def _in_the_way(requirements: RouteRequirements, circle: Circle, tightest: float
     return f"{near}, {', '.join(found)}: only a flight tells where it is"
 
 
-def _came_to(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:
-    """Whether the flight came to a circle: whoever leaves it when its time is over may come to none of its corners."""
+def _reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:
+    """Return True if the flight reached a loiter.
+
+    A flight that leaves it when its time is over may miss all corners.
+    """
     away, _ = approaches(aligned.track.position, circle.middle)
     early = requirements.setup.autopilot.turn_distance(math.pi, float(requirements.points[circle.first, 2]))
     return bool(away.min() <= circle.radius + early + PASS)
 
 
 def _too_small(requirements: RouteRequirements, circle: Circle, tightest: float) -> list[Message]:
-    """What is wrong with a circle smaller than the bank limit's (m)."""
+    """Return a fault if a loiter is smaller than the bank limit's radius (m)."""
     if circle.radius >= tightest - RADIUS_TOLERANCE:
         return []
     speed, bank = float(requirements.route.airspeed[circle.first]), math.degrees(requirements.limits.max_bank)
@@ -256,15 +269,15 @@ def _too_small(requirements: RouteRequirements, circle: Circle, tightest: float)
 
 
 def _not_held(circle: Circle, bad: list[Finding]) -> Message:
-    """How many corners were not held, and the worst of them."""
+    """Return the number of corners that were not held, and the worst of them."""
     worst = min(bad, key=badness)
     corners = len({item.place for item in bad})
     count = f"{corners} of {circle.last - circle.first + 1} corners not held, as "
-    return Message(f"{count}{place_text(worst.place)}: {worst.reason}", f"{count}{_bare(worst.place)}")
+    return Message(f"{count}{place_text(worst.place)}: {worst.reason}", f"{count}{_corner_text(worst.place)}")
 
 
-def _bare(corner: Place) -> str:
-    """A corner as a headline names it, without the item that all of its loiter's corners share."""
+def _corner_text(corner: Place) -> str:
+    """Return a corner's name for a headline, without the item that all corners of its loiter share."""
     return place_text(replace(corner, item=None))
 
 

@@ -1,4 +1,4 @@
-"""The rule of loss of control, `departure`: numbers that are none, extreme bank, too slow to fly, or ground contact."""
+"""The `departure` rule on loss of control: bad numbers, extreme bank, low airspeed, ground contact."""
 
 import math
 
@@ -20,14 +20,14 @@ Floats = NDArray[np.float64]
 def departure_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding of a flight: numbers that are none, extreme bank, too slow to fly, or ground contact."""
+    """Judge a flight for bad numbers, extreme bank, too low airspeed, or ground contact."""
     if geometric:
         return []
     if aligned is None:
         return [make_finding("departure", FLIGHT, ok=None, reason="no usable rows", unit="deg")]
     track = aligned.track
     bank = np.abs(track.attitude[:, ROLL].astype(np.float64))
-    most, slow = _most(bank), _too_slow(requirements, aligned)
+    most, slow = _largest(bank), _too_slow(requirements, aligned)
     faults = []
     if aligned.bad_rows:
         faults.append(
@@ -46,7 +46,7 @@ def departure_findings(
                 f", {aligned.where(k, float(aligned.low_at[k]))}",
             )
         )
-    least = -_most(-track.airspeed.astype(np.float64))
+    least = -_largest(-track.airspeed.astype(np.float64))
     known = [] if math.isnan(most) else [f"bank at most {math.degrees(most):.0f}°"]
     known += [] if math.isnan(least) else [f"airspeed at least {least:.1f} m/s"]
     steady = ", ".join(known) or "no ground contact; neither bank nor airspeed is known"
@@ -68,14 +68,14 @@ def departure_findings(
     ]
 
 
-def _most(values: Floats) -> float:
-    """The largest number; NaN where there is none."""
+def _largest(values: Floats) -> float:
+    """Return the largest finite number, or NaN if there is none."""
     finite = values[np.isfinite(values)]
     return float(finite.max()) if finite.size else math.nan
 
 
 def _too_slow(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Message]:
-    """That the aircraft was too slow to fly; nothing of one that is not known."""
+    """Return a fault if the aircraft was too slow to fly; empty for an unknown aircraft."""
     source = requirements.setup.source
     if source is not None and not source.aircraft_known:
         return []
@@ -93,7 +93,7 @@ def _time_text(time: float) -> str:
 
 
 def _slowest(requirements: RouteRequirements, up: Floats) -> Floats:
-    """Airspeed below which the aircraft is taken to have stopped flying, at each height."""
+    """Return the airspeed below which the aircraft is considered out of flight, at each altitude."""
     if requirements.setup.aircraft == "aerosonde":
         return np.full(up.shape, SLOWEST)
     envelope = requirements.setup.envelope

@@ -1,12 +1,12 @@
-"""The mission rule: what PX4's feasibility checker would refuse, by the names of its checks.
+"""The mission rule: items that PX4's feasibility checker would refuse, by the names of its checks.
 
-After `FeasibilityChecker` and `MissionFeasibilityChecker` of PX4's navigator for a fixed wing, with the parameters that
-PX4 is flown with: NAV_ACC_RAD, FW_LND_ANG, MIS_TKO_LAND_REQ (its fixed wings ask for a landing by default: 2), and
-MIS_DIST_1WP 10 km.  These are PX4's own limits and say nothing of the aircraft: what PX4 alone refuses is named, and
-fails only where PX4 is to fly; the landing that it asks for by default only where a person's file of parameters says
-so, for most missions have none and it is one parameter to change.  Whoever flies, a command that neither PX4 nor
-ArduPlane takes fails, and a route beyond the mission's own fence.  Latitude, longitude, frames and counts that are none
-were refused when the file was read.
+After `FeasibilityChecker` and `MissionFeasibilityChecker` of PX4's navigator for a fixed wing, with the parameters of
+PX4: NAV_ACC_RAD, FW_LND_ANG, MIS_TKO_LAND_REQ (its fixed-wing default requires a landing: 2), and MIS_DIST_1WP 10 km.
+These are PX4's own limits and say nothing about the aircraft: items that PX4 alone refuses are reported, and fail only
+if PX4 is to fly.  The landing that PX4 requires by default fails only if the user's parameter file requires it, because
+most missions have none and it takes one parameter to change that.  A command that neither PX4 nor ArduPlane supports
+fails for any autopilot, and so does a route beyond the mission's own fence.  Invalid latitudes, longitudes, frames and
+counts were refused when the file was read.
 """
 
 import itertools
@@ -50,41 +50,41 @@ C = Command
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """One finding a check: the first item at fault, or that there is none."""
+    """Judge each check: one finding with the first item at fault, or without a fault."""
     mission, origin, limits = setup.mission, setup.scenario.origin, setup.autopilot.mission_checks
     checks = (
         ("checkMissionItemValidity", _validity(mission)),
         ("checkTakeoff", _takeoff(mission, limits)),
         ("checkFixedWingLanding", _landing(mission)),
         ("checkFixedWindLandApproach", _approach(mission, origin, limits)),
-        ("checkTakeoffLandAvailable", _available(mission, limits, setup.autopilot.refuses)),
-        ("checkDistanceToFirstWaypoint", _first_distance(mission, origin)),
+        ("checkTakeoffLandAvailable", _takeoff_landing_required(mission, limits, setup.autopilot.refuses)),
+        ("checkDistanceToFirstWaypoint", _distance_to_first(mission, origin)),
         ("checkDistancesBetweenWaypoints", _distances(mission, origin)),
         ("checkIfBelowHomeAltitude", _below_home(mission)),
         ("checkGeofence", _fence(setup)),
     )
     refuses = setup.autopilot.refuses
     found = [_finding(name, list(remarks), refuses) for name, remarks in checks]
-    # No autopilot has a name for these: they are what of a mission is not judged.
+    # No autopilot has a name for these checks: they report the parts of a mission that are not judged.
     return [
         *found,
-        *_refused_by_arduplane(setup),
-        *([_unjoined(setup)] if setup.route.unjoined else []),
-        *_not_flown(setup),
+        *_arduplane_refusals(setup),
+        *([_unjoined_finding(setup)] if setup.route.unjoined else []),
+        *_unflown_findings(setup),
     ]
 
 
-# What a check remarks: the verdict on it, the item (None: the whole mission), and why.  PX4's refusal is a verdict only
-# where PX4 is to fly.
+# Remark of a check: its verdict, the item (None: the whole mission), and the reason.  PX4's refusal is a verdict only
+# if PX4 is to fly.
 REFUSED: Literal["refused"] = "refused"
 _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
 
 
 def _finding(check: str, said: list[_Remark], refuses: bool) -> Finding:
-    """One finding of what a check said.  refuses: whether whoever flies refuses what PX4 does."""
+    """Return one finding for a check's remarks.  refuses: True if the autopilot refuses what PX4 does."""
     verdict = False if refuses else None
     remarks = [(verdict if ok == REFUSED else ok, item, why) for ok, item, why in said]
-    # A failure comes first, then what PX4 refuses, then what is only remarked.
+    # A failure comes first, then PX4's refusals, then mere remarks.
     remarks.sort(key=lambda one: {False: 0, None: 1, True: 2}[one[0]])
     ok, item, why = remarks[0] if remarks else (True, None, "nothing to object to")
     first = why if isinstance(why, Message) else message(why)
@@ -101,8 +101,8 @@ def _finding(check: str, said: list[_Remark], refuses: bool) -> Finding:
     )
 
 
-def _refused_by_arduplane(setup: FlightSetup) -> list[Finding]:
-    """Return a finding of the items that ArduPlane refuses at the upload and PX4 takes, if ArduPlane flies."""
+def _arduplane_refusals(setup: FlightSetup) -> list[Finding]:
+    """Return a finding on the items that ArduPlane refuses at upload but PX4 accepts, if ArduPlane flies."""
     refused = [
         item
         for item in setup.mission.items
@@ -126,10 +126,10 @@ def _refused_by_arduplane(setup: FlightSetup) -> list[Finding]:
     ]
 
 
-def _unjoined(setup: FlightSetup) -> Finding:
-    """That an autopilot flies where the route does not: to a place inside a circle, or about another middle.
+def _unjoined_finding(setup: FlightSetup) -> Finding:
+    """Report that an autopilot leaves the route: to a place inside a loiter, or about another center.
 
-    Of an imported flight it is no fault, and left open: `logs.verdict.rules.completion_rule.imported_completion`.
+    For an imported flight this is no fault, and undecided: `logs.verdict.rules.completion_rule.imported_completion`.
     """
     first, *others = setup.route.unjoined
     who = setup.autopilot.title
@@ -151,7 +151,7 @@ def _unjoined(setup: FlightSetup) -> Finding:
     )
 
 
-def _not_flown(setup: FlightSetup) -> Iterator[Finding]:
+def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
     """Return a finding for each item and setting that changes the flight path and is not flown."""
     left = [(one.item, one.text) for one in setup.route.open_items]
     if not setup.autopilot.follows_ground:
@@ -159,7 +159,7 @@ def _not_flown(setup: FlightSetup) -> Iterator[Finding]:
         why = f"its height above terrain is not followed along the leg by {setup.autopilot.title} as it is flown here"
         left += [(seq, why) for seq in held]
     if setup.scenario.returns is not None:
-        # Returns from anywhere on the route are judged to the mission's home alone.
+        # Returns from anywhere on the route are judged only to the mission's home.
         left += [
             (item.seq, f"{command_name(item.command)}: returns are judged to the mission's home alone")
             for item in setup.mission.items
@@ -180,8 +180,8 @@ def _not_flown(setup: FlightSetup) -> Iterator[Finding]:
         )
 
 
-def _positions(mission: Mission) -> list[MissionItem]:
-    """Items that PX4 flies to."""
+def _flown_items(mission: Mission) -> list[MissionItem]:
+    """Return the items that PX4 flies to."""
     return [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
 
 
@@ -211,8 +211,8 @@ def _validity(mission: Mission) -> Iterator[_Remark]:
         yield REFUSED, mission.items[0].seq, "starts with landing"
 
 
-def _over_home(mission: Mission, item: MissionItem) -> float:
-    """Height of an item over home, m; NaN where it is not known."""
+def _height_above_home(mission: Mission, item: MissionItem) -> float:
+    """Return an item's height above home, m; NaN if unknown."""
     if item.frame in OVER_HOME | OVER_TERRAIN:
         return item.alt
     return item.alt - mission.home.alt if mission.home is not None else math.nan
@@ -222,7 +222,7 @@ def _takeoff(mission: Mission, limits: MissionChecks) -> Iterator[_Remark]:
     placed = False
     for item in mission.items:
         if item.command in TAKEOFFS:
-            height = _over_home(mission, item)
+            height = _height_above_home(mission, item)
             if height - PX4_TAKEOFF_BUFFER < limits.acceptance:
                 least, radius = limits.acceptance + PX4_TAKEOFF_BUFFER, f"NAV_ACC_RAD {limits.acceptance:g} m"
                 low = message(
@@ -255,14 +255,14 @@ def _approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) -> Ite
     for before, item in zip(mission.items, mission.items[1:], strict=False):
         if item.command != C.NAV_LAND or before.command not in PLACES | TAKEOFFS or not before.has_position:
             continue
-        rise = _over_home(mission, before) - _over_home(mission, item)
+        rise = _height_above_home(mission, before) - _height_above_home(mission, item)
         if math.isnan(rise):
             yield None, item.seq, "the heights of landing and approach are not known over one another"
             continue
         if rise <= 0.0:
             yield REFUSED, item.seq, "the approach waypoint must be above the landing point"
             continue
-        run = _apart(before, item, origin)
+        run = _distance_between(before, item, origin)
         if before.command == C.NAV_LOITER_TO_ALT:
             radius = 0.0 if math.isnan(before.params[1]) else abs(before.params[1])
             if run <= radius:
@@ -278,31 +278,31 @@ def _approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) -> Ite
             yield REFUSED, item.seq, steep
 
 
-def _available(mission: Mission, limits: MissionChecks, refuses: bool) -> Iterator[_Remark]:
+def _takeoff_landing_required(mission: Mission, limits: MissionChecks, refuses: bool) -> Iterator[_Remark]:
     lack = missing_ends_text(mission, limits)
     if not lack:
         yield True, None, "takeoff and landing are as MIS_TKO_LAND_REQ asks for them"
     elif limits.stated:
         yield REFUSED, None, lack
     else:
-        # One parameter, of which nothing is known: no verdict, and of no interest to who flies something else.
+        # A single parameter of unknown value: no verdict, and irrelevant for another autopilot.
         yield None if refuses else True, None, lack
 
 
-def _apart(a: MissionItem, b: MissionItem, origin: GeoOrigin) -> float:
+def _distance_between(a: MissionItem, b: MissionItem, origin: GeoOrigin) -> float:
     east, north = to_map(origin, [a.lat_deg, b.lat_deg], [a.lon_deg, b.lon_deg])
     return float(math.hypot(float(np.diff(east)[0]), float(np.diff(north)[0])))
 
 
-def _first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    places = _positions(mission)
+def _distance_to_first(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
+    places = _flown_items(mission)
     if mission.home is None or not places:
         yield True, None, "no home, so no distance to the first waypoint"
         return
     home = MissionItem(0, int(C.NAV_WAYPOINT), 0, (0.0,) * 4, mission.home.lat_deg, mission.home.lon_deg, 0.0)
-    away = _apart(home, places[0], origin)
+    away = _distance_between(home, places[0], origin)
     if not away < PX4_FIRST_WAYPOINT:
-        # A warning, in the releases whose law is flown here.
+        # A warning in the releases whose control law is simulated here.
         yield (
             None,
             places[0].seq,
@@ -311,7 +311,7 @@ def _first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 
 
 def _gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """A condition gate at the place of the waypoint before or after it."""
+    """Yield a remark on a condition gate at the place of the waypoint before or after it."""
     places = [
         item
         for item in mission.items
@@ -319,13 +319,13 @@ def _gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     ]
     for before, after in itertools.pairwise(places):
         gates = C.CONDITION_GATE in (before.command, after.command)
-        if gates and _apart(before, after, origin) < PX4_GATE_APART:
+        if gates and _distance_between(before, after, origin) < PX4_GATE_APART:
             yield REFUSED, after.seq, "distance between waypoint and gate too close"
 
 
 def _distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     yield from _gates(mission, origin)
-    places = _positions(mission)
+    places = _flown_items(mission)
     if len(places) < 2:
         return
     east, north = to_map(origin, [item.lat_deg for item in places], [item.lon_deg for item in places])
@@ -337,12 +337,12 @@ def _distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 
 
 def _below_home(mission: Mission) -> Iterator[_Remark]:
-    for item in _positions(mission):
+    for item in _flown_items(mission):
         if item.frame in OVER_HOME and mission.home is None:
             reason = "the file has no home, and heights over it: PX4 refuses them until the vehicle has one"
             yield None, item.seq, reason
             return
-        if _over_home(mission, item) < 0.0:
+        if _height_above_home(mission, item) < 0.0:
             yield True, item.seq, f"waypoint {item.seq} below home: a warning"
 
 

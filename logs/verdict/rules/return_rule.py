@@ -1,8 +1,8 @@
 """The return rule: where a return to launch goes, and how far it was flown.
 
-A mission says no more than that the aircraft is to return.  The way back is the autopilot's: it owes no corridor, no
-waypoint and no slope to anybody, and what stands for it in the route is not judged for style.  Ground, threats, zones,
-area, speed, stall and energy are judged on it as on every other leg.
+A mission only states that the aircraft is to return.  The path back is the autopilot's choice: no corridor, waypoint or
+slope is required of it, and its stand-in in the route is not judged for accuracy.  Ground, threats, zones, area, speed,
+stall and energy are judged on it as on every other leg.
 """
 
 import math
@@ -30,37 +30,38 @@ from logs.verdict.rule import Rule
 from world.errors import MissionError
 from world.scenario_tables import ReturnDemand
 
-# Returns that are flown where all are required to be safe: one a second, and no more than this, 2 ms each.
+# Largest number of returns that are simulated if all have to be safe: one a second up to this, 2 ms each.
 _MAX_RETURNS = 3000
-# A log's rows begin and end up to a second before and after its circle does, rad: 26 m/s on 260 m.
-_PART_OF_A_TICK = 0.1
+# Angle by which a logged loiter may fall short of a full lap, rad: rows may miss a second at either end (26 m/s, 260
+# m).
+_LAP_TOLERANCE_RAD = 0.1
 # Rules that hold a flight to its legs.
-_OF_LEGS = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
+_LEG_RULES = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
 
 
 def return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Where a planned return to launch goes and how, and whether that of an imported flight got to its end.
+    """Judge where a planned return to launch goes, and whether an imported flight completed its return.
 
-    How planfly's own flights ended is known beside their track: `flown_return_findings` judges them.
+    The end of planfly's own flights is known from outside their track: `flown_return_findings` judges them.
     """
     if geometric:
-        asked = _required(requirements, partial(planned_starts, requirements.setup))
+        asked = _requirement_findings(requirements, partial(planned_starts, requirements.setup))
         return _finding(requirements, None, "not flown yet") + asked
     if requirements.setup.source is None:
         return []
     passed = aligned is not None and bool(aligned.passed[-1])
     lands = requirements.setup.route.return_until <= requirements.legs
-    return _flown(requirements, passed and (lands or (aligned is not None and circled(requirements, aligned))))
+    return _flown_finding(requirements, passed and (lands or (aligned is not None and circled(requirements, aligned))))
 
 
 def flown_return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
 ) -> list[Finding]:
-    """Where a flown return to launch goes and how, and whether it got there.
+    """Judge where a flown return to launch goes and how, and whether it got there.
 
-    ended: "completed", which is no sooner than it has circled, or what stopped it.  log_complete: told by completion.
+    ended: "completed", which is after its loiter, or the reason for its end.  log_complete: reported by completion.
     """
     arrived = aligned is not None and bool(aligned.passed[-1]) and ended == "completed"
     why = "" if ended == "completed" else f": {ended}"
@@ -68,13 +69,13 @@ def flown_return_findings(
     starts = partial(planned_starts, requirements.setup)
     if track is not None:
         starts = partial(flown_starts, requirements.setup, track)
-    return _flown(requirements, arrived, why) + _required(requirements, starts)
+    return _flown_finding(requirements, arrived, why) + _requirement_findings(requirements, starts)
 
 
-def _required(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:
-    """Whether what the scenario requires of returns and of glides holds from all of the way; nothing where it does not.
+def _requirement_findings(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:
+    """Judge the scenario's requirements on returns and glides from all of the path; may be empty.
 
-    starts: makes them, so many seconds apart.
+    starts: makes the starts of returns, at an interval in s.
     """
     setup = requirements.setup
     asked = setup.scenario.returns
@@ -86,15 +87,15 @@ def _required(requirements: RouteRequirements, starts: Callable[[float], ReturnS
         world, begun = return_world(setup), starts(every)
         found = [judge(world, begun, every) for judge in demands]
     except MissionError as error:
-        # Without a home nothing returns; what could be glided to is not known.
+        # Without a home nothing returns; what a glide could reach is not known.
         found = [_Answer(False if "rtl" in asked.require else None, str(error), _METHOD)]
     results = {one.ok for one in found}
     ok = False if False in results else None if None in results else True
-    # What fails, or else what is not known, is said first.
+    # Failures come first, then what is not known.
     found.sort(key=lambda one: (one.ok is not False, one.ok is not None))
     reason, method = "; ".join(one.reason for one in found), "; ".join(one.method for one in found)
     method = f"from every {every:.0f} s of the way, {method}"
-    # A verdict that asks for them is not given without them.
+    # A verdict that requires them is undecided without them.
     faults, check = ([Message(reason, _NOT_KNOWN)], UNKNOWN_RETURN) if ok is None else ([], "")
     return [
         make_finding(
@@ -108,23 +109,23 @@ _NOT_KNOWN = "whether the aircraft gets home as the scenario requires is not kno
 
 
 class _Answer(NamedTuple):
-    """Whether a demand is met, None where that is not known; why; and how it was judged."""
+    """Answer to a requirement: whether it is met, or None if unknown; the reason; and how it was judged."""
 
     ok: bool | None
     reason: str
     method: str
 
 
-def _rtl(world: ReturnWorld, starts: ReturnStarts, every: float) -> _Answer:
-    """Whether every return to launch is safe."""
+def _judge_rtl(world: ReturnWorld, starts: ReturnStarts, every: float) -> _Answer:
+    """Judge whether every return to launch is safe."""
     returns = judge_returns(world, starts, every)
     return _Answer(None if returns.undecided else returns.safe, headline(returns), _METHOD)
 
 
-def _glide(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer:
-    """Whether the engine may stop anywhere: a glide leads home, to a rally point, a landing place or flat ground.
+def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer:
+    """Judge whether a glide from anywhere reaches home, a rally point, a landing place or flat ground.
 
-    Lower than the least height above ground an aircraft takes off or lands, and comes down straight ahead.
+    Below the least height above ground an aircraft takes off or lands, and descends straight ahead.
     """
     low = heights_above_ground(world, starts) < world.limit
     glides = judge_glides(world, starts.at(np.flatnonzero(~low)))
@@ -133,14 +134,17 @@ def _glide(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer:
     return _Answer(glides.somewhere, reason, f"glides that keep {MARGIN:.0f} m above ground")
 
 
-# The go-around has a rule of its own.
-_DEMANDS: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _Answer]] = {"rtl": _rtl, "glide": _glide}
+# The go-around has its own rule.
+_DEMANDS: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _Answer]] = {
+    "rtl": _judge_rtl,
+    "glide": _judge_glides,
+}
 
 
 def circled(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
-    """Whether a track has been at its return's circle for as long as that is flown, and all around it, at its height.
+    """Return True if a track was at its return loiter for its duration, all around it, at its altitude.
 
-    From when it had come there, near its middle and at its height, as for a simulated flight
+    The time starts when it is there, near the center and at the altitude, as for a simulated flight
     (`flight.simulation.tick.end_return`).
     """
     end = requirements.setup.route.return_to
@@ -148,24 +152,24 @@ def circled(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
         return False
     track = aligned.track
     east, north, up = (track.position - (end.east, end.north, end.up)).T
-    # True radii grow with height as the square of true airspeed.
+    # True radii grow with altitude as the square of true airspeed.
     wide = WIDER * abs(end.radius) * true_by_equivalent(end.up) ** 2
     there = (np.hypot(east, north) < max(NEAR, wide)) & (np.abs(up) < AT_HEIGHT)
     if not there.any():
         return False
     first = int(np.argmax(there))
     bearing = np.unwrap(np.arctan2(east[first:], north[first:]))
-    around = abs(float(bearing[-1] - bearing[0])) >= 2.0 * math.pi - _PART_OF_A_TICK
+    around = abs(float(bearing[-1] - bearing[0])) >= 2.0 * math.pi - _LAP_TOLERANCE_RAD
     return around and float(track.time[-1] - track.time[first]) >= UNLIMITED
 
 
-def _flown(requirements: RouteRequirements, arrived: bool, why: str = "") -> list[Finding]:
+def _flown_finding(requirements: RouteRequirements, arrived: bool, why: str = "") -> list[Finding]:
     outcome = "flown to its end" if arrived else f"the flight did not get to its end{why}"
     return _finding(requirements, True if arrived else None, outcome)
 
 
 def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> list[Finding]:
-    """One finding of a mission that ends with a return to launch."""
+    """Return one finding for a mission that ends with a return to launch."""
     route = requirements.setup.route
     if route.return_from < 0:
         return []
@@ -175,7 +179,7 @@ def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> 
     other = next((note.partition(": ")[2] for note in route.notes if RETURN_NOT_FLOWN_ON in note), "")
     faults = []
     if other and requirements.setup.source is None:
-        # What was flown instead says nothing of where the autopilot goes.
+        # What was flown instead does not show where the autopilot goes.
         faults, ok = [message("where the return leads to is not known", f": {other}")], None
         reason = f"{faults[0].text}; {reason}"
     return [
@@ -194,14 +198,14 @@ def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> 
 def without_style(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Findings without those that hold the way back to its drawing.
+    """Return findings without those that hold the return to its drawn path.
 
-    findings: with that of the return itself.
+    findings: including the finding on the return itself.
     """
     first = requirements.setup.route.return_from
     if first < 0:
         return tuple(findings)
-    # The corner where the way back begins is of its making, the waypoint there is the mission's.
+    # The corner where the return begins belongs to it; the waypoint there belongs to the mission.
     until = requirements.setup.route.return_until
     legs = range(first, min(until, requirements.legs))
     places = {requirements.waypoint(i) for i in range(first + 1, min(until, requirements.legs + 1))}
@@ -210,11 +214,11 @@ def without_style(
     kept = [
         item
         for item in findings
-        if not ((item.rule in _OF_LEGS and item.place in places) or (item.rule == "turn" and item.place == corner))
+        if not ((item.rule in _LEG_RULES and item.place in places) or (item.rule == "turn" and item.place == corner))
     ]
     if aligned is None or not any(item.rule == "return" and item.place != FLIGHT and item.ok for item in kept):
         return tuple(kept)
-    # All of the way is on some leg, and one that is drawn and has nothing of it was none.
+    # All of the return is on some leg; a drawn leg without any part of it was not flown.
     unflown = {requirements.leg(i) for i in legs if not aligned.flew(i)}
     return tuple(item for item in kept if item.ok is not None or item.place not in unflown)
 

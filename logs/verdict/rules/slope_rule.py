@@ -1,4 +1,4 @@
-"""The slope rule: can each leg be climbed or descended at its speed, and was it."""
+"""The slope rule: whether each leg can be climbed or descended at its speed, and whether it was."""
 
 import math
 
@@ -34,7 +34,7 @@ def slope_findings(
     """Judge each leg; ``geometric`` judges the route alone, without a flight."""
     out = []
     for leg in range(requirements.legs):
-        # Where nothing was flown nobody knows where a climb that cannot be flown leads.
+        # Without a flight the path of a climb that cannot be flown is unknown.
         if requirements.leads_around(leg) and not geometric:
             continue
         measure = None if geometric else SlopeMeasure()
@@ -63,10 +63,10 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
     method = "route"
     if measure is not None:
         facts += _flown_facts(measure)
-        weak = _too_weak(requirements, leg, measure)
-        shown = _shown(requirements, leg, measure, limit, weak)
-        # Where the aircraft's limits count they judge, and what it showed that it cannot; how closely it kept to the
-        # leg is reported beside it.
+        weak = _performance_faults(requirements, leg, measure)
+        shown = _flown_faults(requirements, leg, measure, limit, weak)
+        # If the aircraft's limits apply, they judge, and so does a shown lack of performance; the height error on the
+        # leg is only reported.
         facts += [one.brief for one in shown] if requirements.envelope else []
         faults += weak if requirements.envelope else [*shown, *weak]
         fit = measure.slope
@@ -76,7 +76,7 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
             method = f"{how} over {fit.run:.0f} m"
     ok: bool | None = not faults
     check = ""
-    if not faults and (doubt := _in_doubt(requirements, leg)):
+    if not faults and (doubt := _uncertainty_text(requirements, leg)):
         ok, check = None, UNKNOWN_AIRCRAFT
         facts.insert(0, doubt)
     if measure is not None and not measure.finished:
@@ -98,14 +98,14 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
         unit="deg",
         method=method,
         check=check,
-        facts=_measured(requirements, leg, measure),
+        facts=_measured_facts(requirements, leg, measure),
     )
 
 
-def _in_doubt(requirements: RouteRequirements, leg: int) -> str:
-    """Why a slope within every limit is undecided, where the aircraft's is not known for certain; "" if it is decided.
+def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
+    """Return why a slope within all limits is undecided by an uncertain aircraft, "" if it is decided.
 
-    A scenario's tighter limit says nothing of what the aircraft can.
+    A tighter limit of the scenario says nothing about the aircraft's ability.
     """
     planned, envelope = float(requirements.slopes[leg]), requirements.setup.envelope
     limits, certain, verb, off = (
@@ -114,7 +114,7 @@ def _in_doubt(requirements: RouteRequirements, leg: int) -> str:
         else (requirements.dive, requirements.sure_dive, "falls", envelope.descent_sd)
     )
     limit, sure = float(limits[leg]), float(certain[leg])
-    # Judged without the aircraft's limits, there is none to be in doubt of.
+    # When judged without the aircraft's limits, there is no limit to be in doubt.
     if abs(planned) <= max(LEVEL, sure) or not sure < limit < math.inf:
         return ""
     asked, known, give = (math.degrees(angle) for angle in (abs(planned), limit, off))
@@ -122,7 +122,7 @@ def _in_doubt(requirements: RouteRequirements, leg: int) -> str:
 
 
 def _steep_arc(requirements: RouteRequirements, leg: int) -> list[Message]:
-    """What the fly-by arc at a leg's end asks beyond the aircraft's limit."""
+    """Return a fault if the fly-by arc at a leg's end is beyond the aircraft's limit."""
     found = steep_arc(requirements, leg)
     if found is None:
         return []
@@ -147,18 +147,18 @@ def _in_envelope(requirements: RouteRequirements, leg: int) -> bool:
 
 
 def _too_steep(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
-    """What is wrong with a planned slope: what the leg asks for, and what the limit is there."""
+    """Return the fault of a planned slope: what the leg needs, and the limit there."""
     planned = float(requirements.slopes[leg])
     verb = "climbs" if planned >= 0.0 else "falls"
     asks = f"{math.degrees(abs(planned)):.1f}° for {_distance(float(requirements.runs[leg]))}"
     if requirements.runs[leg] < ON_THE_SPOT:
         rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
         asks = f"{round(rise, 1):g} m on the spot, {math.degrees(abs(planned)):.1f}°"
-    return message(f"leg {leg} {verb} {asks}", f"; {_allowed(requirements, leg, limit, source)}", placed=True)
+    return message(f"leg {leg} {verb} {asks}", f"; {_limit_text(requirements, leg, limit, source)}", placed=True)
 
 
-def _allowed(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
-    """The limit on a leg's slope, in words, and what the wind has to do with it."""
+def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
+    """Return the limit on a leg's slope, in words, and the effect of the wind on it."""
     if source == "scenario":
         return f"the scenario allows {math.degrees(limit):.1f}°"
     speed = float(requirements.route.airspeed[leg])
@@ -183,12 +183,12 @@ def _distance(metres: float) -> str:
 
 
 def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str], ...]:
-    """Either throttle limit: its name, s at it, m/s off the command meanwhile, and which way."""
+    """Return for either throttle limit: name, s at it, m/s off the command meanwhile, and direction."""
     return (("full", measure.at_full, measure.slow, "slow"), ("idle", measure.at_idle, measure.fast, "fast"))
 
 
 def _flown_facts(measure: SlopeMeasure) -> list[str]:
-    """How the leg was flown, in words."""
+    """Describe how the leg was flown, in words."""
     facts = []
     if measure.slope is not None:
         facts.append(f"flown {math.degrees(measure.slope.value):+.2f}°")
@@ -198,8 +198,8 @@ def _flown_facts(measure: SlopeMeasure) -> list[str]:
     return facts
 
 
-def _measured(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> list[Fact]:
-    """How the leg was flown, in numbers."""
+def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> list[Fact]:
+    """Return the measured leg in numbers."""
     if measure is None:
         return []
     facts = [] if measure.height_error is None else [Fact("height error", measure.height_error, "m")]
@@ -211,10 +211,13 @@ def _measured(requirements: RouteRequirements, leg: int, measure: SlopeMeasure |
     return facts
 
 
-def _shown(
+def _flown_faults(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, weak: list[Message]
 ) -> list[Message]:
-    """How the leg as flown differs from the leg as planned.  weak: what it shows that the aircraft cannot."""
+    """Return how the flown leg differs from the planned leg.
+
+    weak: faults that show a lack of performance.
+    """
     faults = []
     planned = float(requirements.slopes[leg])
     sign = 1.0 if planned >= 0.0 else -1.0
@@ -233,19 +236,19 @@ def _shown(
     covered = not weak and measure.ability is not None and measure.ability.covers(planned)
     most = OFF_SPEED + GUST_SHARE * W20[requirements.setup.scenario.wind.turbulence]
     for name, held, off, way in _throttle_times(measure):
-        # Where the aircraft showed that it can more than the leg asks, the air took the speed.
+        # If the aircraft showed more ability than the leg needs, the air caused the speed error.
         if held >= SATURATED and off > most and not (covered and name == _throttle(planned)):
             faults.append(message(f"throttle at {name} for {held:.0f} s and {off:.1f} m/s too {way}"))
     return faults
 
 
 def _throttle(planned: float) -> str:
-    """Name of the throttle limit that a slope may come to."""
+    """Return the name of the throttle limit that a slope may reach."""
     return "full" if planned >= 0.0 else "idle"
 
 
-def _too_weak(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
-    """What is wrong where the aircraft showed a smaller limit than the leg asks for."""
+def _performance_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
+    """Return a fault if the aircraft showed a smaller limit than the leg needs."""
     ability, planned = measure.ability, float(requirements.slopes[leg])
     if ability is None or abs(planned) <= LEVEL:
         return []

@@ -1,4 +1,4 @@
-"""The speed rule: each leg's commanded airspeed in the envelope, room to take it up, and what was flown."""
+"""The speed rule: commanded airspeed in the envelope, room to take it up, and the flown airspeed."""
 
 import math
 from typing import NamedTuple
@@ -36,13 +36,13 @@ Floats = NDArray[np.float64]
 def speed_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each leg's commanded airspeed by the envelope, and say what was flown."""
+    """Judge each leg's commanded airspeed by the envelope, and report the flown airspeed."""
     found = [_speed(requirements, aligned, leg, geometric) for leg in range(requirements.legs)]
-    return [*_misfits(requirements), *found] if geometric else found
+    return [*_parameter_findings(requirements), *found] if geometric else found
 
 
-def _misfits(requirements: RouteRequirements) -> list[Finding]:
-    """Leave open whether an airspeed is held with parameters that contradict one another: only a flight tells."""
+def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
+    """Report contradictory speed parameters as undecided: only a flight shows which airspeed is held."""
     parameters = requirements.setup.autopilot.parameters
     if parameters is None or not parameters.misfits or requirements.setup.source is not None:
         return []
@@ -53,12 +53,12 @@ def _misfits(requirements: RouteRequirements) -> list[Finding]:
 
 def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
     commanded = float(requirements.route.airspeed[leg])
-    slowest, fastest, faults = _commanded(requirements, leg, commanded)
+    slowest, fastest, faults = _level_flight_range(requirements, leg, commanded)
     asked = float(requirements.setup.route.airspeed[leg])
     true = "" if asked == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
     said = [f"{asked:.1f} m/s{true} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"]
-    said += _not_taken(requirements, asked)
-    said += _no_room(requirements, leg, commanded)
+    said += _speed_range_notes(requirements, asked)
+    said += _short_leg_notes(requirements, leg, commanded)
     margin = min(commanded - slowest, fastest - commanded)
     limit = slowest if commanded - slowest <= fastest - commanded else fastest
     mean, tolerance, facts, source = math.nan, 0.0, [], "aircraft"
@@ -66,21 +66,21 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
     if unflown:
         said.append("the leg was not flown")
     elif aligned is not None:
-        measured = _measured(requirements, aligned, leg)
+        measured = _measure_leg(requirements, aligned, leg)
         if measured is None:
-            mean = _reached(aligned, leg, commanded)
+            mean = _nearest_mean(aligned, leg, commanded)
             said.append(f"{mean:.1f} m/s reached; the leg is too short to hold it")
         else:
             mean, tolerance, least = measured
             off = abs(mean - commanded)
             said.append(f"flown {mean:.2f} m/s on average, {least:.1f} m/s at the slowest second")
-            if off > OFF_MEAN + tolerance and not _by_the_air(requirements, aligned, leg, mean - commanded):
+            if off > OFF_MEAN + tolerance and not _caused_by_air(requirements, aligned, leg, mean - commanded):
                 text = f"flown {mean:.1f} m/s on average, {off:.1f} m/s off the commanded {commanded:.1f} m/s"
                 said += [text] if requirements.envelope else []
                 faults += [] if requirements.envelope else [message(text)]
-            wanted = _taken(requirements, leg)
-            if not faults and (unheld := _unheld(requirements, aligned, leg, wanted)):
-                # The speed that was flown is judged by its command, and no longer the command by the envelope.
+            wanted = _flown_command(requirements, leg)
+            if not faults and (unheld := _find_held_speed(requirements, aligned, leg, wanted)):
+                # From here on the flown speed is judged by its command, no longer the command by the envelope.
                 mean, allowed, source = unheld.speed, unheld.allowed, "mission"
                 limit = wanted + math.copysign(allowed, mean - wanted)
                 margin, tolerance = allowed - abs(mean - wanted), unheld.tolerance
@@ -88,7 +88,7 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
         facts.append(Fact("speed error", mean - commanded, "m/s"))
     ok: bool | None = not faults
     check = ""
-    if not faults and (doubt := _in_doubt(requirements, leg, commanded, fastest)):
+    if not faults and (doubt := _uncertainty_text(requirements, leg, commanded, fastest)):
         ok, check = None, UNKNOWN_AIRCRAFT
         said.insert(0, doubt)
     return make_finding(
@@ -110,8 +110,8 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
     )
 
 
-def _taken(requirements: RouteRequirements, leg: int) -> float:
-    """Return the airspeed that the autopilot takes on a leg, m/s: another one where it does not take the command."""
+def _flown_command(requirements: RouteRequirements, leg: int) -> float:
+    """Return the airspeed that the autopilot flies on a leg, m/s; it may differ from the command."""
     setup = requirements.setup
     asked = setup.route.airspeed
     taken = setup.autopilot.speeds_flown(asked, setup.airspeed)
@@ -119,9 +119,9 @@ def _taken(requirements: RouteRequirements, leg: int) -> float:
 
 
 class _HeldSpeed(NamedTuple):
-    """An airspeed that was held instead of the commanded one, m/s.
+    """Airspeed that was held instead of the commanded airspeed, m/s.
 
-    allowed: how far from the command it may be.  tolerance: what gusts may add to that.
+    allowed: tolerated difference from the command.  tolerance: what gusts may add to it.
     """
 
     speed: float
@@ -129,11 +129,14 @@ class _HeldSpeed(NamedTuple):
     tolerance: float
 
 
-def _unheld(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, commanded: float) -> _HeldSpeed | None:
-    """Return the airspeed over the second half of a leg's steady rows if it is far from its command; None if not.
+def _find_held_speed(
+    requirements: RouteRequirements, aligned: AlignedTrack, leg: int, commanded: float
+) -> _HeldSpeed | None:
+    """Return the airspeed that a leg settled at if it is far from its command, or None.
 
-    In the first half an autopilot may still take up its speed.  Where the leg is too steep for the aircraft, the rule
-    `slope` names the cause.  Of an imported flight it is a fact only: its airspeed sensor may be as far off.
+    The mean over the second half of its steady rows.  In the first half an autopilot may still take up its speed.  If
+    the leg is too steep for the aircraft, the slope rule names the cause.  For an imported flight it is a fact only:
+    its airspeed sensor may have the same error.
     """
     if abs(float(requirements.slopes[leg])) > slope_limit(requirements, leg)[0] + PLAN_TOLERANCE:
         return None
@@ -145,15 +148,15 @@ def _unheld(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, co
     speed = float(aligned.track.airspeed[half : rows.stop].astype(np.float64).mean())
     off, allowed = speed - commanded, max(OFF_MEAN, HELD_SPEED_SHARE * commanded)
     tolerance = _gust_spread(requirements, float(aligned.track.time[rows.stop - 1] - aligned.track.time[half]))
-    if abs(off) <= allowed + tolerance or _by_the_air(requirements, aligned, leg, off):
+    if abs(off) <= allowed + tolerance or _caused_by_air(requirements, aligned, leg, off):
         return None
     if off > 0.0 and float(requirements.ground_speed[leg]) < LEAST_GROUND_SPEED:
         return None
     return _HeldSpeed(speed, allowed, tolerance)
 
 
-def _in_doubt(requirements: RouteRequirements, leg: int, commanded: float, fastest: float) -> str:
-    """Why a speed of level flight is undecided, where the aircraft's fastest is not certain; "" if it is decided."""
+def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: float, fastest: float) -> str:
+    """Return why a level-flight speed is undecided if the aircraft's maximum is uncertain; "" if decided."""
     envelope = requirements.setup.envelope
     if not envelope.fastest_sd:
         return ""
@@ -165,8 +168,8 @@ def _in_doubt(requirements: RouteRequirements, leg: int, commanded: float, faste
     return f"{commanded:.1f} m/s commanded, and {says} give or take {envelope.fastest_sd:.1f} m/s"
 
 
-def _not_taken(requirements: RouteRequirements, asked: float) -> list[str]:
-    """That the autopilot does not take a commanded speed (m/s)."""
+def _speed_range_notes(requirements: RouteRequirements, asked: float) -> list[str]:
+    """Return a note if the autopilot does not accept a commanded speed (m/s)."""
     autopilot = requirements.setup.autopilot
     limits = autopilot.speed_limits
     if limits is None or limits.min <= asked <= limits.max:
@@ -176,12 +179,12 @@ def _not_taken(requirements: RouteRequirements, asked: float) -> list[str]:
     return [f"{autopilot.title} takes speeds from {taken}, and {does}"]
 
 
-def _no_room(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
-    """What a leg has no room for: to take up its speed at `ACCELERATION` from that of the leg before."""
+def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
+    """Return a note if a leg is too short to take up its speed at `ACCELERATION` from the leg before."""
     before = float(requirements.route.airspeed[leg - 1]) if leg else commanded
     change, run = commanded - before, float(requirements.runs[leg])
     seconds = abs(change) / ACCELERATION
-    # Along the ground at the mean of both speeds, in the wind along the leg.
+    # Distance at the mean of both speeds over ground, in the wind along the leg.
     start = float(requirements.ground_speed[leg]) - change
     needs = seconds * (start + 0.5 * change)
     if not needs > run or not start > 0.0:
@@ -195,33 +198,35 @@ def _no_room(requirements: RouteRequirements, leg: int, commanded: float) -> lis
     ]
 
 
-def _reached(aligned: AlignedTrack, leg: int, commanded: float) -> float:
-    """The mean airspeed over a second of a leg, or over all of a shorter one, that came nearest to its command, m/s."""
+def _nearest_mean(aligned: AlignedTrack, leg: int, commanded: float) -> float:
+    """Return the mean airspeed over a second of a leg, or over a shorter leg, nearest to its command, m/s."""
     means = _second_means(aligned, aligned.leg_rows(leg))
     return float(means[np.argmin(np.abs(means - commanded))])
 
 
 def _second_means(aligned: AlignedTrack, rows: slice) -> Floats:
-    """Mean airspeeds over each second of some rows, or over all of fewer, m/s."""
+    """Return the mean airspeeds over each second of some rows, or over all of fewer rows, m/s."""
     speed = aligned.track.airspeed[rows].astype(np.float64)
     width = max(1, min(speed.size, round(1.0 / aligned.tick)))
     total = np.concatenate([[0.0], np.cumsum(speed)])
     return np.asarray((total[width:] - total[:-width]) / width)
 
 
-def _by_the_air(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, off: float) -> bool:
-    """Whether rising or sinking air took the speed on a leg where the aircraft showed that it can more than it asks."""
+def _caused_by_air(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, off: float) -> bool:
+    """Return True if vertical air motion caused the speed error and the aircraft showed enough ability."""
     if off * requirements.slopes[leg] >= 0.0:
         return False
     ability = measure_ability(requirements, aligned, leg)
     return ability is not None and ability.covers(float(requirements.slopes[leg]))
 
 
-def _commanded(requirements: RouteRequirements, leg: int, commanded: float) -> tuple[float, float, list[Message]]:
-    """Level-flight speeds that hold all along a leg, and what is wrong with the commanded one."""
+def _level_flight_range(
+    requirements: RouteRequirements, leg: int, commanded: float
+) -> tuple[float, float, list[Message]]:
+    """Return the range of level-flight speeds all along a leg, and faults of the commanded speed."""
     heights = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     speeds = [requirements.setup.envelope.level_speeds(up) for up in heights]
-    # Without level flight at one height there is none all along the leg: NaN stays.
+    # Without level flight at one altitude there is none all along the leg: NaN remains.
     slowest, fastest = float(np.max([low for low, _ in speeds])), float(np.min([high for _, high in speeds]))
     faults = []
     if math.isnan(requirements.ground_speed[leg]):
@@ -238,8 +243,11 @@ def _commanded(requirements: RouteRequirements, leg: int, commanded: float) -> t
     return slowest, fastest, faults
 
 
-def _measured(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> tuple[float, float, float] | None:
-    """Mean airspeed of a flown leg, what gusts and a new slope may add to it, and the least mean over a second, m/s."""
+def _measure_leg(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> tuple[float, float, float] | None:
+    """Return a leg's mean airspeed, its tolerance, and its least mean over a second, m/s.
+
+    The tolerance is for gusts and a new slope.
+    """
     rows = steady_rows(requirements, aligned, leg)
     time = aligned.track.time[rows]
     if time.size < 2 or time[-1] - time[0] < min(SATURATED, MEASURED_SHARE * float(requirements.runs[leg]) / SLOWEST):

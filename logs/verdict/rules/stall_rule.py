@@ -1,9 +1,9 @@
-"""The stall rule: airspeed against the stall in a bank, which the load factor raises.
+"""The stall rule: airspeed against the stall speed in a bank, which the load factor raises.
 
-A level turn with bank b takes a lift of n = 1 / cos b weights, and the slowest speed that carries it is the slowest of
-level flight times the root of n (Beard and McLain, *Small Unmanned Aircraft*, section 5.1; any text on the level turn).
-All speeds are true airspeeds at the height where they are flown, as those of the envelope are: that the air is thinner
-there is in them, and an autopilot's equivalent airspeeds are taken to true ones first.
+A level turn with bank b needs a lift of n = 1 / cos b weights, and the slowest speed that carries it is the slowest
+level speed times the root of n (Beard and McLain, *Small Unmanned Aircraft*, section 5.1; any text on the level turn).
+All speeds are true airspeeds at the altitude where they are flown, like the envelope's speeds: they include the lower
+air density there, and an autopilot's equivalent airspeeds are converted to true airspeeds first.
 """
 
 import math
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class _Margin:
-    """An airspeed, the stall in this bank (rad) and in level flight; m/s true."""
+    """Airspeed, the stall speed in this bank (rad) and in level flight; m/s true."""
 
     speed: float
     stall: float
@@ -38,22 +38,22 @@ class _Margin:
 
     @property
     def left(self) -> float:
-        """How far above the stall, m/s."""
+        """Margin above the stall, m/s."""
         return self.speed - self.stall
 
 
 def stall_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding: the least margin of airspeed over the stall in a bank; none for a route without a turn.
+    """Judge the least margin of airspeed over the stall in a bank; empty for a route without a turn.
 
-    A route that asks for a bank in which its speed is below the stall fails in flight too, at whatever speed it was
-    flown: an autopilot that did not take the speed, or banked less, does not make it one to fly.
+    A route that needs a bank in which its speed is below the stall fails in flight too, at whatever speed it was flown:
+    an autopilot that did not accept the speed, or banked less, does not make the route flyable.
     """
     planned = _planned(requirements)
     if geometric:
         return planned
-    # Without an envelope there is nothing to hold a flight against.
+    # Without an envelope there is no limit to compare a flight with.
     if aligned is None or not requirements.envelope:
         return []
     return [found for found in planned if found.ok is False] or _flown(requirements, aligned)
@@ -77,15 +77,15 @@ def _planned(requirements: RouteRequirements) -> list[Finding]:
 
 
 def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float:
-    """Bank (rad) that the turn at a waypoint takes at an airspeed (m/s) of its two legs, at most the bank limit.
+    """Return the bank (rad) that a waypoint's turn takes at an airspeed (m/s), up to the limit.
 
-    On an arc of radius R it is atan(v^2 / (g R)) at the highest ground speed v on the way, and a turn that is over
-    before the aircraft has rolled into it takes no more than it can roll to.
+    On an arc of radius R it is atan(v^2 / (g R)) at the highest ground speed v on it, and a turn that is over before
+    the aircraft has rolled into it takes no more bank than it can roll to.
     """
     turn, radius, limit = abs(float(requirements.turns[i])), float(requirements.radius[i]), requirements.limits.max_bank
     if turn <= 0.0 or not math.isfinite(radius):
         return 0.0
-    # The bank limit's radius is that of the faster leg's ground speed.
+    # The bank limit's radius belongs to the ground speed of the faster leg.
     fastest = math.sqrt(float(requirements.tightest[i]) * GRAVITY * math.tan(limit))
     slower = max(requirements.route.airspeed[i - 1 : i + 1]) - speed
     bank = math.atan(max(0.0, fastest - slower) ** 2 / (GRAVITY * radius))
@@ -95,7 +95,10 @@ def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float
 
 
 def level_stall(requirements: RouteRequirements, up: float) -> float:
-    """Slowest level flight at a height (m AMSL), m/s true: the elevator is at its stop there."""
+    """Return the slowest level flight at an altitude (m AMSL), m/s true.
+
+    The elevator is at its stop there.
+    """
     return requirements.setup.envelope.level_speeds(up)[0]
 
 
@@ -107,7 +110,7 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Findi
     up = _means(track.position[:, 2], width)
     envelope = requirements.setup.envelope
     level = np.interp(up, envelope.amsl, envelope.level_speed_min)
-    # What the wing carried, or what it had to carry for the height to be held in a turn within the bank limit.
+    # Load that the wing carried, or that it needed to hold altitude in a turn within the bank limit.
     # An imported log may hold no load factor.
     carried = np.fmax(load, 1.0 / np.cos(np.minimum(bank, requirements.limits.max_bank)))
     stall = level * np.sqrt(np.maximum(carried, 0.0))
@@ -121,7 +124,7 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Findi
 
 
 def _means(values: NDArray[np.floating], width: int) -> Floats:
-    """Mean over each window of so many rows."""
+    """Return the mean over each window of this many rows."""
     total = np.concatenate([[0.0], np.cumsum(values.astype(np.float64))])
     return np.asarray((total[width:] - total[:-width]) / width)
 

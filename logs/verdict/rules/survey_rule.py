@@ -1,7 +1,7 @@
-"""The survey rule: how much of each photo line is flown so that its photos can be used, and how much these overlap.
+"""The survey rule: how much of each photo line is flown usably, and how much its photos overlap.
 
-A survey's turn-arounds are the autopilot's own business, as long as they keep ground, threats and zones: the rules of
-turns, slopes, waypoints and, unless somebody stated a corridor, of the corridor leave them alone.
+The autopilot decides a survey's turn-arounds, as long as they keep clear of ground, threats and zones: the turn, slope
+and waypoint rules ignore them, and so does the corridor rule unless a corridor is stated.
 """
 
 import math
@@ -18,14 +18,17 @@ from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.tolerances import PHOTO_BANK, PHOTO_OVERLAP, PHOTO_SHARE, PLAN_TOLERANCE, TURN_AROUND_RADII
 
-# The checks of photos' overlap.
+# Checks of the photos' overlap.
 FRONT, SIDE = "front overlap", "side overlap"
 
 
 def survey_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each photo line; ``geometric``: by what the turns at its ends leave of it, and each turn-around's room."""
+    """Judge each photo line.
+
+    ``geometric``: by the part that its end turns leave of it, and each turn-around's room.
+    """
     out = []
     for survey in requirements.surveys:
         for number, line in enumerate(survey.lines, 1):
@@ -41,7 +44,7 @@ def survey_findings(
 
 
 def _overlaps(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
-    """Judge the least overlap of a survey's photos along its lines and across, where its camera is known."""
+    """Judge the least overlap of a survey's photos along its lines and across, if its camera is known."""
     measure = measure_overlap(requirements, aligned, survey)
     if measure is None:
         return []
@@ -78,7 +81,7 @@ def _overlaps(requirements: RouteRequirements, aligned: AlignedTrack | None, sur
 
 
 def overlap_text(measure: OverlapMeasure, check: str) -> str:
-    """How much photos overlap along lines or across them at the least, where, and what was asked for."""
+    """Describe the least overlap of photos along lines or across them, its place, and the requirement."""
     if check == FRONT:
         share, asked = measure.front, measure.camera.front
         soonest = f" apart, one each {measure.camera.interval:g} s" if measure.slow else " apart"
@@ -94,9 +97,9 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
 
 
 def _turn_arounds(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
-    """Turn-arounds too tight to be flown as drawn that have something within reach: only a flight tells their way.
+    """Report turn-arounds too tight to be flown as drawn with hazards in reach.
 
-    So are the turns onto the first line and off the last.
+    Only a flight shows their path.  This includes the turns onto the first line and off the last.
     """
     out = []
     ways = survey.ways_onto_lines()
@@ -120,12 +123,12 @@ def _turn_arounds(requirements: RouteRequirements, survey: Survey) -> list[Findi
 
 
 def _too_tight(requirements: RouteRequirements, i: int) -> bool:
-    """Whether a corner has no room for its turn."""
+    """Return True if a corner has no room for its turn."""
     turn = abs(float(requirements.turns[i]))
     return 0 < i < requirements.legs and turn > turn_limit(requirements, i)[0] + PLAN_TOLERANCE
 
 
-def _named(requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int) -> str:
+def _line_text(requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int) -> str:
     items = [int(requirements.setup.route.items[i]) for i in (line.first, line.last)]
     return f"photo line {number} of {len(survey.lines)} (items {items[0]} to {items[1]})"
 
@@ -135,16 +138,16 @@ def _place(requirements: RouteRequirements, line: PhotoLine) -> Place:
 
 
 def _planned(requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int) -> Finding:
-    """What the turns at a line's ends leave of it, where the line ends at its turns."""
+    """Judge the part of a line that the turns at its ends leave, if the line ends at its turns."""
     length = float(requirements.runs[line.first : line.last].sum())
-    # What the turns before and behind take of the leads does not matter.
+    # The part that the turns use of the leads before and after the line does not matter.
     lead_in = float(requirements.runs[line.begins : line.first].sum())
     lead_out = float(requirements.runs[line.last : line.ends].sum())
-    cut_in = _taken(float(requirements.after[line.begins]) - lead_in, length)
-    cut_out = _taken(_left_early(requirements, line) - lead_out, length)
+    cut_in = _clipped(float(requirements.after[line.begins]) - lead_in, length)
+    cut_out = _clipped(_turn_lead(requirements, line) - lead_out, length)
     share = max(0.0, length - cut_in - cut_out) / length
     ok = share >= PHOTO_SHARE
-    name = _named(requirements, survey, line, number)
+    name = _line_text(requirements, survey, line, number)
     faults, facts = [], [f"{name}: its turns leave {100.0 * share:.0f} % of its {length:.0f} m straight"]
     if not ok:
         faults.append(
@@ -156,8 +159,8 @@ def _planned(requirements: RouteRequirements, survey: Survey, line: PhotoLine, n
     return _finding(requirements, line, ok, faults, facts, share, geometric=True)
 
 
-def _left_early(requirements: RouteRequirements, line: PhotoLine) -> float:
-    """How far before the end of a line's straight run the turn there begins, m."""
+def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
+    """Return how far before the end of a line's straight run the turn there begins, m."""
     setup, last = requirements.setup, line.ends
     if setup.autopilot.follows_path or not 0 < last < requirements.legs:
         return float(requirements.before[last])
@@ -166,14 +169,14 @@ def _left_early(requirements: RouteRequirements, line: PhotoLine) -> float:
     return stated or setup.autopilot.turn_distance(turn, float(requirements.points[last, 2]))
 
 
-def _taken(metres: float, length: float) -> float:
+def _clipped(metres: float, length: float) -> float:
     return min(max(metres, 0.0), length) if math.isfinite(metres) else length
 
 
 def _flown(
     requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey, line: PhotoLine, number: int
 ) -> Finding:
-    name = _named(requirements, survey, line, number)
+    name = _line_text(requirements, survey, line, number)
     measure = None if aligned is None else measure_line(requirements, aligned, survey, line)
     if measure is None:
         return _finding(requirements, line, None, [], [f"{name}: not flown"], math.nan, geometric=False)
@@ -186,7 +189,7 @@ def _flown(
 
 
 def lost_text(measure: LineMeasure) -> str:
-    """What the lost parts of a line lack, the largest first; "" where next to nothing is lost."""
+    """Describe the defects of the lost parts of a line, the largest first; "" if next to nothing is lost."""
     lacks = {
         f"not along it within {measure.allowed_aside:.0f} m": measure.away,
         f"banked beyond {math.degrees(PHOTO_BANK):.0f}°": measure.banked,
@@ -198,7 +201,7 @@ def lost_text(measure: LineMeasure) -> str:
 
 
 def _fault(measure: LineMeasure, name: str) -> Message:
-    """How much of a line can be used, what the rest lacks, and how much of its ends is lost."""
+    """Describe the usable part of a line, the defects of the rest, and the lost length at its ends."""
     ends = f"; its first {measure.late:.0f} m and last {measure.early:.0f} m are lost"
     return message(
         f"{name}: {100.0 * measure.good:.0f} % of its {measure.length:.0f} m can be used",

@@ -1,9 +1,9 @@
-"""The take-off and landing rules: the climb from the ground to a mission's first place, and the approach to its last.
+"""The take-off and landing rules: the climb to a mission's first place, and its final approach.
 
-A flight begins and ends in the air, so that both are judged by the mission's places alone, whether it was flown or not.
+A flight begins and ends in the air, so both are judged by the mission's places alone, whether it was flown or not.
 An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper than it can climb
-is not judged: a climb-out of 30 degrees is what QGroundControl draws (its TakeoffMissionItem), and autopilots climb on.
-What of a mission's own take-off or landing is not judged leaves the verdict open.
+is not judged: QGroundControl draws a climb-out of 30 degrees (its TakeoffMissionItem), and autopilots climb on.
+Any part of a mission's own take-off or landing that is not judged leaves the verdict undecided.
 """
 
 import math
@@ -19,32 +19,32 @@ from logs.verdict.tolerances import PLAN_TOLERANCE
 from logs.verdict.wording import gentle_launch_text, place_text
 from world.airfield import Launch
 
-# How the flight does it instead.
-_ENDS = {"takeoff": "begins", "landing": "ends"}
+# Verb for how the flight replaces the phase.
+_VERBS = {"takeoff": "begins", "landing": "ends"}
 _TITLES = {"takeoff": "take-off", "landing": "landing"}
-# What is said of a slope beyond the limit.
-_BEYOND = {"takeoff": None, "landing": False}
+# Result for a slope beyond the limit.
+_RESULT_BEYOND_LIMIT = {"takeoff": None, "landing": False}
 
 
 def takeoff_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding of a mission with a take-off: the climb from the ground at home to where the item has its place.
+    """Judge the climb from the ground at home to the place of the take-off item, with one finding.
 
-    None of one that was flown, which the launch rule judges.
+    A flown take-off has no finding here: the launch rule judges it.
     """
     if requirements.ground is not None and requirements.ground.ways.take_off is not None:
         return []
     route, mission = requirements.setup.route, requirements.setup.mission
     items = [item for item in mission.items if item.command in TAKEOFFS]
     at = _waypoint_of(requirements, items[0].seq) if items else -1
-    # One in the air is a waypoint like any other.
+    # A take-off item in the air is a waypoint like any other.
     if at < 0 or (route.items[:at] >= 0).any():
         return []
     up, home = float(requirements.points[at, 2]), mission.home
     own = home is not None and (items[0].lat_deg, items[0].lon_deg) != (home.lat_deg, home.lon_deg)
     launch = requirements.setup.scenario.launch
-    if launch is not None and (held := _never_started(requirements, launch)):
+    if launch is not None and (held := _gentle_launch_findings(requirements, launch)):
         return held
     if launch is not None and (at == 0 or not own):
         # From the ground at home to the next place, on the launch course.
@@ -57,8 +57,11 @@ def takeoff_findings(
     return [_slope(requirements, "takeoff", 0, at, route.takeoff_ground, up)]
 
 
-def _never_started(requirements: RouteRequirements, launch: Launch) -> list[Finding]:
-    """A finding of a launch too gentle for the autopilot to start its motor by; nothing where it asks for none."""
+def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> list[Finding]:
+    """Return a finding if a launch is too gentle to start the motor.
+
+    Empty if the autopilot needs no acceleration.
+    """
     setup = requirements.setup
     trigger, found = setup.autopilot.launch_trigger, launch.acceleration(setup.slowest_launched)
     if trigger is None or found >= trigger[0]:
@@ -84,9 +87,9 @@ def _never_started(requirements: RouteRequirements, launch: Launch) -> list[Find
 def landing_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding of a mission with a landing: the descent from the last place before it to where it is.
+    """Judge the descent from the last place before a landing to the landing, with one finding.
 
-    None of one that was flown, which the touchdown rule judges.
+    A flown landing has no finding here: the touchdown rule judges it.
     """
     if requirements.ground is not None and requirements.ground.ways.approach is not None:
         return []
@@ -101,7 +104,7 @@ def landing_findings(
             reason = RETURN_NOT_FLOWN_ON
         end, flown_on = requirements.waypoint(requirements.legs), RETURN_NOT_FLOWN_ON in " ".join(route.notes)
         if route.return_from >= 0 and not flown_on:
-            # The return ends the mission; nobody flies to the landing behind it.
+            # The return ends the mission; the landing after it is not flown.
             return [make_finding("landing", end, ok=None, reason=reason, unit="deg")]
         return [_unjudged("landing", end, reason)]
     at, ground = found[-1], requirements.setup.route.landing_ground
@@ -109,13 +112,13 @@ def landing_findings(
 
 
 def _waypoint_of(requirements: RouteRequirements, seq: int) -> int:
-    """The last waypoint of a mission's item, -1 for none."""
+    """Return the last waypoint of a mission's item, or -1 if there is none."""
     found = [k for k, item in enumerate(requirements.setup.route.items) if int(item) == seq]
     return found[-1] if found else -1
 
 
 def _slope(requirements: RouteRequirements, rule: str, first: int, last: int, low: float, high: float) -> Finding:
-    """Judge the slope from the place of one waypoint to that of another, between two heights (m AMSL)."""
+    """Judge the slope from one waypoint's place to another's, between two altitudes (m AMSL)."""
     place = requirements.waypoint(last)
     run = float(requirements.runs[first:last].sum())
     if math.isnan(low) or math.isnan(high):
@@ -128,12 +131,12 @@ def _slope(requirements: RouteRequirements, rule: str, first: int, last: int, lo
     ways = requirements.setup.ground_ways
     flown = (ways.take_off if rule == "takeoff" else ways.approach) is not None
     reason = f"{text} of {math.degrees(limit):.1f}°"
-    reason += "" if flown else f"; not flown: the flight {_ENDS[rule]} in the air"
+    reason += "" if flown else f"; not flown: the flight {_VERBS[rule]} in the air"
     fault = message(
         f"the {_TITLES[rule]} {text}",
         f"; at most {math.degrees(limit):.1f}° can be flown at this speed and in this wind",
     )
-    ok = True if within else _BEYOND[rule]
+    ok = True if within else _RESULT_BEYOND_LIMIT[rule]
     return make_finding(
         rule,
         place,
@@ -152,13 +155,13 @@ def _slope(requirements: RouteRequirements, rule: str, first: int, last: int, lo
 
 
 def _unjudged(rule: str, place: Place, reason: str) -> Finding:
-    """Return a finding of a take-off or landing that is not judged, which leaves the verdict open."""
+    """Return a finding on a take-off or landing that is not judged, which leaves the verdict undecided."""
     fault = message(f"the {_TITLES[rule]} at {place_text(place)} is not judged")
     return make_finding(rule, place, ok=None, reason=reason, faults=[fault], unit="deg", check=GROUND_WAY)
 
 
 def _limit(requirements: RouteRequirements, leg: int, low: float, high: float, slope: float) -> tuple[float, str]:
-    """Steepest slope of this sign over the ground on a leg's course (rad), and whose it is."""
+    """Return the steepest slope of this sign over the ground on a leg's course (rad), and its source."""
     side, limits = (0 if slope >= 0.0 else 1), requirements.limits
     speed, course = float(requirements.route.airspeed[leg]), float(requirements.courses[leg])
     by_aircraft = min(limits.slopes(course, up, speed)[side] for up in (low, high))

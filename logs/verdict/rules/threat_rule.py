@@ -27,7 +27,7 @@ _METHOD = "time inside, exact on each segment"
 def threat_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each missile and radar sphere that plan or flight touches, or say that there is none."""
+    """Judge each missile and radar sphere that plan or flight touches, or report that there is none."""
     scenario = requirements.setup.scenario
     if scenario.external:
         reason = "the mission came without a scenario, so threats are not known"
@@ -53,15 +53,15 @@ def threat_findings(
                 visit = None if geometric else _visit(track, m)
                 place = Place(side, m, name=table.name or "")
                 where = "" if side == "radar" else _nearest_place(requirements, aligned, visit, float(radii[m]))
-                touched.append(_touched(place, _visit(plan, m), visit, float(radii[m]), where))
+                touched.append(_sphere_finding(place, _visit(plan, m), visit, float(radii[m]), where))
     if not any(item.place.kind == "missile" for item in touched):
         error = position_error(requirements.setup)
-        touched.insert(0, _untouched(len(threats), nearest, name, error, aligned is not None or geometric))
+        touched.insert(0, _no_entry_finding(len(threats), nearest, name, error, aligned is not None or geometric))
     return touched
 
 
 def _spheres(threats: Threats, side: Side) -> tuple[Floats, Floats]:
-    """Radii and scales of every threat's missile or radar, (m,) m each."""
+    """Return the radii and scales of every threat's missile or radar, (m,) m each."""
     if side == "missile":
         return threats.kill_radius, threats.kill_scale
     return threats.detection_radius, threats.detection_scale
@@ -69,7 +69,10 @@ def _spheres(threats: Threats, side: Side) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True, slots=True)
 class _Visit:
-    """How one sphere is met: s inside, exposure in s, m from its centre at the least and when; NaN where not flown."""
+    """Visit to one sphere; NaN if not flown.
+
+    inside, exposure, closest_time: s.  closest: least distance to its center, m.
+    """
 
     inside: float = math.nan
     exposure: float = math.nan
@@ -87,7 +90,10 @@ def _visit(visits: SphereVisits | None, m: int) -> _Visit:
 def _nearest_place(
     requirements: RouteRequirements, aligned: AlignedTrack | None, visit: _Visit | None, radius: float
 ) -> str:
-    """On which leg and where a flight inside a sphere (m) was nearest to its centre, in words; "" if not inside."""
+    """Return where a flight inside a sphere was nearest to its center, in words; "" if not inside.
+
+    radius: m.
+    """
     if aligned is None or visit is None or math.isnan(visit.closest_time) or visit.closest > radius:
         return ""
     time = aligned.track.time
@@ -96,8 +102,11 @@ def _nearest_place(
     return f" on {place_text_within(requirements.leg(aligned.leg_at(k)))} {aligned.where(k, fraction)}"
 
 
-def _untouched(count: int, nearest: float, name: str, error: float, judged: bool) -> Finding:
-    """No sphere is entered.  nearest: m outside that of the threat of this name.  error: of navigation, m."""
+def _no_entry_finding(count: int, nearest: float, name: str, error: float, judged: bool) -> Finding:
+    """Report that no sphere is entered.
+
+    nearest: m outside the named threat's sphere.  error: of navigation, m.
+    """
     reason = f"no missile sphere of {count} threats is entered" if count else "the scenario has no threats"
     facts = []
     if math.isfinite(nearest):
@@ -123,7 +132,7 @@ def _untouched(count: int, nearest: float, name: str, error: float, judged: bool
     )
 
 
-def _touched(place: Place, plan: _Visit, track: _Visit | None, radius: float, where: str) -> Finding:
+def _sphere_finding(place: Place, plan: _Visit, track: _Visit | None, radius: float, where: str) -> Finding:
     judged = plan if track is None else track
     missing = math.isnan(judged.closest)
     facts = f"planned {plan.inside:.1f} s inside {radius:.0f} m, exposure {plan.exposure:.3g} s"

@@ -1,10 +1,10 @@
-"""The touchdown rule: a landing that was flown, from the last waypoint to where the aircraft stands.
+"""The touchdown rule: a flown landing, from the last waypoint to where the aircraft stops.
 
-Judged are the height of the final above ground, what it enters, and where the aircraft touches down and comes to rest
-against the scenario's strip.  How fast it sinks towards the ground, which may rise before it, is stated: ArduPlane's
-law knows the glide to the flare, but not the last metres so well (`docs/measured.md`), so that a sink beyond all that
-was seen leaves the landing open, and none passes or fails it.  A landing that is not flown is judged by the landing and
-approach rules, by the mission's items.
+It judges the final's height above ground, the hazards that the final enters, and where the aircraft touches down and
+comes to rest on the scenario's strip.  The sink rate towards the ground, which may rise before the aircraft, is
+reported: the simulation of ArduPlane's law is accurate down to the flare, but less so in the last metres
+(`docs/measured.md`).  So a sink rate beyond all measured ones leaves the landing undecided, and no sink rate passes or
+fails it.  A landing that is not flown is judged by the landing and approach rules, from the mission's items.
 """
 
 import math
@@ -37,18 +37,18 @@ from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
-# Along this much of the strip about the touch-down the ground's slope is taken, m.
-_SLOPE_OVER = 10.0
+# Length of the strip about the touch-down over which the ground's slope is measured, m.
+_SLOPE_RUN_M = 10.0
 
 
 class _Landing(NamedTuple):
-    """A landing in numbers.
+    """Landing in numbers.
 
-    along, aside: of the touch-down, beyond the landing point and to the right of it, m.
-    touch, stop: how far along the strip beyond its middle, and aside of it, m.
-    left: of the strip beyond where it stands, m.
-    sink, towards: m/s at the touch-down, down and towards the ground, which rises or falls.
-    room: least height above ground of the final, m; inf for none, NaN where that is not known.
+    along, aside: position of the touch-down, beyond the landing point and to the right of it, m.
+    touch, stop: positions along the strip beyond its center, and to the side of it, m.
+    left: length of strip left beyond the stop, m.
+    sink, towards: sink rate at the touch-down, vertical and relative to the sloping ground, m/s.
+    room: least height above ground of the final, m; inf without a final, NaN if unknown.
     over: height of the landing point above the ground there, m.
     """
 
@@ -66,11 +66,11 @@ class _Landing(NamedTuple):
 def touchdown_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding of a landing that was flown, at the landing point; before the flight of a strip that is too short."""
+    """Judge a flown landing at its point; before the flight only a strip that is too short."""
     ground = requirements.ground
     if ground is None or ground.ways.approach is None:
         planned = requirements.setup.ground_ways.approach if geometric else None
-        return [] if planned is None else _foreseen(requirements.waypoint(planned.leg + 1), planned)
+        return [] if planned is None else _planned_findings(requirements.waypoint(planned.leg + 1), planned)
     approach = ground.ways.approach
     place = ground.whole.waypoint(approach.leg + 1)
     track, terrain = ground.landing, requirements.setup.scenario.terrain
@@ -83,31 +83,33 @@ def touchdown_findings(
         reason = "the ground at the landing point is not known"
         fault = message(f"the touchdown at {place_text(place)} is not judged: {reason}")
         return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY)]
-    k = _touched(track, terrain)
+    k = _touchdown_row(track, terrain)
     if k is None:
         fault = message("the aircraft did not touch down", f" at {_place_of(approach)}")
         return [make_finding("touchdown", place, ok=False, reason=fault.text, faults=[fault], unit="m")]
-    landing = _measured(requirements, track, terrain, approach, k)._replace(over=over)
-    faults = _amiss(approach, landing)
+    landing = _measure_landing(requirements, track, terrain, approach, k)._replace(over=over)
+    faults = _detect_faults(approach, landing)
     if entered := entered_by_way(requirements, track_way(track)):
         faults.append(message(f"the final enters {entered}"))
     gusts = requirements.setup.scenario.wind.turbulence != "none"
     return [_finding(place, approach, landing, faults, gusts=gusts)]
 
 
-def _foreseen(place: Place, approach: Approach) -> list[Finding]:
-    """What is known of a landing before it is flown: that its strip is too short for its touch-down to be judged."""
+def _planned_findings(place: Place, approach: Approach) -> list[Finding]:
+    """Return the finding known before a landing is flown: a strip too short to judge the touch-down."""
     found = _too_short(approach)
     reason = reason_of(found)
     return [make_finding("touchdown", place, ok=None, reason=reason, faults=found, check=GROUND_WAY)] if found else []
 
 
-def _measured(requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, k: int) -> _Landing:
-    """The numbers of a landing that touches down at a row, but for the height of its point."""
+def _measure_landing(
+    requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, k: int
+) -> _Landing:
+    """Measure a landing that touches down at a row, except the height of its point."""
     position = np.asarray(track.position, dtype=np.float64)
     along, aside = _pair(approach.place(position[k]))
     touch, stop = (_pair(approach.on_strip(position[row])) for row in (k, -1))
-    sink, towards = _sinks(track, terrain, approach, k)
+    sink, towards = _sink_rates(track, terrain, approach, k)
     return _Landing(
         along=along,
         aside=aside,
@@ -116,16 +118,16 @@ def _measured(requirements: RouteRequirements, track: Track, terrain: Terrain, a
         left=0.5 * approach.strip.length - stop[0],
         sink=sink,
         towards=towards,
-        room=_final_room(requirements, position, terrain, approach),
+        room=_final_clearance(requirements, position, terrain, approach),
     )
 
 
 def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[Message], *, gusts: bool) -> Finding:
-    """The finding: what fails, or else what is open, or else what is not known.
+    """Return the finding: faults, or else undecided parts, or else unknown ground.
 
-    gusts: whether the air is turbulent.
+    gusts: True if the air is turbulent.
     """
-    open_ = [] if faults else _left_open(approach, landing, gusts=gusts)
+    open_ = [] if faults else _undecided_messages(approach, landing, gusts=gusts)
     if not faults and not open_ and math.isnan(landing.room):
         open_ = [message("the ground below the final is not known")]
     said = faults or open_
@@ -135,7 +137,7 @@ def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[M
         "touchdown",
         place,
         ok=False if faults else None if open_ else True,
-        reason=reason_of(said, _described(approach, landing)),
+        reason=reason_of(said, _description(approach, landing)),
         faults=said,
         flown=farthest,
         limit=inside,
@@ -157,7 +159,7 @@ def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[M
 
 
 def _place_of(approach: Approach) -> str:
-    """The landing point in words."""
+    """Return the landing point in words."""
     return f"item {approach.item}"
 
 
@@ -165,33 +167,33 @@ def _pair(values: tuple[Floats, Floats]) -> tuple[float, float]:
     return float(values[0]), float(values[1])
 
 
-def _touched(track: Track, terrain: Terrain) -> int | None:
-    """The row at which the aircraft first stands as low over the ground as it does at rest; None for none."""
+def _touchdown_row(track: Track, terrain: Terrain) -> int | None:
+    """Return the first row at which the aircraft is as low above ground as at rest, or None."""
     if not len(track):
         return None
     position = np.asarray(track.position, dtype=np.float64)
     over = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
     speed = np.hypot(*np.asarray(track.velocity[:, :2], dtype=np.float64).T)
-    # It stands where it has come to rest; a flight that ended otherwise has not landed.
+    # The aircraft has landed only if it has come to rest.
     if not speed[-1] < 1.0:
         return None
     low = over <= over[-1] + TOUCHED
     return int(np.argmax(low)) if low.any() else None
 
 
-def _sinks(track: Track, terrain: Terrain, approach: Approach, k: int) -> tuple[float, float]:
-    """Sink just before the touch-down, and that towards the ground, which rises or falls along the landing, m/s."""
+def _sink_rates(track: Track, terrain: Terrain, approach: Approach, k: int) -> tuple[float, float]:
+    """Return the sink rate just before touch-down, and the rate relative to the sloping ground, m/s."""
     k = max(0, k - 2)
     east, north, up = (float(value) for value in track.velocity[k])
     here = np.asarray(track.position[k, :2], dtype=np.float64)
-    ahead = 0.5 * _SLOPE_OVER * np.array([math.sin(approach.course), math.cos(approach.course)])
-    rise = float(terrain.height(*(here + ahead)) - terrain.height(*(here - ahead))) / _SLOPE_OVER
+    ahead = 0.5 * _SLOPE_RUN_M * np.array([math.sin(approach.course), math.cos(approach.course)])
+    rise = float(terrain.height(*(here + ahead)) - terrain.height(*(here - ahead))) / _SLOPE_RUN_M
     over_ground = east * math.sin(approach.course) + north * math.cos(approach.course)
     return -up, -up + rise * over_ground
 
 
-def _final_room(requirements: RouteRequirements, position: Floats, terrain: Terrain, approach: Approach) -> float:
-    """Least height above ground until the flare may begin, or the aircraft may touch down: m, as of `_Landing.room`."""
+def _final_clearance(requirements: RouteRequirements, position: Floats, terrain: Terrain, approach: Approach) -> float:
+    """Return the least height above ground until flare or touch-down, m, as in `_Landing.room`."""
     up = float(approach.point[2])
     glide = requirements.setup.autopilot.landing_glide(approach.begin - up, approach.run, approach.tail_wind, up)
     flares = glide.flare_distance + max(0.0, ABOVE_FLARE - glide.flare_height) / glide.slope
@@ -203,10 +205,10 @@ def _final_room(requirements: RouteRequirements, position: Floats, terrain: Terr
     return float(low.min())
 
 
-def _amiss(approach: Approach, landing: _Landing) -> list[Message]:
-    """What of the landing is not on the strip, or not on the ground."""
+def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
+    """Return faults: parts of the landing off the strip, or a point off the ground."""
     half, side = 0.5 * approach.strip.length, 0.5 * approach.strip.width
-    # On a strip that leaves nothing of it, only what is off the strip by more than the error is known.
+    # On a strip shorter than the error, only a distance beyond the strip by more than the error is known.
     inside = half - TOUCH_ERROR if half > TOUCH_ERROR else half + TOUCH_ERROR
     touch, stop = landing.touch, landing.stop
     faults = []
@@ -229,15 +231,15 @@ def _amiss(approach: Approach, landing: _Landing) -> list[Message]:
 
 
 def _too_short(approach: Approach) -> list[Message]:
-    """That a strip is shorter than what the law's error allows."""
+    """Return a message if a strip is shorter than the error of the simulated law requires."""
     if approach.strip.length > 2.0 * TOUCH_ERROR:
         return []
     brief = f"the strip is {approach.strip.length:.0f} m long"
     return [message(brief, f"; a touch-down is known within {TOUCH_ERROR:.0f} m either way, which takes more")]
 
 
-def _left_open(approach: Approach, landing: _Landing, *, gusts: bool) -> list[Message]:
-    """What may be amiss with the landing, by what the law does not know so well."""
+def _undecided_messages(approach: Approach, landing: _Landing, *, gusts: bool) -> list[Message]:
+    """Return the undecided parts of a landing, due to the limited accuracy of the simulated law."""
     found = _too_short(approach)
     left = 0.5 * approach.strip.length - max(landing.touch[0], landing.stop[0])
     if gusts and left < GUST_TOUCH_ERROR and not found:
@@ -255,8 +257,8 @@ def _left_open(approach: Approach, landing: _Landing, *, gusts: bool) -> list[Me
     return found
 
 
-def _described(approach: Approach, landing: _Landing) -> list[str]:
-    """The landing in words."""
+def _description(approach: Approach, landing: _Landing) -> list[str]:
+    """Describe the landing in words."""
     before = "before" if landing.along < 0.0 else "beyond"
     known = [f"touches down {abs(landing.along):.0f} m {before} the landing point, {abs(landing.aside):.1f} m aside"]
     known.append(f"comes to rest with {landing.left:.0f} m of the strip left")

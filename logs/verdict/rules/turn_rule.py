@@ -1,4 +1,4 @@
-"""The turn rule: can each corner be turned, and was it."""
+"""The turn rule: whether each corner can be turned, and whether it was."""
 
 import math
 
@@ -49,7 +49,7 @@ def _judge(
 ) -> Finding:
     planned = abs(float(requirements.turns[i]))
     limit, source = turn_limit(requirements, i)
-    # Neighbours that want more than the legs have are at fault themselves: going straight on takes no room.
+    # Neighbours that need more than the legs have are at fault themselves: going straight on takes no room.
     limit = max(limit, 0.0)
     if requirements.runs[i - 1 : i + 1].min() < ON_THE_SPOT:
         reason = "a leg beside it goes straight up or down, which has no course to turn from or to"
@@ -69,8 +69,8 @@ def _judge(
     if measure is not None:
         angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE
         facts += _flown_facts(requirements, i, measure)
-        shown = _shown(requirements, i, measure, limit)
-        # Where the aircraft's limits count they judge; what the flight showed of them is reported beside it.
+        shown = _flown_faults(requirements, i, measure, limit)
+        # If the aircraft's limits apply, they judge; what the flight showed of them is only reported.
         facts += [one.brief for one in shown] if requirements.envelope else []
         faults += [] if requirements.envelope else shown
         method = "least-squares courses of both legs" if measure.fitted else "course change over the turn"
@@ -78,7 +78,7 @@ def _judge(
             method = "not flown"
     ok: bool | None = not faults
     if measure is not None and not measure.over:
-        facts.append(_not_over(requirements, i, measure, aligned))
+        facts.append(_unflown_reason(requirements, i, measure, aligned))
         ok = None if ok else False
     return make_finding(
         "turn",
@@ -94,12 +94,15 @@ def _judge(
         margin=math.degrees(limit - (planned if angle is None else angle)),
         unit="deg",
         method=method,
-        facts=_measured(measure),
+        facts=_measured_facts(measure),
     )
 
 
-def _not_over(requirements: RouteRequirements, i: int, measure: TurnMeasure, aligned: AlignedTrack | None) -> str:
-    """Why a turn was not flown: the flight ended before it, or the autopilot left a leg beside it at once."""
+def _unflown_reason(requirements: RouteRequirements, i: int, measure: TurnMeasure, aligned: AlignedTrack | None) -> str:
+    """Return why a turn was not flown.
+
+    The flight ended before it, or the autopilot skipped a neighbouring leg.
+    """
     if measure.corner is not None:
         return "its legs were not flown in turn"
     if aligned is None or int(aligned.track.leg.max()) < i:
@@ -115,7 +118,7 @@ def _not_over(requirements: RouteRequirements, i: int, measure: TurnMeasure, ali
 
 
 def _flown_over(requirements: RouteRequirements, i: int, turn: float) -> list[str]:
-    """That a waypoint is flown over because its arc would miss its acceptance, and what that takes."""
+    """Return a note if a waypoint is flown over because its arc would miss its acceptance radius."""
     radius, acceptance = float(requirements.radius[i]), float(requirements.setup.route.acceptance[i])
     if not requirements.setup.route.fly_over[i] or not acceptance or not math.isfinite(radius):
         return []
@@ -157,7 +160,7 @@ def _too_sharp(requirements: RouteRequirements, i: int, planned: float, limit: f
 
 
 def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[str]:
-    """How the turn was flown, in words."""
+    """Describe how the turn was flown, in words."""
     facts = []
     if measure.angle is not None and measure.tolerance is not None:
         facts.append(f"flown {math.degrees(measure.angle):.2f}°")
@@ -176,8 +179,8 @@ def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) 
     return facts
 
 
-def _measured(measure: TurnMeasure | None) -> list[Fact]:
-    """How the turn was flown, in numbers."""
+def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
+    """Return the measured turn in numbers."""
     if measure is None:
         return []
     bank = None if measure.held_bank is None else math.degrees(measure.held_bank)
@@ -191,14 +194,14 @@ def _measured(measure: TurnMeasure | None) -> list[Fact]:
     return [Fact(what, value, unit) for what, value, unit in numbers if value is not None]
 
 
-def _shown(requirements: RouteRequirements, i: int, measure: TurnMeasure, limit: float) -> list[Message]:
-    """What the turn as flown shows of a limit: more angle or bank than allowed, a tighter arc, a turn gone wide."""
+def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure, limit: float) -> list[Message]:
+    """Return faults of the flown turn: angle or bank beyond the limit, tighter arc, overshoot."""
     faults = []
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
         flown, most = math.degrees(measure.angle), math.degrees(limit)
         faults.append(message(f"flown course change {flown:.1f}° beyond {most:.1f}°"))
     max_bank = requirements.limits.max_bank + BANK_TOLERANCE
-    # The roll of a gust, or into a turn, is not the turn's: the mean over a second counts.
+    # Roll in a gust, or into a turn, is not the bank of the turn: the mean over a second applies.
     if measure.held_bank is not None and measure.held_bank > max_bank:
         held, most = math.degrees(measure.held_bank), math.degrees(max_bank)
         faults.append(message(f"bank {held:.1f}° beyond {most:.1f}°"))
@@ -216,16 +219,16 @@ def _shown(requirements: RouteRequirements, i: int, measure: TurnMeasure, limit:
 
 
 def _too_tight(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[Message]:
-    """What is wrong with a turn flown tighter than the bank limit's arc, by how closely it passed its waypoint.
+    """Return a fault if a turn was tighter than the bank limit's arc, by the distance from its waypoint.
 
-    Legs too short for their turn are joined by a tighter arc, and a flight that follows it has used bank that it does
-    not have, or slowed down.
+    Legs too short for their turn are joined by a tighter arc, and a flight that follows it has used more
+    bank than it has, or slowed down.
     """
     turn, setup = abs(float(requirements.turns[i])), requirements.setup
     tightest = float(requirements.tightest[i])
-    # Guidance's own limit: a corner sharper than it has no arc to be held to where its legs are short.
+    # Guidance's own limit: a sharper corner has no arc to follow if its legs are short.
     least = fly_by_offset(turn, tightest) if turn < SHARPEST_FLY_BY else math.inf
-    # Another's autopilot does not follow the arc, and passes the waypoint as closely as it likes.
+    # A real autopilot does not follow the arc, and may pass the waypoint at any distance.
     followed = setup.autopilot.keeps_to_arcs and setup.source is None and not setup.route.fly_over[i]
     if measure.passed is None or not math.isfinite(least) or not followed:
         return []

@@ -1,8 +1,8 @@
-"""The waypoint rule: was each waypoint reached, by the radius that mission or autopilot has for it.
+"""The waypoint rule: whether each waypoint was reached, by the mission's or autopilot's radius.
 
-ArduPlane also takes a waypoint as reached, and turns to the next leg, when it is past the line across the leg at its
-end, however far to the side; flown by its law, that counts where it is within the corridor.  Height has no part in the
-rule: what a height off the plan can harm is judged where it harms.
+ArduPlane also considers a waypoint reached, and turns to the next leg, once it is past the line across the leg at its
+end, however far to the side; for ArduPlane's simulated law that is accepted within the corridor.  Altitude has no part
+in the rule: other rules judge the harm that a wrong altitude can do.
 """
 
 import math
@@ -33,13 +33,13 @@ def waypoint_findings(
 
 
 def _planned(requirements: RouteRequirements, i: int) -> Finding:
-    """Whether the fly-by arc at a waypoint passes it within what counts as reached."""
+    """Judge whether the fly-by arc at a waypoint passes it within its acceptance distance."""
     near, offset = reach(requirements, i), float(requirements.fly_by_offset[i])
     faults, fact = [], f"the fly-by path passes at {offset:.0f} m"
     if requirements.setup.route.fly_over[i]:
         fact = "flown over"
     elif not requirements.setup.autopilot.follows_path:
-        fact = _turns(requirements, i, near)
+        fact = _turn_text(requirements, i, near)
     elif offset > near.radius + ROUNDING:
         turn, radius = math.degrees(abs(float(requirements.turns[i]))), float(requirements.radius[i])
         faults.append(
@@ -64,8 +64,8 @@ def _planned(requirements: RouteRequirements, i: int) -> Finding:
     )
 
 
-def _turns(requirements: RouteRequirements, i: int, near: Reach) -> str:
-    """Where an autopilot that flies from leg to leg turns at a waypoint."""
+def _turn_text(requirements: RouteRequirements, i: int, near: Reach) -> str:
+    """Describe where an autopilot that flies from leg to leg turns at a waypoint."""
     autopilot, before, unread = requirements.setup.autopilot, near.radius, ""
     if near.source == "mission" and not autopilot.reads_acceptance:
         turn = abs(float(requirements.turns[i])) if 0 < i < requirements.legs else math.pi
@@ -85,7 +85,7 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int
         away, off = _closest(requirements, aligned, i, float(apexes[i, 2]))
         facts = (Fact("height error", off, "m"),)
         ok = away <= most
-        beside = math.inf if ok or setup.autopilot.follows_path else _beside(requirements, aligned, i)
+        beside = math.inf if ok or setup.autopilot.follows_path else _crossing_offset(requirements, aligned, i)
         if beside <= setup.corridor:
             ok = True
         reason = f"passed at {away:.1f} m, {abs(off):.1f} m {'above' if off >= 0.0 else 'below'}"
@@ -99,11 +99,11 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int
             faults = [message("not reached", text)]
             ok, reason = False, reason_of(faults)
             if not aligned.passed[i - 1]:
-                # A waypoint that the flight was not on the way to: how far away it was says nothing.
+                # The flight was not flying to this waypoint: its distance says nothing.
                 away, ok, facts = math.nan, None, ()
                 reason = f"not reached: the flight ended on {place_text(ended)}"
         elif not ok:
-            reason = f"missed: {reason}; {_counts(near)}"
+            reason = f"missed: {reason}; {_acceptance_text(near)}"
     return make_finding(
         "waypoint",
         requirements.waypoint(i),
@@ -115,7 +115,7 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int
         limit=near.radius,
         source=near.source,
         tolerance=near.tolerance,
-        # Past the line beside it counts as reached whatever its distance; one that was not reached has none.
+        # A waypoint passed to the side is reached whatever its distance; one not reached has no margin.
         margin=near.radius - away if ok is (away <= most) and not faults else None,
         unit="m",
         method="closest approach, horizontal",
@@ -123,8 +123,8 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int
     )
 
 
-def _beside(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> float:
-    """How far (m) beside a waypoint the track crossed the line across the leg before it; inf where it did not."""
+def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> float:
+    """Return the distance (m) from a waypoint where the track crossed the line across its leg, or inf."""
     if i == 0:
         return math.inf
     last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
@@ -133,15 +133,15 @@ def _beside(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> f
     return abs(float(across[past[0]])) if past.size else math.inf
 
 
-def _counts(near: Reach) -> str:
-    """What counts as reached, in words."""
+def _acceptance_text(near: Reach) -> str:
+    """Return the acceptance distance, in words."""
     whose = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(near.source, "the path's")
     error = f", and {near.tolerance:.1f} m for navigation and gusts," if near.tolerance else ""
     return f"{near.radius:.0f} m{error} count as reached ({whose})"
 
 
 def _closest(requirements: RouteRequirements, aligned: AlignedTrack, i: int, level: float) -> tuple[float, float]:
-    """Closest horizontal approach between the neighbouring waypoints, m, and the height above ``level`` there."""
+    """Return the closest horizontal approach between the neighbours, m, and the height above ``level``."""
     first = int(aligned.rows[i - 1]) if i else 0
     last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
     position = aligned.track.position[first : max(last, first + 1) + 1]
@@ -149,7 +149,7 @@ def _closest(requirements: RouteRequirements, aligned: AlignedTrack, i: int, lev
     if not distance.size:
         off = aligned.track.position[-1] - requirements.points[i]
         return math.hypot(off[0], off[1]), float(off[2])
-    # Of equally close rows the one nearest in height.
+    # Among equally close rows take the one nearest in altitude.
     near = np.flatnonzero(distance <= distance.min() + EQUALLY_CLOSE)
     up = position[near, 2] + fraction[near] * (position[near + 1, 2] - position[near, 2]) - level
     return float(distance.min()), float(up[np.argmin(np.abs(up))])
