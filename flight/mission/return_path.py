@@ -318,7 +318,7 @@ class _ReturnBuilder:
         return self._circle.up - self._at[2]
 
     def turn_gently(self, course: float, rules: ReturnRules) -> float:
-        """Fly the arc at the first bank limit for as long as that limit applies, and return the course at its end."""
+        """Fly the arc at the first bank limit while that limit applies, and return the course at its end."""
         climb = min(rules.climb_first, max(0.0, self._rise)) if math.isinf(rules.climb_first) else rules.climb_first
         if climb <= 0.0:
             return course
@@ -356,7 +356,7 @@ class _ReturnBuilder:
         self.circle_from(*on_rim(self._circle, onward), onward)
 
     def _add_slope_break(self, onward: float) -> None:
-        """Add a waypoint on the straight leg where a climb or a step ends, or where a held altitude begins to fall."""
+        """Add a waypoint on the straight leg where a climb or step ends, or a held altitude begins to fall."""
         join = on_rim(self._circle, onward)
         run = math.hypot(join[0] - self._at[0], join[1] - self._at[1])
         if self._rise > 0.0:
@@ -390,8 +390,9 @@ class _ReturnBuilder:
         self._add(*on_rim(self._circle, course + math.copysign(sweep, self._circle.turn)), 0.0, on_circle=True)
 
     def _continue_to(self, course: float, spiral: float, onward: Place) -> None:
-        """Fly around the circle until its altitude is reached, and turn from there to a place in the shorter
-        direction.
+        """Fly around the circle until its altitude is reached, and turn from there to a place.
+
+        The turn takes the shorter direction.
         """
         if spiral > 0.0:
             self._add_circle(course, spiral)

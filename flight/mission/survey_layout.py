@@ -72,7 +72,7 @@ def turn_around_of(route: Route, survey: Survey) -> float:
 
 
 def _lead_lengths(route: Route, survey: Survey) -> list[float]:
-    """How far (m) the lines go straight on at each end of each turn-around."""
+    """Return how far the lines extend straight beyond their photos at each end of each turn-around, m."""
     points, pairs = route.waypoints[:, :2], zip(survey.lines[:-1], survey.lines[1:], strict=True)
     ends = [pair for one, other in pairs for pair in ((one.last, one.ends), (other.begins, other.first))]
     return [math.dist(points[one], points[other]) for one, other in ends]
@@ -132,7 +132,10 @@ def with_layout(
 
 
 def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItems:
-    """Return the indices of a survey's items; each line includes the commands that switch something at its ends."""
+    """Return the indices of a survey's items.
+
+    Each line includes the commands that switch something at its ends.
+    """
     at, count = {item.seq: k for k, item in enumerate(mission.items)}, len(mission.items)
     seqs = [int(seq) for seq in route.items]
 
@@ -157,7 +160,7 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
 
 
 def _waypoint_of_item(mission: Mission, route: Route) -> dict[int, int]:
-    """Return the waypoint of each navigation item by its number; an item without one gets the waypoint before it."""
+    """Return the waypoint of each navigation item by its number, or the one before it if it has none."""
     own, here, out = {int(seq): i for i, seq in enumerate(route.items)}, 0, dict[int, int]()
     for item in mission.items:
         if is_navigation(item.command):
@@ -169,10 +172,12 @@ def _waypoint_of_item(mission: Mission, route: Route) -> dict[int, int]:
 def _without_leads(
     mission: Mission, route: Route, items: Sequence[MissionItem], end: int, longest: float
 ) -> list[MissionItem]:
-    """Return the items beyond an end of a survey without its lead waypoints, which the new layout replaces.
+    """Return the items beyond an end of a survey without its lead waypoints.
 
-    end: the waypoint at that end. Waypoints further away than the turn-arounds are long belong to the transit to the
-        survey and stay.
+    end: the waypoint at that end.
+
+    The new layout replaces those leads. Waypoints further away than the turn-arounds are long belong to the transit to
+    the survey and stay.
     """
     points, places = route.waypoints[:, :2], _waypoint_of_item(mission, route)
 
@@ -207,7 +212,10 @@ def _in_flying_order(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line
 
 
 def _reversed(line: _Line) -> _Line:
-    """Return a line in the opposite direction: its waypoints swap places, and the commands after each stay in place."""
+    """Return a line in the opposite direction.
+
+    Its waypoints swap places; the commands between them stay in place.
+    """
     steps = [item for item in line.items if is_navigation(item.command)]
     backwards = iter(reversed(steps))
     return _Line(
@@ -234,7 +242,7 @@ def _waypoint(like: MissionItem, place: Floats, origin: GeoOrigin) -> MissionIte
 
 
 def _with_course(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOrigin) -> list[_Line] | None:
-    """Return lines on another course over the convex hull of the present lines, or None if that is impossible."""
+    """Return lines on another course over the hull of the present ones, or None if that is impossible."""
     ends = [item for line in lines for item in line.items if is_navigation(item.command)]
     if len({(item.frame, item.alt) for item in ends}) != 1 or any(_is_bent(line.corners) for line in lines):
         return None
