@@ -312,7 +312,7 @@ class _Runs:
     def spacing(self, one: int, other: int) -> float | None:
         """Return the distance between two runs, m, or None if they are not parallel neighbors."""
         if (one, other) not in self._spacings:
-            self._spacings[one, other] = _run_spacing(self.points, self.runs[one], self.runs[other])
+            self._spacings[one, other] = _apart(self.points, self.runs[one], self.runs[other])
         return self._spacings[one, other]
 
     def following(self, here: int) -> list[int]:
@@ -404,7 +404,7 @@ def _stay_parallel(runs: _Runs, here: int, after: int, bends: int) -> bool:
     )
 
 
-def _run_spacing(points: Floats, one: tuple[int, int], other: tuple[int, int]) -> float | None:
+def _apart(points: Floats, one: tuple[int, int], other: tuple[int, int]) -> float | None:
     """Return the distance between two runs, m, or None if they are not parallel neighbors."""
     start, course, length = _run_geometry(points, one)
     along, across = _along_and_right(points[[other[0], other[1]], :2] - start, course)

@@ -126,7 +126,7 @@ class Airborne(ABC):
     def _fly(self, count: int) -> int:
         """Fly up to a number of ticks into the workspace's rows; return the last tick's status, 0 to fly on."""
 
-    def _start_disturbances(self, setup: FlightSetup) -> None:
+    def _disturb(self, setup: FlightSetup) -> None:
         """Set the wind, and start turbulence and navigation error."""
         wind, work = setup.scenario.wind, self._work
         to = wind.to_course
