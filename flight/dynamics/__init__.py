@@ -1,1 +1,1 @@
-"""JSBSim behind one class: trims, model checks, envelope tables and flight characteristics."""
+"""JSBSim behind one class: trim, model checks, envelope tables and flight characteristics."""

@@ -1,4 +1,4 @@
-"""What an aircraft is like: its trims, its modes and how it answers each control, measured on its JSBSim model."""
+"""Flight characteristics of an aircraft's JSBSim model: trims, modes and step responses."""
 
 import math
 from dataclasses import dataclass
@@ -13,25 +13,27 @@ from flight.dynamics.trim import Trim, linearise, straight
 
 Floats = NDArray[np.float64]
 
-# Height of all measurements, m above sea level.
+# Altitude of all measurements, m AMSL.
 TRIM_AMSL = 500.0
-# Latitude and longitude of all measurements, degrees; steps are flown due north from there.
-_POSITION = (45.0, 0.0)
+# Latitude and longitude of all measurements, degrees; step responses are flown due north from there.
+_POSITION_DEG = (45.0, 0.0)
+# Simulation steps per second.
 _RATE_HZ = 120.0
-_STEP_AT = 1.0
-# A control that changes nothing by more than this (rad, m) is none.
-_NOTHING = 1e-4
-# Columns of the longitudinal states in (u, v, w, p, q, r, roll, pitch); the other half is lateral.
-_LONGITUDINAL = np.array([True, False, True, False, True, False, False, True])
+# Time at which a control moves, s.
+_STEP_TIME_S = 1.0
+# Largest response (rad, m) of a control without effect.
+_MIN_RESPONSE = 1e-4
+# Mask of the longitudinal states in (u, v, w, p, q, r, roll, pitch); the other states are lateral.
+_IS_LONGITUDINAL = np.array([True, False, True, False, True, False, False, True])
 
 
 @dataclass(frozen=True, slots=True)
 class TrimRow:
     """Level flight at one airspeed.
 
-    trim: its controls and attitude.
+    trim: controls and attitude.
     power: W, from the battery or as heat of fuel.
-    endurance: how long 80 % of the battery or the fuel lasts, s; NaN where no power is used.
+    endurance: time that 80 % of the battery or of the fuel lasts, s; NaN if no power is used.
     """
 
     trim: Trim
@@ -41,14 +43,17 @@ class TrimRow:
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """A way in which the aircraft answers a disturbance.  root: 1/s, that of a pair with a positive imaginary part."""
+    """A natural mode of the aircraft.
+
+    root: eigenvalue, 1/s; of a complex pair the one with positive imaginary part.
+    """
 
     name: str
     root: complex
 
     @property
     def frequency(self) -> float:
-        """Undamped natural frequency, rad/s; for a real root its size."""
+        """Undamped natural frequency, rad/s; for a real root its magnitude."""
         return abs(self.root)
 
     @property
@@ -58,20 +63,20 @@ class Mode:
 
     @property
     def time(self) -> float:
-        """Seconds to half the amplitude, or to double it if the root is unstable."""
+        """Time to half the amplitude, or to double it if the root is unstable, s."""
         return math.log(2.0) / abs(self.root.real) if self.root.real != 0.0 else math.inf
 
 
 @dataclass(frozen=True, slots=True)
 class StepResponse:
-    """The answer to one control, from level flight at cruise.
+    """Response to one control, from level flight at cruise.
 
     control: a field of `flight.dynamics.state.Commands`.
-    size: by how much it moved, rad, or of full throttle.
-    held: for how long, s; infinite for a step that stays.
+    size: deflection, rad, or fraction of full throttle.
+    held: duration of the deflection, s; infinite for a step.
     time: (t,) s.
     quantities: the k fields of `flight.dynamics.state.STATE` that are shown.
-    change: (t, k) of these quantities from the trim, SI and radians.
+    change: (t, k) deviation of these quantities from the trim, SI and radians.
     """
 
     control: str
@@ -83,7 +88,7 @@ class StepResponse:
 
 
 def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
-    """Level flight over the speeds that guidance may use, evenly spaced, where there is a trim.
+    """Return level flights at evenly spaced speeds that guidance may use, where there is a trim.
 
     >>> from aircraft.catalog import load_aircraft
     >>> slow, fast = trim_table(load_aircraft("aerosonde"), 2)
@@ -105,7 +110,9 @@ def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
 
 
 def modes_at(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_AMSL) -> tuple[Mode, ...]:
-    """The named modes of level flight at this airspeed (m/s) and height (m), empty where there is no such flight.
+    """Return the named modes of level flight at this airspeed (m/s) and altitude (m).
+
+    Return an empty tuple if there is no such flight.
 
     >>> from aircraft.catalog import load_aircraft
     >>> for mode in modes_at(load_aircraft("aerosonde"), 25.0):
@@ -122,15 +129,15 @@ def modes_at(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_AMSL) -> tu
 
 
 def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
-    """Name the modes of A (8, 8), states as in `flight.dynamics.trim.linearise`, by where their eigenvectors live.
+    """Name the modes of A (8, 8), states as in `flight.dynamics.trim.linearise`, by their eigenvectors.
 
-    Longitudinal, from fast to slow: short period, phugoid.  Lateral: an oscillation is the Dutch roll, a slower one
-    beside it roll-spiral; of the real roots the faster is roll, the slower spiral.
+    Longitudinal, from fast to slow: short period, phugoid. Lateral: an oscillation is the Dutch roll, and a second,
+    slower one is the roll-spiral; of the real roots the faster is roll, the slower spiral.
     """
     roots, vectors = np.linalg.eig(a)
-    # Speeds as angles, so that the parts of an eigenvector can be compared.
+    # Convert speeds to angles, so that the components of an eigenvector can be compared.
     sizes = np.abs(vectors) / np.array([airspeed] * 3 + [1.0] * 5)[:, None]
-    share = (sizes[_LONGITUDINAL] ** 2).sum(axis=0) / (sizes**2).sum(axis=0)
+    share = (sizes[_IS_LONGITUDINAL] ** 2).sum(axis=0) / (sizes**2).sum(axis=0)
     along: list[complex] = []
     aside: list[complex] = []
     for k in np.argsort(-np.abs(roots), kind="stable"):
@@ -146,11 +153,11 @@ def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
 
 
 def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
-    """Move each control alone, with no guidance, from level flight at cruise.
+    """Return the responses to each control alone, without guidance, from level flight at cruise.
 
-    Each moves by a tenth of its travel: less would be lost in the play of some models' actuators.  Elevator (up) and
-    throttle (down where there is not that much left) stay; aileron and rudder come back after a second, because no
-    aircraft stays upright with them held.  A control that moves nothing, as a flying wing's rudder, is left out.
+    Each control moves by a tenth of its travel: less would be lost in the play of some models' actuators. Elevator (up)
+    and throttle (down if there is not that much left) stay; aileron and rudder return after a second, because no
+    aircraft stays upright with them held. A control without effect, such as a flying wing's rudder, is left out.
 
     >>> from aircraft.catalog import load_aircraft
     >>> for step in step_responses(load_aircraft("aerosonde")):
@@ -168,25 +175,25 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
     throttle = 0.1 if level is None or level.throttle < 0.9 else -0.1
     along, across = ("pitch", "alpha", "airspeed", "amsl"), ("roll", "roll_rate", "beta", "yaw")
     responses = (
-        _respond(aircraft, "elevator", -elevator, math.inf, 20.0, along),
-        _respond(aircraft, "throttle", throttle, math.inf, 20.0, along),
-        _respond(aircraft, "aileron", aileron, 1.0, 15.0, across),
-        _respond(aircraft, "rudder", rudder, 1.0, 15.0, ("roll", "yaw_rate", "beta", "yaw")),
+        _step_response(aircraft, "elevator", -elevator, math.inf, 20.0, along),
+        _step_response(aircraft, "throttle", throttle, math.inf, 20.0, along),
+        _step_response(aircraft, "aileron", aileron, 1.0, 15.0, across),
+        _step_response(aircraft, "rudder", rudder, 1.0, 15.0, ("roll", "yaw_rate", "beta", "yaw")),
     )
-    return tuple(response for response in responses if float(np.abs(response.change).max()) > _NOTHING)
+    return tuple(response for response in responses if float(np.abs(response.change).max()) > _MIN_RESPONSE)
 
 
-def _respond(
+def _step_response(
     aircraft: Aircraft, control: str, size: float, held: float, seconds: float, quantities: tuple[str, ...]
 ) -> StepResponse:
     fdm = Fdm(aircraft, rate_hz=_RATE_HZ)
-    commands = fdm.start(*_POSITION, TRIM_AMSL, 0.0, aircraft.airspeed, terrain_amsl=-1000.0).commands()
+    commands = fdm.start(*_POSITION_DEG, TRIM_AMSL, 0.0, aircraft.airspeed, terrain_amsl=-1000.0).commands()
     moved = commands._replace(**{control: getattr(commands, control) + size})
     count = round(seconds * _RATE_HZ)
     states = np.zeros(count + 1, STATE)
     states[0] = fdm.read()
     for k in range(count):
-        fdm.write(moved if _STEP_AT <= k / _RATE_HZ < _STEP_AT + held else commands)
+        fdm.write(moved if _STEP_TIME_S <= k / _RATE_HZ < _STEP_TIME_S + held else commands)
         fdm.step()
         states[k + 1] = fdm.read()
     change = np.column_stack([_unwrapped(states, name) - states[name][0] for name in quantities])

@@ -1,4 +1,4 @@
-"""Fills an aircraft's envelope from JSBSim trims, and keeps it in the user's cache folder."""
+"""Compute an aircraft's envelope from JSBSim trims, and cache it in the user's cache folder."""
 
 import contextlib
 import json
@@ -17,19 +17,22 @@ from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
 from flight.dynamics.trim import Floats, Trim, fastest, full_throttle, idle, slowest, straight
 from world.files import write_whole
 
-# Any change of what the file holds or of how it is computed counts this up.
-_SCHEMA = 6
-_SPEEDS = 11
-_AMSL = np.arange(0.0, 9001.0, 1000.0)
-_TABLES = (*TABLES, *POWERS)
+# Version of the file format; increase it with any change of the contents or of their computation.
+_SCHEMA_VERSION = 6
+# Number of airspeeds in the grid.
+_AIRSPEED_COUNT = 11
+# Altitudes of the grid, m AMSL.
+_GRID_AMSL_M = np.arange(0.0, 9001.0, 1000.0)
+# Names of all tables in the file.
+_TABLE_NAMES = (*TABLES, *POWERS)
 
 
 def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelope:
-    """Return the aircraft's envelope, from the cache if it is there, computed and cached if not.
+    """Return the aircraft's envelope, from the cache if possible, otherwise computed and cached.
 
-    Both are equal to the last bit.  A cache file that cannot be read, is damaged or is for another model, JSBSim or
-    schema is computed anew; a cache folder that cannot be written to is left alone.
-    Raises FlightError for a model that JSBSim cannot load.
+    Both are equal to the last bit. A cache file that is unreadable, damaged or for another model, JSBSim or schema is
+    computed again; a cache folder without write permission is left alone. Raise FlightError for a model that JSBSim
+    cannot load.
 
     >>> from aircraft.catalog import load_aircraft
     >>> climb, descent = load_envelope(load_aircraft("aerosonde")).air_angles(25.0, 500.0)
@@ -60,28 +63,28 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
 
 
 def cache_file(aircraft: Aircraft, motor_braking: bool) -> Path:
-    """Where this envelope is kept."""
+    """Return the cache file of this envelope."""
     kind = "braking" if motor_braking else "coasting"
-    name = f"envelope-{aircraft.name}-{model_hash(aircraft)[:16]}-{kind}-v{_SCHEMA}.json"
+    name = f"envelope-{aircraft.name}-{model_hash(aircraft)[:16]}-{kind}-v{_SCHEMA_VERSION}.json"
     return Path(user_cache_dir("planfly")) / name
 
 
 def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]:
-    """Trim over the grid: the tables of `aircraft.envelope.Envelope` by name.
+    """Compute the tables of `aircraft.envelope.Envelope` by name, with a trim at each grid point.
 
     In still standard atmosphere at 45 degrees latitude on a course due north.
     """
     fdm = Fdm(aircraft, motor_braking=motor_braking)
     airspeeds = _airspeeds(aircraft)
-    climb = np.full((airspeeds.size, _AMSL.size), math.nan)
+    climb = np.full((airspeeds.size, _GRID_AMSL_M.size), math.nan)
     descent = climb.copy()
     powers = {name: climb.copy() for name in POWERS}
-    slow, fast = np.full(_AMSL.size, math.nan), np.full(_AMSL.size, math.nan)
-    for j, amsl in enumerate(_AMSL.tolist()):
+    slow, fast = np.full(_GRID_AMSL_M.size, math.nan), np.full(_GRID_AMSL_M.size, math.nan)
+    for j, amsl in enumerate(_GRID_AMSL_M.tolist()):
         up: Trim | None = None
         down: Trim | None = None
         even: Trim | None = None
-        # From fast to slow: the last ones may not exist, and each trim starts from its neighbour's.
+        # From fast to slow: the slowest may have no trim, and each trim starts from its neighbor.
         for i in reversed(range(airspeeds.size)):
             airspeed = float(airspeeds[i])
             if found := full_throttle(fdm, airspeed, amsl, up):
@@ -96,10 +99,10 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
             fast[j] = found.airspeed
         if found := slowest(fdm, amsl):
             slow[j] = found.airspeed
-    # A trim is good to about 1e-11; nine decimals are the same on every machine.
+    # A trim is accurate to about 1e-11; nine decimals are the same on every machine.
     return {
         "airspeed": airspeeds,
-        "amsl": _AMSL,
+        "amsl": _GRID_AMSL_M,
         "climb": climb.round(9),
         "descent": descent.round(9),
         "level_speed_min": slow.round(9),
@@ -109,19 +112,19 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
 
 
 def _power(fdm: Fdm, at: Trim) -> float:
-    """Power of a trim, W."""
+    """Return the power of a trim, W."""
     fdm.balance(at.vector())
     return float(fdm.read().power)
 
 
 def _airspeeds(aircraft: Aircraft) -> Floats:
-    """(v,) from the stall to 5 m/s above the fastest that guidance may use, m/s."""
-    return np.linspace(math.ceil(aircraft.stall_speed), math.ceil(aircraft.airspeed_max) + 5.0, _SPEEDS)
+    """Return the airspeeds (v,) from the stall to 5 m/s above the highest that guidance may use, m/s."""
+    return np.linspace(math.ceil(aircraft.stall_speed), math.ceil(aircraft.airspeed_max) + 5.0, _AIRSPEED_COUNT)
 
 
 def _key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
     return {
-        "schema": _SCHEMA,
+        "schema": _SCHEMA_VERSION,
         "aircraft": aircraft.name,
         "model_hash": model_hash(aircraft),
         "motor_braking": motor_braking,
@@ -130,31 +133,32 @@ def _key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
 
 
 def _read(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Floats] | None:
-    """Return the tables of a cache file, or None if it is not whole, undamaged and for this key."""
-    grid = (airspeeds.size, _AMSL.size)
+    """Return the tables of a cache file, or None if it is incomplete, damaged or for another key."""
+    grid = (airspeeds.size, _GRID_AMSL_M.size)
     shapes = dict.fromkeys(("climb", "descent", *POWERS), grid) | {"airspeed": airspeeds.shape}
-    tables = read_tables(file, key, {name: shapes.get(name, _AMSL.shape) for name in _TABLES})
+    tables = read_tables(file, key, {name: shapes.get(name, _GRID_AMSL_M.shape) for name in _TABLE_NAMES})
     if tables is None:
         return None
-    if not (np.array_equal(tables["airspeed"], airspeeds) and np.array_equal(tables["amsl"], _AMSL)):
+    if not (np.array_equal(tables["airspeed"], airspeeds) and np.array_equal(tables["amsl"], _GRID_AMSL_M)):
         return None
     return tables
 
 
 # ----------------------------------------------------------------------
-# Tables of an aircraft in the user's cache folder, equal to the last bit to what was computed.
+# Tables of an aircraft in the user's cache folder, equal to the computed tables to the last bit.
 
 
 def read_tables(file: Path, key: dict[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Floats] | None:
-    """The tables that `write_tables` kept, or None if the file is not whole, undamaged and for this key.
+    """Return the tables that `write_tables` wrote, or None if the file is damaged or for another key.
 
-    key: what JSON gives back as it is.  shapes: of each table by its name.
+    key: values that JSON reproduces exactly.
+    shapes: shape of each table by its name.
     """
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         if {name: content[name] for name in key} != key:
             return None
-        # No trim is kept as null, because JSON has no NaN; numpy reads it back as NaN.
+        # A missing trim is stored as null, because JSON has no NaN; numpy reads it back as NaN.
         tables = {name: np.array(content["tables"][name], dtype=np.float64) for name in shapes}
     except (OSError, ValueError, KeyError, TypeError):
         return None
@@ -162,7 +166,7 @@ def read_tables(file: Path, key: dict[str, Any], shapes: Mapping[str, tuple[int,
 
 
 def write_tables(file: Path, key: dict[str, Any], tables: Mapping[str, Floats]) -> None:
-    """Write a cache file whole or not at all; without disk space or permission, do nothing."""
+    """Write a cache file completely or not at all; do nothing without disk space or permission."""
     values: dict[str, object] = {}
     for name, table in tables.items():
         entries = table.astype(object)

@@ -1,8 +1,8 @@
-"""The flight-dynamics model: one JSBSim instance, its state and commands in SI units.
+"""Flight-dynamics model: one JSBSim instance, with state and commands in SI units.
 
-The only file that imports JSBSim; feet and slugs stay in it and in `flight.dynamics.jsbsim_properties`.  JSBSim never
-says that anything is wrong: after a NaN, under ground or after a crash it runs on.  Whoever steps it checks the state
-it reads.
+The only module that imports JSBSim; feet and slugs stay in it and in `flight.dynamics.jsbsim_properties`. JSBSim never
+reports an error: after a NaN, below ground or after a crash it continues. The caller must check the state that it
+    reads.
 """
 
 import contextlib
@@ -54,12 +54,12 @@ from world.files import temporary_folder
 from world.kernels import Record, field_names
 
 # ----------------------------------------------------------------------
-# Keeps a talkative library quiet.
+# Suppression of JSBSim's output.
 
 
 @contextmanager
 def silence() -> Iterator[None]:
-    """Send standard output nowhere: JSBSim prints its banner whatever its debug level, by either way out.
+    """Discard standard output: JSBSim prints its banner at every debug level.
 
     Its C++ side writes to file descriptor 1, its Python side to ``sys.stdout``.
     """
@@ -77,13 +77,15 @@ def silence() -> Iterator[None]:
 
 
 # ----------------------------------------------------------------------
-# Where a flight may begin: on the globe, off its poles, in the air and below the tropopause.
+# Valid start of a flight: on the globe except its poles, in the air and below the tropopause.
 
 
 def check_place(lat_deg: float, lon_deg: float, amsl: float, terrain_amsl: float) -> None:
-    """Refuse a place where no flight begins.
+    """Raise FlightError for a place where no flight can begin.
 
-    lat_deg, lon_deg: geodetic, degrees.  amsl: height, m.  terrain_amsl: of the ground there, m.  Raises FlightError.
+    lat_deg, lon_deg: geodetic, degrees.
+    amsl: altitude, m.
+    terrain_amsl: altitude of the ground there, m.
     """
     if abs(lat_deg) >= 90.0 or abs(lon_deg) > 180.0:
         field, value = ("latitude", lat_deg) if abs(lat_deg) >= 90.0 else ("longitude", lon_deg)
@@ -95,21 +97,24 @@ def check_place(lat_deg: float, lon_deg: float, amsl: float, terrain_amsl: float
 
 
 # ----------------------------------------------------------------------
-# Loads an aircraft's model into a JSBSim instance, from a checked copy.
+# Loading of an aircraft's model into a JSBSim instance, from a checked copy.
 
-# How far a stated mass may be from the model's, as a share of it.
+# Largest relative difference of a stated mass from the model's mass.
 MASS_TOLERANCE = 0.01
 
 
 def load_model(
     instance: Any, copy: Path, aircraft: Aircraft, dt: float, *, flat_earth: bool, tried: bool, gear: Gear | None = None
 ) -> None:
-    """Check a model, copy it into an empty folder, and load it from there: some models write into their own folder.
+    """Check a model, copy it into an empty folder, and load it from there.
 
-    instance: a JSBSim instance with no model yet, made for this folder.  dt: s a step.  flat_earth, tried, gear: as
-    `Fdm` takes them.
+    It is copied because some models write into their own folder.
 
-    Raises FlightError for a model that is missing, refused or not loadable.
+    instance: a JSBSim instance without a model, made for this folder.
+    dt: time step, s.
+    flat_earth, tried, gear: see `Fdm`.
+
+    Raise FlightError for a model that is missing, refused or not loadable.
     """
     instance.set_debug_level(0)
     files = check_model(
@@ -147,10 +152,10 @@ def load_model(
 
 
 def _check_mass(instance: Any, aircraft: Aircraft) -> None:
-    """Refuse a stated mass that is not the model's, fuel included.  Raises FlightError."""
+    """Raise FlightError if the stated mass differs from the model's mass, fuel included."""
     known = instance.get_property_manager().hasNode
     tanks = itertools.takewhile(known, (f"propulsion/tank[{k}]/contents-lbs" for k in itertools.count()))
-    # JSBSim adds its fuel when it first runs.
+    # JSBSim adds the fuel's mass when it first runs.
     pounds = sum(map(instance.get_property_value, tanks), instance.get_property_value("inertia/weight-lbs"))
     mass = pounds * POUND
     if not abs(aircraft.mass - mass) <= MASS_TOLERANCE * mass:
@@ -165,20 +170,23 @@ def _check_mass(instance: Any, aircraft: Aircraft) -> None:
         )
 
 
+# Version of JSBSim, part of the keys of cached results.
 JSBSIM_VERSION: str = jsbsim.__version__
 
-_NAMES = field_names(STATE)
-_PACK: Callable[..., None] = struct.Struct(f"{len(_NAMES)}d").pack_into
+# Names of the fields of `STATE`, in order.
+_STATE_FIELDS = field_names(STATE)
+# Function that packs the state's values into an array.
+_PACK_STATE: Callable[..., None] = struct.Struct(f"{len(_STATE_FIELDS)}d").pack_into
 
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """What differs from the model as published, for validation and robustness: factors, and the parasite drag itself.
+    """Changes to the published model for validation and robustness: factors, and the parasite drag itself.
 
-    mass, drag: of the whole aircraft.
-    control: on the moments of the surfaces.
-    parasite_drag: its coefficient; None keeps the model's own.
-    volts: of the battery.
+    mass, drag: factors on the whole aircraft's mass and drag.
+    control: factor on the moments of the control surfaces.
+    parasite_drag: parasite drag coefficient; None keeps the model's own.
+    volts: factor on the battery's voltage.
     properties: values of the model's own properties by their names, such as ``ident/thrust``.
     """
 
@@ -192,13 +200,13 @@ class Variation:
 
 @dataclass(frozen=True, slots=True)
 class LoopAccess:
-    """What a fast loop calls, bound once and in JSBSim's units, for want of time for `Fdm`'s conversions.
+    """Functions for a fast loop, bound once and in JSBSim's units, which avoid the conversions of `Fdm`.
 
-    getters: of the state by field; times its factor each value is SI.
+    getters: getters of the state's fields; each value times its factor is SI.
     factors: (1,) of `STATE`.
-    setters: of the commands, then of the gusts north, east and down, then of the ground's height.
-    scales: for each setter what takes an SI value to JSBSim's where it is above zero, and where it is not.
-    run: advances by one step.
+    setters: setters of the commands, then of the gusts north, east and down, then of the ground's altitude.
+    scales: for each setter the factors to JSBSim's units for values above zero, and for other values.
+    run: function that advances by one step.
     """
 
     getters: dict[str, Getter]
@@ -209,18 +217,20 @@ class LoopAccess:
 
 
 class Fdm:
-    """One aircraft in one JSBSim instance, from a trimmed start; make a new one for each flight.
+    """One aircraft in one JSBSim instance, from a trimmed start; create a new one for each flight.
 
-    rate_hz: steps a second.  motor_braking: whether the motor may brake the propeller (current below zero).
-    flat_earth: the book's world of constant density 1.2682 kg/m^3 and gravity 9.81 m/s^2 over a plane that does not
-    turn, for validation; degrees of latitude are then 157 times longer.  Otherwise WGS84 and the standard atmosphere.
-    tried: whether somebody's model is known not to abort JSBSim; otherwise `flight.dynamics.model_check` finds out.
-    gear: what it meets the ground with, where its model does not say; None for a flight in the air alone.
+    rate_hz: steps per second.
+    motor_braking: True if the motor may brake the propeller (current below zero).
+    flat_earth: the textbook's world of constant density 1.2682 kg/m^3 and gravity 9.81 m/s^2 over a plane without
+        rotation, for validation; degrees of latitude are then 157 times longer. Otherwise WGS84 and the standard
+        atmosphere.
+    tried: True if a user's model is known not to abort JSBSim; otherwise `flight.dynamics.model_check` tests it.
+    gear: gear for ground contact if the model has none; None for a flight in the air only.
 
-    properties: JSBSim's own, by name, in its units.
+    properties: JSBSim's own properties by name, in its units.
 
-    Raises FlightError for a model that is missing, refused by `flight.dynamics.model_check`, or not loadable, and for a
-    property that the model reads or we need and nobody defines.
+    Raise FlightError for a model that is missing, refused by `flight.dynamics.model_check`, or not loadable, and for an
+    undefined property that the model or this class reads.
     """
 
     def __init__(
@@ -242,15 +252,15 @@ class Fdm:
         access = PropertyAccess(self._exec.get_property_manager(), aircraft.model_file)
         self.properties = access
         if flat_earth:
-            # The atmosphere looks for this name at every step, so here a new property is meant.
+            # The atmosphere looks for this name at every step, so a new property must be created here.
             self._exec.set_property_value("atmosphere/override/density", FLAT_DENSITY / SLUG_FT3)
         access.set("simulation/gravity-model", 0.0 if flat_earth else 1.0)
         access.set_optional("motor/braking", float(motor_braking), 0.0)
-        _vary(access, aircraft, variation or Variation())
+        _apply_variation(access, aircraft, variation or Variation())
         readings = zip(MODEL_FIELDS, aircraft.model.readings, strict=True)
         properties = STATE_PROPERTIES | {field: (reading.name, reading.factor) for field, reading in readings}
-        self._readers = [access.getter(properties[field][0]) for field in _NAMES]
-        self._factors = np.array([properties[field][1] for field in _NAMES])
+        self._readers = [access.getter(properties[field][0]) for field in _STATE_FIELDS]
+        self._factors = np.array([properties[field][1] for field in _STATE_FIELDS])
         self._writers = [access.command_setter(command) for command in aircraft.model.commands]
         self._winds = [access.setter(name) for name in WIND]
         self._gusts = [access.setter(name) for name in GUST]
@@ -264,7 +274,7 @@ class Fdm:
         self._engine = Engine(self._exec, self.dt, access.getter, access.setter) if aircraft.model.settles else None
         self._wind = np.zeros(3)
         self._heading = 0.0
-        # lat_deg, lon_deg, terrain amsl: far below, where neither ground effect nor wheels matter.
+        # lat_deg, lon_deg, terrain amsl: far below, where neither ground effect nor wheels act.
         self._at = (45.0, 0.0, -1000.0)
 
     def start(
@@ -280,11 +290,15 @@ class Fdm:
     ) -> Trim:
         """Begin a flight in steady flight along this path over the ground, and return its trim.
 
-        lat_deg: geodetic.  amsl, terrain_amsl: m.  course, climb_angle: rad, of the path over the ground.
-        airspeed: m/s, true.  wind_ned: (3,) m/s, the way the air moves; it stays on as the steady wind.
-        Surfaces and motor stand at their trimmed values, so holding the trim's commands starts no transient.
-        Raises FlightError for values out of range, a wind that the airspeed cannot make way against, and a flight
-        that the aircraft cannot hold.
+        lat_deg: geodetic.
+        amsl, terrain_amsl: m.
+        course, climb_angle: course and slope of the path over the ground, rad.
+        airspeed: m/s, true.
+        wind_ned: (3,) m/s, direction of air motion; it stays as the steady wind.
+
+        Surfaces and motor start at their trimmed values, so that holding the trim's commands causes no transient. Raise
+        FlightError for values out of range, for a wind stronger than the airspeed along the path, and for a flight that
+        the aircraft cannot hold.
         """
         wind = np.array(wind_ned, dtype=np.float64)
         numbers = (lat_deg, lon_deg, amsl, course, airspeed, climb_angle, *wind.tolist(), terrain_amsl)
@@ -305,7 +319,7 @@ class Fdm:
                 file=self.aircraft.name, field="airspeed", value=airspeed,
             )  # fmt: skip
         self.balance(found.vector())
-        self._let_go()
+        self._release_motion()
         return found
 
     def begin_at(
@@ -318,15 +332,18 @@ class Fdm:
         amsl: float,
         commands: Sequence[float],
     ) -> None:
-        """Begin a flight in any state, trimmed or not; surfaces and motor stand at these commands (4,).
+        """Begin a flight in any state, trimmed or not, with surfaces and motor at these commands (4,).
 
-        attitude: roll, pitch, yaw, rad.  velocity: north, east, down over the ground, m/s.  rates: p, q, r, rad/s.
-        wind: north, east, down, the way the air moves, m/s; it stays on as the steady wind.  amsl: m.
+        attitude: roll, pitch, yaw, rad.
+        velocity: north, east, down over the ground, m/s.
+        rates: p, q, r, rad/s.
+        wind: north, east, down, direction of air motion, m/s; it stays as the steady wind.
+        amsl: m.
         """
         self._wind = np.array(wind, dtype=np.float64)
         self.move_to(amsl)
         self._evaluate(attitude, np.array(velocity, dtype=np.float64), rates, commands, settle=True)
-        self._let_go()
+        self._release_motion()
 
     def release(
         self,
@@ -338,30 +355,36 @@ class Fdm:
         terrain_amsl: float = 0.0,
         commands: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     ) -> None:
-        """Begin a flight anywhere, on the ground too, at rest or thrown; surfaces and motor stand at these commands.
+        """Begin a flight anywhere, also on the ground, at rest or thrown.
 
-        place: lat_deg, lon_deg (geodetic) and amsl (m).  attitude: roll, pitch, yaw (true), rad.
-        velocity: north, east, down over the ground, m/s.  wind: (3,) m/s, the way the air moves; it stays on.
-        terrain_amsl: m.  Raises FlightError for numbers that are none, and a place that is on no map.
+        Surfaces and motor start at these commands.
+
+        place: lat_deg, lon_deg (geodetic) and amsl (m).
+        attitude: roll, pitch, yaw (true), rad.
+        velocity: north, east, down over the ground, m/s.
+        wind: (3,) m/s, direction of air motion; it stays as the steady wind.
+        terrain_amsl: m.
+
+        Raise FlightError for values that are not finite, and for an invalid place.
         """
         numbers = (*place, *attitude, *velocity, *wind, terrain_amsl, *commands)
         if len(numbers) != 17 or not all(math.isfinite(number) for number in numbers):
             raise FlightError(f"a release takes 17 finite numbers and has {numbers}", field="start", value=numbers)
         lat_deg, lon_deg, amsl = place
-        # A place on the ground is one above it here: how far its skids are below it is the aircraft's.
+        # On the ground the aircraft's reference point may be at ground level: its contacts reach below it.
         check_place(lat_deg, lon_deg, amsl, min(terrain_amsl, amsl - 1.0))
         self._at = (lat_deg, lon_deg, terrain_amsl)
         self.begin_at(
             attitude=attitude, velocity=velocity, rates=(0.0, 0.0, 0.0), wind=wind, amsl=amsl, commands=commands
         )
 
-    def _let_go(self) -> None:
-        """Let everything move from where the initial conditions have put it."""
+    def _release_motion(self) -> None:
+        """Release the motion from the initial conditions."""
         if self._engine:
             self._engine.release()
         self._exec.set_trim_status(False)
         self._exec.set_sim_time(0.0)
-        # While the initial conditions ran, the wind stood in the gusts, because they overwrite the wind.
+        # During the initial conditions the wind is set as a gust, because they overwrite the wind.
         self.set_wind(*self._wind)
         self.set_gust(0.0, 0.0, 0.0)
 
@@ -373,8 +396,8 @@ class Fdm:
 
     def read(self) -> Record:
         """Read the state, a record of `flight.dynamics.state.STATE`."""
-        values = np.empty(len(_NAMES))
-        _PACK(values, 0, *[reader() for reader in self._readers])
+        values = np.empty(len(_STATE_FIELDS))
+        _PACK_STATE(values, 0, *[reader() for reader in self._readers])
         np.multiply(values, self._factors, values)
         state: Record = values.view(STATE)[0]
         return state
@@ -385,21 +408,21 @@ class Fdm:
             writer(value)
 
     def set_wind(self, north: float, east: float, down: float) -> None:
-        """Set the steady wind, m/s, the way the air moves."""
+        """Set the steady wind, m/s, direction of air motion."""
         for setter, value in zip(self._winds, (north, east, down), strict=True):
             setter(value / FOOT)
 
     def set_gust(self, north: float, east: float, down: float) -> None:
-        """Set what adds to the steady wind, m/s, the way the air moves."""
+        """Set the gust that is added to the steady wind, m/s, direction of air motion."""
         for setter, value in zip(self._gusts, (north, east, down), strict=True):
             setter(value / FOOT)
 
     def loop_access(self) -> LoopAccess:
-        """Bind what a loop reads and sets in this instance."""
+        """Return the functions that a fast loop reads and sets this instance with."""
         commands = self.aircraft.model.commands
         names = [*(command.name for command in commands), *GUST, TERRAIN]
         return LoopAccess(
-            getters=dict(zip(_NAMES, self._readers, strict=True)),
+            getters=dict(zip(_STATE_FIELDS, self._readers, strict=True)),
             factors=self._factors.view(STATE),
             setters=tuple(self.properties.setter(name) for name in names),
             scales=(*((command.above, command.below) for command in commands), *4 * [(1.0 / FOOT, 1.0 / FOOT)]),
@@ -407,27 +430,30 @@ class Fdm:
         )
 
     def specific_force(self) -> tuple[float, float, float]:
-        """What accelerometers at the centre of gravity measure along the body's axes, m/s^2."""
+        """Return the specific force at the center of gravity along the body axes, m/s^2.
+
+        Accelerometers there would measure it.
+        """
         x, y, z = self._forces
         share = FOOT / self._mass()
         return x() * share, y() * share, z() * share
 
     def height(self) -> float:
-        """Height above the ground last set, m; negative under ground, where JSBSim flies on."""
+        """Return the height above the ground last set, m; negative below ground, where JSBSim flies on."""
         return self._height() * FOOT
 
-    # What trims and linearisation need.
+    # Functions for trims and linearization.
 
     def surface_limits(self) -> tuple[float, float, float]:
-        """Elevator, aileron and rudder limits, rad, either way."""
+        """Return the elevator, aileron and rudder limits, rad, in either direction."""
         return self.aircraft.max_elevator, self.aircraft.max_aileron, self.aircraft.max_rudder
 
     def first_guess(self) -> Floats:
-        """(8,) a trim vector to start from: level at cruise."""
+        """Return a trim vector (8,) to start from: level at cruise."""
         return first_guess(self.aircraft.airspeed)
 
     def move_to(self, amsl: float) -> None:
-        """Move the point of evaluation for `balance` and `derivatives` to this height; ends any flight."""
+        """Move the point of evaluation for `balance` and `derivatives` to this altitude; this ends any flight."""
         lat_deg, lon_deg, terrain = self._at
         for setter, value in zip(self._ic_position, (lat_deg, lon_deg, terrain / FOOT, amsl / FOOT), strict=True):
             setter(value)
@@ -437,17 +463,17 @@ class Fdm:
             self._engine.hold()
 
     def balance(self, values: Floats) -> Floats:
-        """(6,) body accelerations, m/s^2 and rad/s^2, of the steady flight with this trim vector (8,)."""
+        """Return the body accelerations (6,), m/s^2 and rad/s^2, of a flight with this trim vector (8,)."""
         airspeed, climb, alpha, bank, *commands = values.tolist()
         axes = body_axes(self._heading, climb, bank, alpha)
-        # Sums by hand, which are the same on every machine: see `world.least_squares`.
+        # Sums written out give the same result on every machine: see `world.least_squares`.
         air = (axes * np.array([math.cos(alpha), 0.0, math.sin(alpha)])).sum(axis=1) * airspeed
         return self._evaluate(euler(axes), air + self._wind, (0.0, 0.0, 0.0), commands, settle=True)[:6]
 
     def derivatives(self, states: Floats, commands: Floats) -> Floats:
-        """(8,) rates of the states (u, v, w, p, q, r, roll, pitch) with surfaces and motor at their commands (4,).
+        """Return the rates (8,) of the states (u, v, w, p, q, r, roll, pitch) with these commands (4,).
 
-        An engine keeps the speed at which the last `balance` left it.
+        Surfaces and motor are at their commands. An engine keeps the speed of the last `balance`.
         """
         roll, pitch = states[6], states[7]
         axes = body_axes(self._heading, pitch, roll, 0.0)
@@ -462,7 +488,7 @@ class Fdm:
         commands: Iterable[float],
         settle: bool = False,
     ) -> Floats:
-        # Trim status lets the actuators through unlagged.
+        # Trim status bypasses the lag of the actuators.
         self.write(commands)
         for setter, value in zip(self._ic_motion, (*angles, *(velocity / FOOT), *pqr), strict=True):
             setter(value)
@@ -474,7 +500,7 @@ class Fdm:
         return rates
 
 
-def _vary(properties: PropertyAccess, aircraft: Aircraft, variation: Variation) -> None:
+def _apply_variation(properties: PropertyAccess, aircraft: Aircraft, variation: Variation) -> None:
     if variation.mass != 1.0:
         extra = (variation.mass - 1.0) * aircraft.mass
         there = properties.getter("inertia/pointmass-weight-lbs")()

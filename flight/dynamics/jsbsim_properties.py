@@ -1,4 +1,4 @@
-"""The properties of JSBSim that are the same for every model, and its units: feet, slugs and pounds."""
+"""JSBSim properties that all models have, and its units: feet, slugs and pounds."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,16 +9,19 @@ import numpy as np
 from aircraft.jsbsim_model import CommandProperty
 from world.errors import FlightError
 
+# Meters in one foot.
 FOOT = 0.3048
-SLUG_FT3 = 515.3788183931961  # kg/m^3 in one slug/ft^3
+# kg/m^3 in one slug/ft^3.
+SLUG_FT3 = 515.3788183931961
+# Kilograms in one pound.
 POUND = 0.45359237
 
-# The property behind each field of the state that is the same for all models, and its factor to SI.
+# Property of each field of the state that is the same for all models, and its factor to SI.
 STATE_PROPERTIES = {
     "time": ("simulation/sim-time-sec", 1.0),
     "latitude": ("position/lat-geod-rad", 1.0),
     "longitude": ("position/long-gc-rad", 1.0),
-    # Above the ellipsoid along its radius: within 3 cm of the geodetic height up to 4000 m.
+    # Above the ellipsoid along the radius: within 3 cm of the geodetic altitude up to 4000 m.
     "amsl": ("position/h-sl-ft", FOOT),
     "velocity_north": ("velocities/v-north-fps", FOOT),
     "velocity_east": ("velocities/v-east-fps", FOOT),
@@ -37,28 +40,37 @@ STATE_PROPERTIES = {
     "wind_east": ("atmosphere/total-wind-east-fps", FOOT),
     "wind_down": ("atmosphere/total-wind-down-fps", FOOT),
 }
-# The fields that each model has properties of its own for, in the order of `aircraft.jsbsim_model.Model.readings`.
+# Fields for which each model has its own properties, in the order of `aircraft.jsbsim_model.Model.readings`.
 MODEL_FIELDS = ("elevator", "aileron", "rudder", "throttle", "current", "power")
+# Mean wind, ft/s.
 WIND = tuple(f"atmosphere/wind-{axis}-fps" for axis in ("north", "east", "down"))
+# Gust, ft/s.
 GUST = tuple(f"atmosphere/gust-{axis}-fps" for axis in ("north", "east", "down"))
+# Initial position, ground and altitude.
 IC_POSITION = ("ic/lat-geod-deg", "ic/long-gc-deg", "ic/terrain-elevation-ft", "ic/h-sl-ft")
+# Initial attitude, velocity and rotation rates.
 IC_MOTION = (
     *("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad"),
     *("ic/vn-fps", "ic/ve-fps", "ic/vd-fps"),
     *("ic/p-rad_sec", "ic/q-rad_sec", "ic/r-rad_sec"),
 )
+# Accelerations, and rates of roll and pitch angle.
 RATES = (
     *(f"accelerations/{axis}dot-ft_sec2" for axis in "uvw"),
     *(f"accelerations/{axis}dot-rad_sec2" for axis in "pqr"),
     *("velocities/phidot-rad_sec", "velocities/thetadot-rad_sec"),
 )
+# Factors of `RATES` to SI units.
 RATE_FACTORS = np.array([FOOT] * 3 + [1.0] * 5)
-# All that acts on the aircraft but gravity, in pounds along the body's axes, and its mass in slugs.
+# All forces on the aircraft except gravity along the body axes, lbf.
 FORCES = tuple(f"forces/fb{axis}-total-lbs" for axis in "xyz")
+# Mass of the aircraft, slugs.
 MASS = "inertia/mass-slugs"
+# Altitude of the ground, ft.
 TERRAIN = "position/terrain-elevation-asl-ft"
+# Height above ground, ft.
 HEIGHT = "position/h-agl-ft"
-# A sphere so large that it is flat, and does not turn: the book's world, for validation.
+# A sphere large enough to be flat, without rotation: the world of the textbook, for validation.
 FLAT_PLANET = """<planet name="flat">
   <semimajor_axis unit="M">1e9</semimajor_axis>
   <semiminor_axis unit="M">1e9</semiminor_axis>
@@ -67,27 +79,29 @@ FLAT_PLANET = """<planet name="flat">
   <J2>0</J2>
 </planet>
 """
+# Air density on the flat planet, kg/m^3.
 FLAT_DENSITY = 1.2682
 
 
 # ----------------------------------------------------------------------
-# JSBSim's properties by name, bound to functions that read and set them.
+# JSBSim properties by name, bound to functions that read and set them.
 
 Getter = Callable[[], float]
 Setter = Callable[[float], object]
 
 
 class PropertyAccess:
-    """The properties of one JSBSim instance with a model.
+    """Properties of one JSBSim instance with a model.
 
-    manager: the instance's property manager.  model_file: named in errors.
+    manager: property manager of the instance.
+    model_file: file named in errors.
     """
 
     def __init__(self, manager: Any, model_file: Path) -> None:
         self._manager, self._model_file = manager, model_file
 
     def _node(self, name: str) -> Any:
-        # A node that is asked for is made, so that it is looked for first.
+        # Reading a missing node would create it, so check for it first.
         node = self._manager.get_node(name) if self._manager.hasNode(name) else None
         if node is None:
             raise FlightError(
@@ -96,19 +110,19 @@ class PropertyAccess:
         return node
 
     def getter(self, name: str) -> Getter:
-        """Bind a property to read; "" reads as zero.  Raises FlightError for one that is not defined."""
+        """Return a function that reads a property; "" reads as zero. Raise FlightError if it is undefined."""
         if not name:
-            return _nothing
+            return _read_zero
         getter: Getter = self._node(name).get_double_value
         return getter
 
     def setter(self, name: str) -> Setter:
-        """Bind a property to set.  Raises FlightError for one that is not defined."""
+        """Return a function that sets a property. Raise FlightError if it is undefined."""
         setter: Setter = self._node(name).set_double_value
         return setter
 
     def command_setter(self, command: CommandProperty) -> Setter:
-        """Bind a command to set in rad, or of the throttle, where its property may count otherwise."""
+        """Return a function that sets a command in rad, or a throttle, scaled to the property's units."""
         setter, above, below = self.setter(command.name), command.above, command.below
         if above == below == 1.0:
             return setter
@@ -119,11 +133,11 @@ class PropertyAccess:
         self.setter(name)(value)
 
     def set_optional(self, name: str, value: float, usual: float) -> None:
-        """Set a property that a model need not have while its value is the usual one."""
+        """Set a property that a model may lack if the value is the usual one."""
         if value != usual or self._manager.hasNode(name):
             self.set(name, value)
 
 
-def _nothing() -> float:
-    """Zero, the reading of an aircraft without this quantity."""
+def _read_zero() -> float:
+    """Return zero, the reading of an aircraft without this quantity."""
     return 0.0

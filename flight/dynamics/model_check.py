@@ -1,7 +1,7 @@
-"""Reads a JSBSim model's XML before JSBSim does, and refuses what it could do to the machine.
+"""Check a JSBSim model's XML before JSBSim reads it, and refuse what could harm the machine.
 
-JSBSim opens a network port for a model with ``<input port=...>`` and writes files for ``<output>``.  A function that
-names a property which does not exist aborts the process, at the first step or when the model is freed.
+JSBSim opens a network port for a model with ``<input port=...>`` and writes files for ``<output>``. A function that
+names a missing property aborts the process, at the first step or when the model is freed.
 """
 
 import os
@@ -18,24 +18,28 @@ from world.errors import FlightError
 from world.files import read_at_most
 
 # Elements whose text names a property that must exist when the model runs.
-_READERS = frozenset({"p", "property", "independentVar", "input"})
-# Elements whose name attribute makes no property; that of functions, tables and flight control components does.
-_NAMELESS = frozenset({"fdm_config", "location", "pointmass", "channel", "axis", "flight_control", "system"})
-_NAME = re.compile(r"-?\s*([A-Za-z_][\w./\[\]-]*)\Z")
+_READING_ELEMENTS = frozenset({"p", "property", "independentVar", "input"})
+# Elements whose name attribute creates no property; the name of functions, tables and flight control components does.
+_ELEMENTS_WITHOUT_PROPERTY = frozenset(
+    {"fdm_config", "location", "pointmass", "channel", "axis", "flight_control", "system"}
+)
+# A property name as an element's text.
+_PROPERTY_NAME = re.compile(r"-?\s*([A-Za-z_][\w./\[\]-]*)\Z")
 
 
-# Made by JSBSim while it loads an engine, a tank or a wheel, so that they cannot be looked up before.
-_MADE_BY_PARTS = re.compile(
+# Properties that JSBSim creates while it loads an engine, a tank or a wheel, so that they cannot be looked up before.
+_PART_PROPERTIES = re.compile(
     r"-?(propulsion/(engine|tank)|gear/unit|fcs/(throttle|mixture|advance|feather|propeller-feather)-(cmd|pos)-norm)"
 )
-_PARTS = frozenset({"engine", "tank", "contact", "thruster"})
+# Elements of such parts.
+_PART_ELEMENTS = frozenset({"engine", "tank", "contact", "thruster"})
 
 
 class _Reader:
-    """Collects property names from one file's XML events and stops at the first forbidden element.
+    """Collector of property names from one file's XML events; it stops at the first forbidden element.
 
-    main: whether it is the model itself, not a file that it brings in.  remove_channels: whether ``<input>`` and
-    ``<output>`` channels are noted to be removed, instead of refused.
+    main: True for the model itself, False for a file that it includes.
+    remove_channels: True to note ``<input>`` and ``<output>`` channels for removal instead of refusing them.
     """
 
     def __init__(self, file: Path, *, main: bool = True, remove_channels: bool = False) -> None:
@@ -46,7 +50,7 @@ class _Reader:
         self.brings: dict[str, str] = {}  # file names, and where in this file they are named
         self.has_parts = False
         self._main, self._remove_channels = main, remove_channels
-        self._channel_start = -1  # the byte at which the channel that is being removed begins
+        self._channel_start = -1  # first byte of the channel that is being removed
         self._spans: list[tuple[int, int]] = []
         self._path: list[str] = []
         self._text: list[str] = []
@@ -71,7 +75,7 @@ class _Reader:
             raise FlightError(f"{self.file}: not well-formed XML: {error}", file=self.file) from None
 
     def without_channels(self) -> bytes:
-        """The file's bytes with blanks for the channels, so that lines keep their numbers."""
+        """Return the file's bytes with blanks for the channels, so that lines keep their numbers."""
         data = bytearray(self.data)
         for start, end in self._spans:
             data[start:end] = bytes(byte if byte == 10 else 32 for byte in data[start:end])
@@ -82,7 +86,7 @@ class _Reader:
         raise FlightError(f"{where}: {what}; the model is refused", file=self.file)
 
     def _doctype(self, _name: str, _system: object, _public: object, internal: int) -> None:
-        # One that only names a document type is never read; JSBSim's own files hold a few harmless entities.
+        # A declaration that only names a document type is never read; JSBSim's own files hold a few harmless entities.
         if internal and not self._remove_channels:
             self._refuse("a document type declaration may expand without end")
 
@@ -103,20 +107,21 @@ class _Reader:
         if "file" in attributes:
             where = f'{self._parser.CurrentLineNumber}: <{name} file="{attributes["file"]}">'
             self.brings.setdefault(attributes["file"], where)
-        self.has_parts |= name in _PARTS
-        # Functions and flight control components make a property of their name; the latter put fcs/ before a bare one.
-        if name not in _NAMELESS and (made := attributes.get("name")):
+        self.has_parts |= name in _PART_ELEMENTS
+        # Functions and flight control components create a property of their name; the latter prefix fcs/ to a bare
+        # name.
+        if name not in _ELEMENTS_WITHOUT_PROPERTY and (made := attributes.get("name")):
             self.made_names |= {made, "fcs/" + made.lower().replace(" ", "-")}
-        # A <property> right below a section declares one, everywhere else it reads one.
+        # A <property> directly below a section declares one; elsewhere it reads one.
         self._declares = name == "property" and depth == (2 if self._main else 1)
 
     def _end(self, name: str) -> None:
         self._path.pop()
-        match = _NAME.fullmatch("".join(self._text).strip())
+        match = _PROPERTY_NAME.fullmatch("".join(self._text).strip())
         self._text = []
         if self._channel_start >= 0:
             if name in {"input", "output"} and len(self._path) < 3:
-                # An empty-element tag ends where it began; otherwise the parser stands before the end tag.
+                # An empty-element tag ends where it began; otherwise the parser is before the end tag.
                 here = self._parser.CurrentByteIndex
                 self._spans.append((self._channel_start, self.data.index(b">", here) + 1))
                 self._channel_start = -1
@@ -125,7 +130,7 @@ class _Reader:
             return
         if self._declares or name == "output":
             self.made_names.add(match[1])
-        elif name in _READERS:
+        elif name in _READING_ELEMENTS:
             self.read_names.setdefault(match[1], self._parser.CurrentLineNumber)
 
     def _text_seen(self, text: str) -> None:
@@ -135,14 +140,15 @@ class _Reader:
 def check_model(
     file: Path, provided: Callable[[str], bool], folders: Sequence[Path] = (), *, shipped: bool = False
 ) -> dict[str, bytes]:
-    """Refuse a model that is unsafe to give to JSBSim, and return its files by name, as JSBSim may read them.
+    """Refuse a model that is unsafe for JSBSim, and return its files by name, as JSBSim may read them.
 
-    provided: whether JSBSim itself has a property of this name before a model is loaded.  folders: where the files that
-    the model brings in may stand.  shipped: the model is JSBSim's own: its channels are removed, and its names
-    are known to be good.
-    Raises FlightError, naming file and line, for a file that cannot be read or is not well formed, for a document type
-    declaration, for an ``<input>`` or ``<output>`` channel, for a file brought in that is not in the folders, and for a
-    property that is read and that neither JSBSim nor the model makes.
+    provided: test whether JSBSim itself has a property of a name before a model is loaded.
+    folders: folders of the files that the model includes.
+    shipped: True for JSBSim's own model: its channels are removed, and its names are known to be valid.
+
+    Raise FlightError, naming file and line, for a file that cannot be read or is not well formed, for a document type
+    declaration, for an ``<input>`` or ``<output>`` channel, for an included file that is not in the folders, and for a
+    property that is read and that neither JSBSim nor the model creates.
     """
     readers = {file.name: _read(file, main=True, remove_channels=shipped)}
     waiting = [readers[file.name]]
@@ -168,7 +174,7 @@ def _read(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
 
 
 def _find(name: str, folders: Sequence[Path]) -> Path | None:
-    """The file of this name, with or without its suffix; never outside the folders."""
+    """Return the file of this name, with or without its suffix; never outside the folders."""
     if Path(name).name != name or name.startswith("."):
         return None
     names = (name, f"{name}.xml")
@@ -180,18 +186,21 @@ def _check_names(readers: Sequence[_Reader], provided: Callable[[str], bool]) ->
     parts = any(reader.has_parts for reader in readers)
     for reader in readers:
         for name, line in reader.read_names.items():
-            if name in made or (parts and _MADE_BY_PARTS.match(name)) or provided(name):
+            if name in made or (parts and _PART_PROPERTIES.match(name)) or provided(name):
                 continue
             message = f"{reader.file}:{line}: property {name} is read, and neither JSBSim nor the model makes it"
             raise FlightError(message, file=reader.file, field=name)
 
 
 # ----------------------------------------------------------------------
-# A first run of somebody's model in a process of its own, because JSBSim may abort where it should complain.
+# First run of a user's model in a separate process, because JSBSim may abort instead of reporting an error.
 
-_SECONDS = 60.0
+# Timeout of that process, s.
+_TIMEOUT_S = 60.0
+# Its exit code for a refused model.
 _REFUSED = 3
-_RUN = f"""
+# Program of that process.
+_TRIAL_PROGRAM = f"""
 import sys
 from pathlib import Path
 from aircraft.catalog import read_aircraft
@@ -211,8 +220,8 @@ except FlightError:
 def try_model(aircraft: Aircraft) -> None:
     """Load and step a model in another process, once for each version of it.
 
-    Raises FlightError where that process dies.  Where it only refuses the model, nothing is raised:
-    loading it here will refuse it again, with the reason.
+    Raise FlightError if that process dies. If it only refuses the model, nothing is raised: loading the model here will
+    refuse it again, with the reason.
     """
     code = _try(str(aircraft.folder), model_hash(aircraft))
     if code not in {0, _REFUSED}:
@@ -225,14 +234,14 @@ def try_model(aircraft: Aircraft) -> None:
 
 @cache
 def _try(folder: str, _version: str) -> int | None:
-    """The exit code of the process, or None if it does not end."""
-    # The child finds our packages where this process found them.
+    """Return the exit code of the process, or None on timeout."""
+    # The child process finds planfly's packages where this process found them.
     root = str(Path(__file__).parents[2])
     paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
     try:
         done = subprocess.run(
-            [sys.executable, "-c", _RUN, folder],
-            env=os.environ | {"PYTHONPATH": paths}, capture_output=True, check=False, timeout=_SECONDS,
+            [sys.executable, "-c", _TRIAL_PROGRAM, folder],
+            env=os.environ | {"PYTHONPATH": paths}, capture_output=True, check=False, timeout=_TIMEOUT_S,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         return None

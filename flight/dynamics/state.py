@@ -1,10 +1,10 @@
-"""What passes between JSBSim and the guidance core: the aircraft's state and its commands, SI and radians."""
+"""State and commands exchanged between JSBSim and the guidance core, in SI units and radians."""
 
 from typing import NamedTuple
 
 from world.kernels import record_dtype
 
-# The state that `flight.dynamics.fdm.Fdm.read` gives.
+# The state that `flight.dynamics.fdm.Fdm.read` returns.
 STATE = record_dtype(
     "latitude",  # rad, geodetic
     "longitude",  # rad
@@ -29,7 +29,7 @@ STATE = record_dtype(
     "power",  # W from the battery
     "load_factor",  # g, normal to the wing, 1 in level flight
     "time",  # s since the start
-    "wind_north",  # m/s, total with gusts, the way the air moves
+    "wind_north",  # m/s, total with gusts, direction of air motion
     "wind_east",
     "wind_down",
 )

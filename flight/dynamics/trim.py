@@ -1,7 +1,7 @@
-"""Steady straight flight: the controls and attitude at which nothing accelerates, and the dynamics about it.
+"""Steady straight flight: controls and attitude without acceleration, and linear dynamics about it.
 
-A trim has eight quantities, `QUANTITIES`.  Two are held and Newton's method finds the other six, so that the six body
-accelerations vanish.  Speeds and angles are relative to the air mass.
+A trim has eight quantities, `QUANTITIES`. Two are held and Newton's method finds the other six, so that the six body
+accelerations vanish. Speeds and angles are relative to the air mass.
 """
 
 import math
@@ -21,17 +21,24 @@ Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
-# A running engine in a JSBSim model: its speed is a state of its own, which settles before anything is measured.
+# Running engine in a JSBSim model: its speed is a state of its own, which must settle before a measurement.
 
-# An engine's speed settles in steps of this, s; at most so many; rates within this, ft/s^2 and rad/s^2, are steady.
-_SETTLE_STEP, _SETTLE_STEPS, _SETTLED = 0.2, 300, 1e-10
-_RATE_STEPS = 6
+# Time step in which an engine's speed settles, s.
+_SETTLE_STEP_S = 0.2
+# Largest number of such steps.
+_MAX_SETTLE_STEPS = 300
+# Change of the rates below which they are steady, ft/s^2 and rad/s^2.
+_STEADY_RATE_CHANGE = 1e-10
+# Largest number of steps in which derivatives settle at constant engine speed.
+_MAX_RATE_STEPS = 6
 
 
 class Engine:
-    """A running engine that can be let turn until it is steady, while the aircraft stands still in its flow of air.
+    """A running engine whose speed can settle while the aircraft is held in its air flow.
 
-    fdm: the JSBSim instance.  dt: s, of its flight.  getter, setter: of its properties.
+    fdm: the JSBSim instance.
+    dt: time step of its flight, s.
+    getter, setter: access to its properties.
     """
 
     def __init__(self, fdm: Any, dt: float, getter: Callable[[str], Any], setter: Callable[[str], Any]) -> None:
@@ -46,7 +53,7 @@ class Engine:
         self._running = False
 
     def hold(self) -> None:
-        """Stop the motion of the aircraft and the use of fuel; start the engine if it does not run."""
+        """Stop the aircraft's motion and its fuel flow; start the engine if it is not running."""
         for integrator in self._integrators:
             integrator(0.0)
         self._freeze(1.0)
@@ -56,44 +63,51 @@ class Engine:
             self._running = True
 
     def settle(self, *, spin: bool) -> None:
-        """Let the engine take up its speed for the air and the throttle that are set; it keeps its speed without spin.
+        """Let the engine speed settle for the airspeed and throttle that are set.
 
-        Without spin, only what follows its own derivative (the lift of a changing angle of attack) settles.
+        Without ``spin`` the engine keeps its speed, and only quantities that depend on their own derivative (the lift
+        of a changing angle of attack) settle.
         """
-        self._exec.set_dt(_SETTLE_STEP if spin else 0.0)
+        self._exec.set_dt(_SETTLE_STEP_S if spin else 0.0)
         before = [0.0] * 6
-        for _ in range(_SETTLE_STEPS if spin else _RATE_STEPS):
+        for _ in range(_MAX_SETTLE_STEPS if spin else _MAX_RATE_STEPS):
             self._exec.run()
             now = [rate() for rate in self._rates]
-            # Not by NumPy, which takes as long for six numbers as JSBSim for its step.
-            if all(abs(a - b) < _SETTLED for a, b in zip(now, before, strict=True)):
+            # Without NumPy, which takes as long for six numbers as JSBSim for its step.
+            if all(abs(a - b) < _STEADY_RATE_CHANGE for a, b in zip(now, before, strict=True)):
                 break
             before = now
         self._exec.set_dt(self._dt)
 
     def release(self) -> None:
-        """Let everything move again."""
+        """Release the motion again."""
         for integrator, usual in zip(self._integrators, self._usual, strict=True):
             integrator(usual)
         self._freeze(0.0)
 
 
-# Of a trim vector (8,), in this order, SI and radians: climb is the flight-path angle to the air mass, bank turns about
-# the velocity; sideslip is zero.
+# Elements of a trim vector (8,), in this order, SI and radians: climb is the flight-path angle to the air mass, bank is
+# a rotation about the velocity; sideslip is zero.
 TrimQuantity = Literal["airspeed", "climb", "alpha", "bank", "elevator", "aileron", "rudder", "throttle"]
+# The same names as a tuple.
 QUANTITIES: tuple[TrimQuantity, ...] = get_args(TrimQuantity)
-# Of the order of one step of Newton's method; also the scale of the finite differences.
-_STEP = np.array([4.0, 0.1, 0.1, 0.05, 0.15, 0.05, 0.05, 0.2])
-_DIFFERENCE = 1e-5
-_CONVERGED = 1e-8  # m/s^2 and rad/s^2
-_ITERATIONS = 40
-# There is no such flight where steps get nowhere: halved in vain so often, or the accelerations not halved in so many.
-# Flights of the catalogue's aircraft are found without a step in vain, and halve them at every fourth step at least.
-_IN_VAIN, _WITHOUT_GAIN = 3, 10
+# Largest step of Newton's method for each quantity; also the scale of the finite differences.
+_MAX_NEWTON_STEP = np.array([4.0, 0.1, 0.1, 0.05, 0.15, 0.05, 0.05, 0.2])
+# Finite difference as a ratio to `_MAX_NEWTON_STEP`.
+_DIFFERENCE_RATIO = 1e-5
+# Largest acceleration of a converged trim, m/s^2 and rad/s^2.
+_MAX_TRIM_ACCELERATION = 1e-8
+# Largest number of Newton steps.
+_MAX_ITERATIONS = 40
+# Declare no trim after this many failed step halvings. Trims of the catalog's aircraft are found without one.
+_MAX_FAILED_HALVINGS = 3
+# Declare no trim after this many iterations without halving the residual. For the catalog's aircraft at least every
+# fourth step halves it.
+_MAX_STALLED_STEPS = 10
 
 
 def first_guess(airspeed: float) -> Floats:
-    """(8,) a trim vector near level flight at an airspeed (m/s)."""
+    """Return a trim vector (8,) near level flight at an airspeed (m/s)."""
     return np.array([airspeed, 0.0, 0.06, 0.0, -0.15, 0.0, 0.0, 0.8])
 
 
@@ -101,8 +115,12 @@ def first_guess(airspeed: float) -> Floats:
 class Trim:
     """A steady straight flight.
 
-    airspeed: m/s.  amsl: m.  climb: rad, flight-path angle to the air mass.  alpha, bank: rad.
-    elevator, aileron, rudder: rad.  throttle: 0..1.
+    airspeed: m/s.
+    amsl: m.
+    climb: rad, flight-path angle to the air mass.
+    alpha, bank: rad.
+    elevator, aileron, rudder: rad.
+    throttle: 0..1.
     """
 
     airspeed: float
@@ -116,31 +134,31 @@ class Trim:
     throttle: float
 
     def commands(self) -> Commands:
-        """The commands that hold it."""
+        """Return the commands that hold it."""
         return Commands(self.elevator, self.aileron, self.rudder, self.throttle)
 
     def vector(self) -> Floats:
-        """(8,) its trim vector, in the order of `QUANTITIES`."""
+        """Return its trim vector (8,), in the order of `QUANTITIES`."""
         return np.array([getattr(self, quantity) for quantity in QUANTITIES])
 
 
 class Simulator(Protocol):
-    """What a trim needs of a flight-dynamics model; `flight.dynamics.fdm.Fdm` has it."""
+    """Interface of a flight-dynamics model for trims; `flight.dynamics.fdm.Fdm` implements it."""
 
     def move_to(self, amsl: float) -> None:
-        """Move the point of evaluation to this height."""
+        """Move the point of evaluation to this altitude."""
 
     def balance(self, values: Floats) -> Floats:
-        """(6,) body accelerations, m/s^2 and rad/s^2, of the steady flight with this trim vector (8,)."""
+        """Return the body accelerations (6,), m/s^2 and rad/s^2, of a flight with this trim vector (8,)."""
 
     def surface_limits(self) -> tuple[float, float, float]:
-        """Elevator, aileron and rudder limits, rad, either way."""
+        """Return the elevator, aileron and rudder limits, rad, in either direction."""
 
     def first_guess(self) -> Floats:
-        """(8,) a trim vector to start from."""
+        """Return a trim vector (8,) to start from."""
 
     def derivatives(self, states: Floats, commands: Floats) -> Floats:
-        """(8,) rates of the states (u, v, w, p, q, r, roll, pitch) with surfaces and motor at their commands."""
+        """Return the rates (8,) of the states (u, v, w, p, q, r, roll, pitch) with these commands."""
 
 
 def solve(
@@ -149,10 +167,14 @@ def solve(
     limits: tuple[float, float, float],
     start: Floats | None = None,
 ) -> Floats | None:
-    """Return the trim vector (8,) with two quantities held, or None where there is no such flight.
+    """Return the trim vector (8,) with two quantities held, or None if there is no such flight.
 
-    balance: trim vector -> (6,) accelerations.  limits: of elevator, aileron, rudder.  start: (8,) first guess.
-    Newton's method with one-sided differences; a step is cut to `_STEP` and halved while it makes things worse.
+    balance: trim vector -> (6,) accelerations.
+    limits: limits of elevator, aileron, rudder.
+    start: (8,) first guess.
+
+    Newton's method with one-sided differences; a step is limited to `_MAX_NEWTON_STEP`, and halved while it increases
+    the residual.
     """
     values = (first_guess(25.0) if start is None else start).copy()
     for quantity, value in held.items():
@@ -160,23 +182,25 @@ def solve(
     free = np.array([k for k, quantity in enumerate(QUANTITIES) if quantity not in held])
     lowest, highest = _bounds(limits)
     residual = balance(values)
-    least, without_gain, in_vain = math.inf, 0, 0
-    for _ in range(_ITERATIONS):
+    least, stalled_steps, failed_halvings = math.inf, 0, 0
+    for _ in range(_MAX_ITERATIONS):
         size = float(np.abs(residual).max())
-        if size < _CONVERGED or not np.isfinite(size):
+        if size < _MAX_TRIM_ACCELERATION or not np.isfinite(size):
             break
-        least, without_gain = (size, 0) if size < 0.5 * least else (least, without_gain + 1)
-        if size > 10.0 * _CONVERGED and (in_vain >= _IN_VAIN or without_gain >= _WITHOUT_GAIN):
+        least, stalled_steps = (size, 0) if size < 0.5 * least else (least, stalled_steps + 1)
+        if size > 10.0 * _MAX_TRIM_ACCELERATION and (
+            failed_halvings >= _MAX_FAILED_HALVINGS or stalled_steps >= _MAX_STALLED_STEPS
+        ):
             break
         columns = []
         for k in free:
             moved = values.copy()
-            # Away from the stops: a surface past its stop no longer moves, and its column would be zero.
-            difference = _DIFFERENCE * _STEP[k] * (-1.0 if values[k] >= 0.0 else 1.0)
+            # Away from the stops: a surface beyond its stop does not move, and its column would be zero.
+            difference = _DIFFERENCE_RATIO * _MAX_NEWTON_STEP[k] * (-1.0 if values[k] >= 0.0 else 1.0)
             moved[k] += difference
             columns.append((balance(moved) - residual) / difference)
         step = least_squares(np.stack(columns, axis=1), -residual)
-        step /= max(1.0, float(np.abs(step / _STEP[free]).max()))
+        step /= max(1.0, float(np.abs(step / _MAX_NEWTON_STEP[free]).max()))
         for _ in range(6):
             trial = values.copy()
             trial[free] += step
@@ -186,9 +210,9 @@ def solve(
                 break
             step = 0.5 * step
         else:
-            in_vain += 1
+            failed_halvings += 1
         values, residual = trial, changed
-    return values if np.abs(residual).max() < 10.0 * _CONVERGED else None
+    return values if np.abs(residual).max() < 10.0 * _MAX_TRIM_ACCELERATION else None
 
 
 def _bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
@@ -201,7 +225,7 @@ def _bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
 def trim(
     simulator: Simulator, amsl: float, held: Mapping[TrimQuantity, float], near: Trim | None = None
 ) -> Trim | None:
-    """Return the steady flight at this height with two of its quantities held, or None if there is none.
+    """Return the steady flight at this altitude with two of its quantities held, or None if there is none.
 
     near: a trim to start from.
     """
@@ -220,7 +244,9 @@ def from_vector(values: Floats, amsl: float) -> Trim:
 def straight(
     simulator: Simulator, airspeed: float, amsl: float, climb: float = 0.0, near: Trim | None = None
 ) -> Trim | None:
-    """Steady flight at this airspeed (m/s), height (m) and air-mass path angle (rad); None where there is none.
+    """Return the steady flight at this airspeed (m/s), altitude (m) and climb angle (rad), or None.
+
+    The climb angle is relative to the air mass.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.fdm import Fdm
@@ -231,7 +257,7 @@ def straight(
     """
     found = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, near)
     if found is None and near is None:
-        # With little power to spare the search fails from afar, and succeeds from the climb at the same airspeed.
+        # With little excess power the search fails from far away, and succeeds from the climb at the same airspeed.
         steepest = full_throttle(simulator, airspeed, amsl)
         if steepest is not None and steepest.climb >= climb:
             found = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, steepest)
@@ -239,22 +265,25 @@ def straight(
 
 
 def full_throttle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Steepest steady climb at this airspeed (m/s) and height (m)."""
+    """Return the steepest steady climb at this airspeed (m/s) and altitude (m), or None."""
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 1.0}, near)
 
 
 def idle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Steepest steady descent at this airspeed (m/s) and height (m), throttle closed."""
+    """Return the steepest steady descent at this airspeed (m/s) and altitude (m), or None.
+
+    The throttle is closed.
+    """
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, near)
 
 
 def fastest(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Level flight at full throttle."""
+    """Return level flight at full throttle, or None."""
     return trim(simulator, amsl, {"climb": 0.0, "throttle": 1.0}, near)
 
 
 def slowest(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Level flight with the elevator at its upper stop."""
+    """Return level flight with the elevator at its upper stop, or None."""
     return trim(simulator, amsl, {"climb": 0.0, "elevator": -simulator.surface_limits()[0]}, near)
 
 
@@ -262,7 +291,7 @@ def linearise(simulator: Simulator, at: Trim) -> tuple[Floats, Floats]:
     """Return A (8, 8) and B (8, 4) about a trim, by central differences.
 
     States u, v, w, p, q, r, roll, pitch (m/s, rad/s, rad; velocity relative to the air); commands in the order of
-    `flight.dynamics.state.Commands`, with actuator and motor lags left out.  Height and course are held.
+    `flight.dynamics.state.Commands`, without actuator and motor lags. Altitude and course are held.
     """
     simulator.move_to(at.amsl)
     roll, pitch = attitude(at)
@@ -283,14 +312,17 @@ def linearise(simulator: Simulator, at: Trim) -> tuple[Floats, Floats]:
 
 
 def attitude(at: Trim) -> tuple[float, float]:
-    """Roll and pitch of a trim, rad."""
+    """Return roll and pitch of a trim, rad."""
     roll, pitch, _ = euler(body_axes(0.0, at.climb, at.bank, at.alpha))
     return roll, pitch
 
 
 def body_axes(heading: float, climb: float, bank: float, alpha: float) -> Floats:
-    """(3, 3) rotation from body to north-east-down axes for a velocity along ``heading`` and ``climb``, no sideslip."""
-    # Not by NumPy, whose sines of processors with AVX-512 differ in the last digit from others'.
+    """Return the rotation (3, 3) from body to north-east-down axes without sideslip.
+
+    heading, climb: direction of the velocity, rad.
+    """
+    # Without NumPy, whose sines on processors with AVX-512 differ in the last digit from other machines.
     ch, sh, cc, sc = math.cos(heading), math.sin(heading), math.cos(climb), math.sin(climb)
     cb, sb, ca, sa = math.cos(bank), math.sin(bank), math.cos(alpha), math.sin(alpha)
     forward = (ch * cc, sh * cc, -sc)
@@ -304,7 +336,7 @@ def body_axes(heading: float, climb: float, bank: float, alpha: float) -> Floats
 
 
 def euler(axes: Floats) -> tuple[float, float, float]:
-    """Roll, pitch and yaw, rad, of a rotation (3, 3) from body to north-east-down axes."""
+    """Return roll, pitch and yaw, rad, of a rotation (3, 3) from body to north-east-down axes."""
     return (
         math.atan2(axes[2, 1], axes[2, 2]),
         math.asin(min(1.0, max(-1.0, -float(axes[2, 0])))),
@@ -313,10 +345,13 @@ def euler(axes: Floats) -> tuple[float, float, float]:
 
 
 def air_velocity(course: float, climb: float, airspeed: float, wind: Floats) -> Floats:
-    """Velocity relative to the air, (3,) north, east, down, of a path over the ground in a wind.
+    """Return the air-relative velocity, (3,) north, east, down, of a path over the ground in a wind.
 
-    course, climb: rad, of the path.  airspeed: m/s.  wind: (3,) m/s, the way the air moves.
-    Raises FlightError where the airspeed makes no way against the wind.
+    course, climb: course and slope of the path, rad.
+    airspeed: m/s.
+    wind: (3,) m/s, direction of air motion.
+
+    Raise FlightError if the airspeed cannot overcome the wind along the path.
     """
     along = np.array([math.cos(climb) * math.cos(course), math.cos(climb) * math.sin(course), -math.sin(climb)])
     tailwind = float((along * wind).sum())

@@ -1,1 +1,1 @@
-"""Where to fly and with which commands: the fly-by path, lateral and vertical laws, inner loops and gains."""
+"""Guidance: the fly-by path, lateral and vertical control laws, inner loops and gains."""

@@ -1,4 +1,4 @@
-"""The gains that fit the guidance to an aircraft, read from ``aircraft/<name>/gains.toml``."""
+"""Gains of guidance and inner loops for an aircraft, read from ``aircraft/<name>/gains.toml``."""
 
 import math
 from dataclasses import MISSING, asdict, dataclass, fields
@@ -10,62 +10,63 @@ from world.errors import FlightError
 from world.files import did_you_mean, read_toml
 from world.kernels import Record, record_dtype
 
+# Name of the file of gains in an aircraft's folder.
 GAINS_FILE = "gains.toml"
 
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """Gains of the guidance core, in SI and radians.
+    """Gains of the guidance core, in SI units and radians.
 
-    Of the airframe and of the height:
+    Airframe and altitude:
 
-    reference_airspeed: the airspeed at which surface gains hold; they are scaled with dynamic pressure.
-    height_frequency, height_damping, height_integral: of the second-order law on the height's error.
-    slope_lead: how far ahead the path's slope is fed forward.
-    load_lead: how far ahead the lift is asked for the bank.
+    reference_airspeed: airspeed at which surface gains apply; they are scaled with dynamic pressure.
+    height_frequency, height_damping, height_integral: second-order altitude law.
+    slope_lead: lead time of the path's slope in the feedforward.
+    load_lead: lead time of the lift for the bank.
     alpha_per_g: angle of attack for the weight.
-    elevator_per_alpha, elevator_per_pitch_rate: what holds an angle of attack and a pitch rate.
-    pitch_rate_gain: damping.
+    elevator_per_alpha, elevator_per_pitch_rate: elevator that holds an angle of attack and a pitch rate.
+    pitch_rate_gain: pitch damping.
 
-    Of the airspeed:
+    Airspeed:
 
     speed_gain, speed_integral: throttle per m/s.
     throttle_per_slope: throttle per rad of climb.
-    throttle_idle: at which the motor begins to give thrust at the reference airspeed; the integral is not led below it.
-    slow_margin: below command less this, height gives way to speed.
-    arc_slowing_time, arc_slowing_max: so long before an arc, and by so much, the airspeed gives way to a ground speed
-    that the arc can be flown with.
+    throttle_idle: throttle at which the motor begins to give thrust at the reference airspeed; lower limit of the
+        integrator.
+    slow_margin: airspeed error below the command at which altitude yields to airspeed.
+    arc_slowing_time, arc_slowing_max: time before an arc, and largest reduction, by which the airspeed yields to a
+        ground speed at which the arc can be flown.
 
-    Across the path:
+    Cross-track:
 
-    cross_track_frequency, cross_track_damping, cross_track_integral: of the second-order cross-track law.
-    intercept: steepest course to the path that it flies when far away.
-    turn_lead, turn_smoothing: how far ahead the path's curvature is fed forward, and over how long it is averaged about
-    there.
-    aside_frequency: how fast the aircraft goes back to the path from where rolling into an arc took it.
-    side_gain, side_lag: how much of the sideways acceleration that bank and ailerons do not explain is answered, and
-    its lag.
-    push_lead, push_smoothing: how far ahead a correction is asked for, as the bank comes late, by its rate of change,
-    and over how long that is smoothed.
-    side_per_sideslip, side_per_aileron: sideways acceleration, m/s^2 a rad.
-    sideslip_max: skid where the bank ends.
+    cross_track_frequency, cross_track_damping, cross_track_integral: second-order cross-track law.
+    intercept: steepest course to the path from far away.
+    turn_lead, turn_smoothing: lead time of the path's curvature in the feedforward, and averaging time about that
+        point.
+    aside_frequency: frequency of the return to the path after the offset from rolling into an arc.
+    side_gain, side_lag: gain on the sideways acceleration that bank and ailerons do not explain, and its lag.
+    push_lead, push_smoothing: lead time of a correction to compensate the bank's lag, from its rate of change, and the
+        smoothing time of that rate.
+    side_per_sideslip, side_per_aileron: sideways acceleration, m/s^2 per rad.
+    sideslip_max: skid at the bank limit.
 
-    In roll and yaw:
+    Roll and yaw:
 
-    roll_frequency, roll_rate_max, roll_acceleration_max: of the model roll that the aircraft follows.
-    roll_gain, roll_rate_gain: aileron per rad and rad/s that it differs from it.
-    roll_disturbance_lag: of the estimate of what else rolls it.
-    aileron_lead: the ailerons' own lag.
-    aileron_per_roll_rate, aileron_per_roll_acceleration: what rolls the airframe.
-    rudder_per_yaw_rate: what turns it without sideslip.
-    yaw_rate_gain: damping.
+    roll_frequency, roll_rate_max, roll_acceleration_max: model roll that the aircraft follows.
+    roll_gain, roll_rate_gain: aileron per rad and rad/s of error from the model roll.
+    roll_disturbance_lag: lag of the estimate of other roll disturbances.
+    aileron_lead: lag of the ailerons.
+    aileron_per_roll_rate, aileron_per_roll_acceleration: ailerons that hold a roll rate and a roll acceleration.
+    rudder_per_yaw_rate: rudder for a yaw rate without sideslip.
+    yaw_rate_gain: yaw damping.
     sideslip_gain: rudder per rad of sideslip.
 
-    Of the reference laws, which have defaults, as have those that an aircraft can do without:
+    Reference laws, which have defaults, as have gains that an aircraft can do without:
 
     l1_period, l1_damping, l1_integral: ArduPlane's NAVL1_PERIOD, NAVL1_DAMPING and NAVL1_XTRACK_I, and its defaults.
     field_approach: course to the path far from it.
-    field_path, field_orbit: how the vector field closes in on a line and on an orbit.
+    field_path, field_orbit: convergence of the vector field on a line and on an orbit.
     field_course, field_course_integral: bank per course error.
     """
 
@@ -122,25 +123,27 @@ class Gains:
     throttle_idle: float = 0.0
 
     def record(self) -> Record:
-        """The gains for compiled code, as a record of `GAINS`."""
+        """Return the gains for compiled code, as a record of `GAINS`."""
         record: Record = np.zeros(1, GAINS)[0]
         for name, value in asdict(self).items():
             setattr(record, name, value)
         return record
 
 
+# Record of the fields of `Gains`, for compiled code.
 GAINS = record_dtype(*(item.name for item in fields(Gains)))
 
-# Suffixes that a key may carry, the longer first, and what takes the value to SI and radians.
-_DEG = math.radians(1.0)
-_UNITS = {
-    **{"_deg_s2": _DEG, "_deg_s": _DEG, "_deg": _DEG},
+# Factor of an angle in degrees.
+_DEG_TO_RAD = math.radians(1.0)
+# Suffixes that a key may carry, longer ones first, and the factor to SI units and radians.
+_UNIT_FACTORS = {
+    **{"_deg_s2": _DEG_TO_RAD, "_deg_s": _DEG_TO_RAD, "_deg": _DEG_TO_RAD},
     **dict.fromkeys(("_rad_s", "_1_s3", "_1_s2", "_1_s", "_1_m", "_mps2", "_mps", "_s2", "_s"), 1.0),
 }
 
 
 def load_gains(aircraft: Aircraft) -> Gains:
-    """Read the gains that stand beside an aircraft's model.  Raises FlightError for a missing, unknown or bad entry.
+    """Read the gains next to an aircraft's model. Raise FlightError for a missing, unknown or bad entry.
 
     >>> from aircraft.catalog import load_aircraft
     >>> load_gains(load_aircraft("aerosonde")).reference_airspeed
@@ -157,8 +160,8 @@ def load_gains(aircraft: Aircraft) -> Gains:
     for key, value in table.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise FlightError(f"{file}: {key} = {value!r} is not a finite number", file=file, field=key, value=value)
-        unit = next((unit for unit in _UNITS if key.endswith(unit)), "")
-        values[key.removesuffix(unit)] = float(value) * _UNITS.get(unit, 1.0)
+        unit = next((unit for unit in _UNIT_FACTORS if key.endswith(unit)), "")
+        values[key.removesuffix(unit)] = float(value) * _UNIT_FACTORS.get(unit, 1.0)
     known = {item.name for item in fields(Gains)}
     wanted = {item.name for item in fields(Gains) if item.default is MISSING}
     missing, unknown = sorted(wanted - set(values)), sorted(set(values) - known)

@@ -1,4 +1,4 @@
-"""Inner loops on roll, pitch and yaw rate, which every law shares, and what guidance keeps from tick to tick."""
+"""Inner loops on roll, pitch and yaw rate, shared by all control laws, and the memory of the guidance."""
 
 import math
 
@@ -7,16 +7,16 @@ import numpy as np
 from aircraft.envelope import GRAVITY
 from world.kernels import Record, inner, record_dtype
 
-# What guidance keeps from tick to tick, and what one tick leaves for the track.
+# State of the guidance from tick to tick, and one tick's values for the track.
 GUIDANCE_MEMORY = record_dtype(
     # Set before the first tick.
-    ("law", np.int64),  # of planfly's guidance: a value of `flight.autopilots.planfly.law.LAWS`
+    ("law", np.int64),  # control law of planfly's guidance: a value of `flight.autopilots.planfly.law.LAWS`
     "max_bank",  # rad, of the command
     "trim_elevator",  # rad, of level flight at the reference airspeed
     "trim_alpha",  # rad
     "trim_throttle",  # 0..1
     "stall_speed",  # m/s, equivalent
-    # Where on the path.
+    # Position on the path.
     ("piece", np.int64),  # index of the piece of the path
     ("leg", np.int64),
     "distance",  # m along the path
@@ -24,39 +24,39 @@ GUIDANCE_MEMORY = record_dtype(
     "height_error",  # m above it
     "speed_command",  # m/s
     ("done", np.bool_),  # past the end of the path
-    ("returning", np.bool_),  # on a way back that the autopilot finds by itself: it cannot miss the path's end
-    "circled",  # s since it came to the circle at the end of that way, and to its height
+    ("returning", np.bool_),  # on a return that the autopilot flies by itself: it cannot miss the path's end
+    "circled",  # s since it arrived at the loiter of that return, at its altitude
     "turned",  # rad around it since then, positive to the right
-    "bearing",  # rad, from its middle, a tick ago
-    # Across: the cross-track law.
+    "bearing",  # rad, bearing from its center, a tick ago
+    # Lateral: the cross-track law.
     "cross_track_sum",  # m s
     "last_velocity_east",  # m/s over the ground, a tick ago
     "last_velocity_north",
     "last_velocity_up",
     "unexplained_acceleration",  # m/s^2 to the right that bank and ailerons do not explain
-    "path_bank",  # rad and rad/s, of the model roll into the path's curvature alone
+    "path_bank",  # rad and rad/s, model roll for the path's curvature alone
     "path_bank_rate",
-    "aside",  # m right of the path and m/s, where that roll takes it
+    "aside",  # m right of the path and m/s, offset caused by that roll
     "aside_rate",
     "push",  # m/s^2 to the right that corrects errors, smoothed
-    "sideslip",  # rad, wanted
-    "arc_speed",  # m/s over the ground, of the sharpest arc near ahead; 0 for no limit
-    # Across: the reference laws.
+    "sideslip",  # rad, sideslip setpoint
+    "arc_speed",  # m/s over the ground, for the sharpest arc close ahead; 0 for no limit
+    # Lateral: the reference laws.
     ("l1_leg", np.int64),  # the leg that L1 is on
     "l1_sum",  # rad
     "course_sum",  # rad s, of the vector field
-    # Up.
+    # Vertical.
     "height_sum",  # m s
     "speed_sum",  # m
     "energy_rate",  # m/s, filtered rate of total energy height
     "last_airspeed",  # m/s, negative before the first tick
-    "airspeed",  # m/s, without its gusts
-    "bend_acceleration",  # m/s^2 upwards, of the path ahead
+    "airspeed",  # m/s, without gusts
+    "bend_acceleration",  # m/s^2 upwards, from the path's slope change ahead
     # Roll.
     "bank",  # rad, of the model roll
     "bank_rate",  # rad/s, of the model roll
     "last_roll_rate",  # rad/s, a tick ago
-    "roll_disturbance",  # rad of aileron that gusts and the propeller amount to
+    "roll_disturbance",  # rad of aileron, equivalent of gusts and propeller torque
 )
 
 
@@ -64,12 +64,12 @@ GUIDANCE_MEMORY = record_dtype(
 def steer_elevator(
     state: Record, gains: Record, memory: Record, commands: Record, climb_rate: float, push: float
 ) -> None:  # pragma: no cover - compiled
-    """Elevator for an acceleration upwards (m/s^2): load factor, angle of attack, elevator.
+    """Set the elevator for an upward acceleration ``push`` (m/s^2), by load factor and angle of attack.
 
     climb_rate: m/s.
     """
     airspeed = max(8.0, state.airspeed)
-    # Lift is slower than the ailerons: it is asked for the bank that comes.
+    # Lift responds more slowly than roll: use the bank predicted by the lead.
     roll = state.roll
     banked = roll + gains.load_lead * memory.bank_rate
     climb = math.asin(min(1.0, max(-1.0, climb_rate / airspeed)))
@@ -93,9 +93,9 @@ def steer_elevator(
 def roll_model(
     wanted: float, bank: float, rate: float, gains: Record, dt: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Bank (rad), roll rate and roll acceleration a tick on of an aircraft that rolls as ours shall.
+    """Return bank (rad), roll rate and roll acceleration of the model roll one tick later.
 
-    A critically damped oscillator within limits of roll rate and acceleration.
+    The model is a critically damped oscillator with limits of roll rate and roll acceleration.
     """
     frequency = gains.roll_frequency
     limit = gains.roll_acceleration_max
@@ -110,10 +110,14 @@ def roll_model(
 def follow_roll(
     state: Record, gains: Record, memory: Record, commands: Record, bank: float, rate: float, turn: float, dt: float
 ) -> None:  # pragma: no cover - compiled
-    """Aileron and rudder for a roll that is given: bank (rad), roll rate (rad/s) and roll acceleration (rad/s^2).
+    """Set aileron and rudder to follow a given roll.
 
-    The ailerons get what this roll takes, what is left of the error, and, against gusts and the propeller, what rolled
-    the aircraft beyond its ailerons' own doing.
+    bank: rad.
+    rate: roll rate, rad/s.
+    turn: roll acceleration, rad/s^2.
+
+    The ailerons get the deflection for this roll, the feedback of the remaining error, and the compensation of gusts
+    and propeller torque, estimated from the roll that the ailerons do not explain.
     """
     airspeed = max(8.0, state.airspeed)
     scale = gains.reference_airspeed / airspeed

@@ -1,8 +1,8 @@
-"""The lateral laws that other autopilots fly, as formulas: L1 and the vector field.
+"""Lateral control laws of other autopilots, as formulas: L1 and the vector field.
 
-L1 is the law of Park, Deyst and How ("A New Nonlinear Guidance Logic for Trajectory Tracking", AIAA 2004-4900) in the
-form that ArduPlane gives it: period and damping as parameters, a capture angle of 45 degrees, an integrator, and
-switching legs at a turn distance.  The field is that of Beard and McLain, *Small Unmanned Aircraft*, chapter 10.
+L1 is the law of Park, Deyst and How ("A New Nonlinear Guidance Logic for Trajectory Tracking", AIAA 2004-4900) in
+ArduPlane's form: period and damping as parameters, a capture angle of 45 degrees, an integrator, and leg switching at a
+turn distance. The vector field is from Beard and McLain, *Small Unmanned Aircraft*, chapter 10.
 """
 
 import math
@@ -16,35 +16,35 @@ from world.kernels import Record, Records, inner, record_dtype
 WAYPOINT = record_dtype(
     "east",  # m
     "north",
-    "turn",  # rad, positive whichever way round
+    "turn",  # rad, positive in either direction
     ("fly_over", np.bool_),
-    "acceptance",  # m; 0 where the mission states none
+    "acceptance",  # m; 0 if the mission states none
     "airspeed",  # m/s, of the leg
     "up",  # m AMSL
     "circle",  # m, radius of the loiter that it is a corner of, positive to the right; 0 for none
     "centre_east",  # m, of that circle
     "centre_north",
     ("item", np.int64),  # seq of the mission item that it belongs to, -1 for none
-    "stays",  # s, of a loiter once it is reached: inf without end, NaN for one of so many turns
-    "turns",  # of a loiter of so many, 0 for any other
-    ("to_height", np.bool_),  # whether the loiter is one to a height
-    ("leaves_on_course", np.bool_),  # whether its item asks to leave it on the course to what follows
-    ("leaves_on_tangent", np.bool_),  # whether the line to what follows is to begin on its rim, not in its middle
-    ("returns", np.bool_),  # whether the leg to it stands for a return; circle, centre and up are then of its target
-    ("stop", np.int64),  # which of the route's stops it belongs to: a jump back leads to another of the same item
-    ("gate", np.bool_),  # whether it is a CONDITION_GATE, which is passed and not flown to
-    ("ends", np.bool_),  # whether the mission ends there and goes no further: not to land, not home
-    ("straight", np.bool_),  # whether the leg to it leads from wherever the aircraft is, along no line
-    "slope_base",  # m, as of `flight.mission.return_path.ReturnCircle`
-    ("over_ground", np.bool_),  # whether the leg to it follows the ground
+    "stays",  # s, duration of a loiter once it is reached: inf without end, NaN for one with a number of turns
+    "turns",  # number of turns of a loiter, 0 for any other
+    ("to_height", np.bool_),  # True if the loiter climbs or descends to an altitude
+    ("leaves_on_course", np.bool_),  # True if its item states an exit on the course to the next waypoint
+    ("leaves_on_tangent", np.bool_),  # True if the line to the next waypoint begins on its circle, not at its center
+    ("returns", np.bool_),  # True if the leg to it stands for a return; circle, center and up are then the target's
+    ("stop", np.int64),  # stop of the route that it belongs to: a jump back leads to another stop of the same item
+    ("gate", np.bool_),  # True for a CONDITION_GATE, which is passed and not flown to
+    ("ends", np.bool_),  # True if the mission ends there without a landing or a return
+    ("straight", np.bool_),  # True if the leg to it leads from wherever the aircraft is, along no line
+    "slope_base",  # m, see `flight.mission.return_path.ReturnCircle`
+    ("over_ground", np.bool_),  # True if the leg to it follows the ground
     "above_ground",  # m, height above ground at the end of such a leg
 )
 
 
 def waypoint_column(count: int) -> Records:
-    """`WAYPOINT` records (count,), all 0, as apart from each other in memory as those of a flight's path.
+    """Return `WAYPOINT` records (count,), all 0, with the memory stride of a flight's path.
 
-    Records side by side are another type to numba, for which every law would be compiled a second time.
+    Contiguous records are another type to numba, for which every control law would be compiled a second time.
 
     >>> waypoint_column(3).shape, waypoint_column(3).flags.c_contiguous
     ((3,), False)
@@ -54,17 +54,19 @@ def waypoint_column(count: int) -> Records:
 
 # ArduPlane's WP_RADIUS where a mission states no acceptance, m.
 WAYPOINT_RADIUS = 90.0
-# L1 integrates only this near to its line (rad), and up to this much (rad).
-_INTEGRATES, _MAX_INTEGRAL = math.radians(5.0), 0.1
-# Steepest that L1 closes in on its line: sine of 45 degrees.
-_CAPTURE = math.sqrt(0.5)
-# L1 heads back to a waypoint that it passed this long ago, s.
-_PASSED = 3.0
+# Largest angle from its line at which L1 integrates, rad.
+_INTEGRATION_LIMIT_RAD = math.radians(5.0)
+# Largest magnitude of the L1 integrator, rad.
+_MAX_INTEGRATOR_RAD = 0.1
+# Steepest intercept of L1: sine of 45 degrees.
+_CAPTURE_SINE = math.sqrt(0.5)
+# Time after passing a waypoint at which L1 heads back to it, s.
+_PASSED_TIME_S = 3.0
 
 
 @inner
 def l1_length(speed: float, period: float, damping: float) -> float:  # pragma: no cover - compiled
-    """How far ahead L1 aims, m, at a ground speed (m/s)."""
+    """Return the L1 distance, m, at a ground speed (m/s)."""
     return period * damping * speed / math.pi
 
 
@@ -72,10 +74,12 @@ def l1_length(speed: float, period: float, damping: float) -> float:  # pragma: 
 def l1_angles(
     estimated: Record, a_east: float, a_north: float, b_east: float, b_north: float, length: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Angle from the ground velocity to the leg or the waypoint it heads for, and from there to its aim, rad.
+    """Return the angles from ground velocity to leg or waypoint, and from there to the aim point, rad.
 
-    estimated: a record of `flight.guidance.navigation_error.MOTION`.  a, b: the leg's ends, m.  The second angle is NaN
-    while it heads straight for a waypoint.  Both are positive where the aircraft has to turn left.
+    estimated: a record of `flight.guidance.navigation_error.MOTION`.
+    a_east, a_north, b_east, b_north: the leg's ends, m.
+
+    The second angle is NaN while the aircraft heads straight for a waypoint. Both are positive if it has to turn left.
     """
     leg_e, leg_n = b_east - a_east, b_north - a_north
     run = max(1e-6, math.hypot(leg_e, leg_n))
@@ -85,25 +89,28 @@ def l1_angles(
     cross = from_e * leg_n - from_n * leg_e
     distance = math.hypot(from_e, from_n)
     course = math.atan2(estimated.velocity_east, estimated.velocity_north)
-    if distance > length and along < -_CAPTURE * max(1.0, distance):
+    if distance > length and along < -_CAPTURE_SINE * max(1.0, distance):
         return wrap(course - math.atan2(-from_e, -from_n)), math.nan
-    if along > run + _PASSED * math.hypot(estimated.velocity_east, estimated.velocity_north):
+    if along > run + _PASSED_TIME_S * math.hypot(estimated.velocity_east, estimated.velocity_north):
         return wrap(course - math.atan2(b_east - estimated.east, b_north - estimated.north)), math.nan
-    aim = math.asin(min(_CAPTURE, max(-_CAPTURE, cross / max(0.1, length))))
+    aim = math.asin(min(_CAPTURE_SINE, max(-_CAPTURE_SINE, cross / max(0.1, length))))
     return wrap(course - math.atan2(leg_e, leg_n)), aim
 
 
 @inner
 def l1_integrate(aim: float, total: float, gain: float, dt: float) -> float:  # pragma: no cover - compiled
-    """The integral after a tick, rad."""
-    if math.isnan(aim) or abs(aim) >= _INTEGRATES:
+    """Return the cross-track integrator after a tick, rad."""
+    if math.isnan(aim) or abs(aim) >= _INTEGRATION_LIMIT_RAD:
         return total
-    return min(_MAX_INTEGRAL, max(-_MAX_INTEGRAL, total + aim * gain * dt))
+    return min(_MAX_INTEGRATOR_RAD, max(-_MAX_INTEGRATOR_RAD, total + aim * gain * dt))
 
 
 @inner
 def l1_acceleration(angle: float, speed: float, length: float, damping: float) -> float:  # pragma: no cover - compiled
-    """Acceleration to the right, m/s^2, for a total angle that the velocity stands right of the aim, rad."""
+    """Return the acceleration to the right, m/s^2.
+
+    angle: angle of the velocity to the right of the aim, rad.
+    """
     angle = min(0.5 * math.pi, max(-0.5 * math.pi, angle))
     return -4.0 * damping * damping * speed * speed / length * math.sin(angle)
 
@@ -112,10 +119,13 @@ def l1_acceleration(angle: float, speed: float, length: float, damping: float) -
 def l1_reached(
     estimated: Record, a: Record, b: Record, length: float, radius: float
 ) -> bool:  # pragma: no cover - compiled
-    """Whether L1 turns to the next leg: within its turn distance of b, or past the line square to the leg there.
+    """Return True if L1 switches to the next leg.
 
-    estimated: as `l1_angles` takes it.  a, b: the leg's ends, of `WAYPOINT`.  radius: m, for a right angle; smaller
-    turns start later.
+    It switches within the turn distance of b, or past the line through b across the leg.
+
+    estimated: as for `l1_angles`.
+    a, b: the leg's ends, of `WAYPOINT`.
+    radius: turn distance for a right angle, m; smaller turns start later.
     """
     leg_e, leg_n = b.east - a.east, b.north - a.north
     to_e, to_n = b.east - estimated.east, b.north - estimated.north
@@ -130,12 +140,14 @@ def l1_reached(
 def field_course(
     course: float, cross: float, curvature: float, approach: float, path_gain: float, orbit_gain: float
 ) -> float:  # pragma: no cover - compiled
-    """Course that the vector field commands beside a path, rad.
+    """Return the course that the vector field commands next to a path, rad.
 
-    course: of the path here, rad.  cross: m right of it.  curvature: 1/m, positive to the right.
+    course: course of the path here, rad.
+    cross: m right of the path.
+    curvature: 1/m, positive to the right.
     """
     if curvature == 0.0:
         return course - approach * 2.0 / math.pi * math.atan(path_gain * cross)
-    # Outside a right turn is left of it: cross is then negative, and the distance over the radius -cross * curvature.
+    # Outside a right turn is left of it: cross is then negative, and -cross * curvature is distance over radius.
     side = math.copysign(1.0, curvature)
     return course + side * math.atan(-orbit_gain * cross * curvature)

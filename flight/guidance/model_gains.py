@@ -1,7 +1,7 @@
-"""Gains that follow from an aircraft's model by a rule, in a second: its linear model, and round figures for the rest.
+"""Compute gains from an aircraft's linear model and from typical values for the rest, in a second.
 
-The airframe's own gains are read off a linear model in level flight at cruise (500 m); the loops about roll and pitch
-are placed by its control power, as fast as its servos and its airspeed allow.
+The airframe's own gains come from a linear model in level flight at cruise (500 m); the roll and pitch loops are placed
+by control power, as fast as servos and airspeed allow.
 """
 
 import math
@@ -16,10 +16,10 @@ from flight.guidance.gains import Gains
 from world.errors import FlightError
 from world.least_squares import least_squares
 
-# Height that the model is linearised at, m.
+# Altitude of the linear model, m.
 AMSL = 500.0
-# Round figures at an airspeed of 25 m/s, of the size that searches of the Aerosonde found
-# (`benchmarks.tuning.tune_gains`): an aircraft that is slower does all of it sooner, one that is faster later.
+# Typical gains at an airspeed of 25 m/s, of the size that searches found for the Aerosonde
+# (`benchmarks.tuning.tune_gains`): a slower aircraft reacts sooner, a faster one later.
 ROUND_FIGURES = {
     "cross_track_frequency": 1.0,
     "cross_track_damping": 0.8,
@@ -48,13 +48,23 @@ ROUND_FIGURES = {
     "speed_integral": 0.01,
     "throttle_per_slope": 2.0,
 }
-_POWERS = {"frequency": -1, "lead": 1, "smoothing": 1, "lag": 1, "cross_track_integral": -3, "height_integral": -3}
-# A loop about roll closes at this phase of the servo's lag, rad; its damping.
-_SERVO_PHASE, _DAMPING = 0.4, 0.8
-# Step of the throttle by which it is looked for where the motor's current begins to flow.
-_CURRENT = 0.02
-# What does not follow from the model.
-_LIMITS = {
+# Power of the airspeed ratio that a gain scales with, by the end of its name.
+_AIRSPEED_POWERS = {
+    "frequency": -1,
+    "lead": 1,
+    "smoothing": 1,
+    "lag": 1,
+    "cross_track_integral": -3,
+    "height_integral": -3,
+}
+# Phase of the servo lag at the bandwidth of the roll loop, rad.
+_SERVO_PHASE_RAD = 0.4
+# Damping ratio of the roll and pitch loops.
+_DAMPING_RATIO = 0.8
+# Throttle step in the search for the onset of motor current.
+_THROTTLE_STEP = 0.02
+# Limits that do not follow from the model.
+_FIXED_GAINS = {
     "intercept": math.radians(35.0),
     "roll_rate_max": math.radians(80.0),
     "roll_acceleration_max": math.radians(400.0),
@@ -64,19 +74,22 @@ _LIMITS = {
 
 
 def at_airspeed(airspeed: float) -> dict[str, float]:
-    """`ROUND_FIGURES` for an airspeed, m/s.  Gains on surfaces are per airspeed's own effect on them, and stay."""
+    """Return `ROUND_FIGURES` scaled to an airspeed, m/s.
+
+    Gains of control surfaces are scaled with airspeed elsewhere, and stay.
+    """
     ratio = airspeed / 25.0
     found: dict[str, float] = {}
     for name, value in ROUND_FIGURES.items():
-        power = next((power for end, power in _POWERS.items() if name.endswith(end)), 0)
+        power = next((power for end, power in _AIRSPEED_POWERS.items() if name.endswith(end)), 0)
         found[name] = value * ratio**power
     return found
 
 
 def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, float]:
-    """The gains that are the airframe's own, off its linearisation in level cruise.
+    """Return the gains of the airframe, from its linear model in level cruise.
 
-    Raises FlightError for an aircraft that holds no level flight at cruise.
+    Raise FlightError for an aircraft that cannot hold level flight at cruise.
     """
     fdm = Fdm(aircraft) if fdm is None else fdm
     return _airframe_gains(aircraft, *linearise(fdm, _level(aircraft, fdm)))
@@ -94,7 +107,7 @@ def _airframe_gains(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float
     speed = aircraft.airspeed
     _, v, w, p, q, r = range(6)
     elevator, aileron, rudder = range(3)
-    # Steady yaw rate without sideslip: ailerons and rudder balance its rolling and yawing moments.
+    # Steady yaw rate without sideslip: ailerons and rudder balance the rolling and yawing moments of the yaw rate.
     steered = abs(b[r, rudder]) > 1e-6
     hold = least_squares(b[np.ix_([p, r], [aileron, rudder])], -a[[p, r], r])[1] if steered else 0.0
     return {
@@ -111,43 +124,45 @@ def _airframe_gains(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float
 
 
 def idle_throttle(aircraft: Aircraft, fdm: Fdm, level: Trim) -> float:
-    """Throttle (0..1) below which an electric motor gives no thrust in this level flight, to 0.02; 0 without one.
+    """Return the throttle (0..1) below which an electric motor has no thrust in this level flight.
 
-    Its current does not flow yet there.
+    Below it no motor current flows. Its resolution is 0.02. Return 0 for an aircraft without an electric motor.
     """
     fdm.move_to(level.amsl)
-    for throttle in np.arange(0.0, level.throttle, _CURRENT).tolist():
+    for throttle in np.arange(0.0, level.throttle, _THROTTLE_STEP).tolist():
         fdm.balance(replace(level, throttle=throttle).vector())
         if float(fdm.read().power) > 0.0 and aircraft.battery_voltage:
-            return float(max(0.0, throttle - _CURRENT))
+            return float(max(0.0, throttle - _THROTTLE_STEP))
     return 0.0
 
 
 def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
-    """All gains of an aircraft, by the rule of this file.
+    """Return all gains of an aircraft by the rule of this module.
 
-    fdm: of the aircraft, with an engine at rest; None makes one.
-    Raises FlightError as `airframe_gains` does.
+    fdm: simulation of the aircraft with its engine at rest; None creates one. Raise FlightError as `airframe_gains`
+        does.
     """
     fdm = Fdm(aircraft) if fdm is None else fdm
     level = _level(aircraft, fdm)
     a, b = linearise(fdm, level)
     own = _airframe_gains(aircraft, a, b)
-    placed = at_airspeed(aircraft.airspeed) | own | _LIMITS | {"throttle_idle": idle_throttle(aircraft, fdm, level)}
+    placed = (
+        at_airspeed(aircraft.airspeed) | own | _FIXED_GAINS | {"throttle_idle": idle_throttle(aircraft, fdm, level)}
+    )
     _, _, _, p, q, r = range(6)
     elevator, aileron, rudder = range(3)
-    # Roll: two poles as fast as the servo lets them be.
-    fastest = _SERVO_PHASE / aircraft.surface_lag
+    # Roll: two poles as fast as the servo allows.
+    fastest = _SERVO_PHASE_RAD / aircraft.surface_lag
     frequency = min(fastest, placed["roll_frequency"])
     power, damping = b[p, aileron], -a[p, p]
     placed["roll_frequency"] = frequency
     placed["roll_gain"] = frequency**2 / power
-    placed["roll_rate_gain"] = max(0.2 * frequency, 2.0 * _DAMPING * frequency - damping) / power
+    placed["roll_rate_gain"] = max(0.2 * frequency, 2.0 * _DAMPING_RATIO * frequency - damping) / power
     placed["roll_rate_max"] = min(placed["roll_rate_max"], 0.6 * aircraft.max_aileron * power / damping)
     placed["roll_acceleration_max"] = min(placed["roll_acceleration_max"], 0.5 * aircraft.max_aileron * power)
-    # Pitch: damping for the short period, as far as the servo's lag leaves it damping.
+    # Pitch: damping of the short period, as far as the servo lag leaves it damping.
     stiffness = max(1.0, -a[q, 2] * aircraft.airspeed)
-    missing = 2.0 * _DAMPING * math.sqrt(stiffness) + a[q, q] + a[2, 2]
+    missing = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness) + a[q, q] + a[2, 2]
     placed["pitch_rate_gain"] = min(max(0.0, missing), fastest) / -b[q, elevator]
     steering = -b[r, rudder]
     if steering > 1e-6:
@@ -161,8 +176,8 @@ def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
     return Gains(**placed)
 
 
-# Units of the keys in a file, by the gains' names; those without one are plain numbers.
-_UNITS = {
+# Unit suffixes of the keys in a file, by gain; gains without one are plain numbers.
+_UNIT_SUFFIXES = {
     "reference_airspeed": "_mps", "cross_track_frequency": "_rad_s", "cross_track_integral": "_1_s3",
     "turn_lead": "_s", "turn_smoothing": "_s", "aside_frequency": "_rad_s", "side_lag": "_s", "push_lead": "_s",
     "push_smoothing": "_s", "height_frequency": "_rad_s", "height_integral": "_1_s3", "slope_lead": "_s",
@@ -176,7 +191,7 @@ _UNITS = {
 
 
 def gains_text(gains: Gains) -> str:
-    """The text of a ``gains.toml``; what has its default is left out."""
+    """Return the text of a ``gains.toml`` without default values."""
     usual = {item.name: item.default for item in fields(Gains)}
     lines = [
         "# Gains of the guidance and inner loops; flight/guidance/gains.py says what each means.",
@@ -184,7 +199,7 @@ def gains_text(gains: Gains) -> str:
         "",
     ]
     for item in fields(Gains):
-        value, unit = getattr(gains, item.name), _UNITS.get(item.name, "")
+        value, unit = getattr(gains, item.name), _UNIT_SUFFIXES.get(item.name, "")
         if value != usual[item.name]:
             shown = math.degrees(value) if "_deg" in unit else value
             lines.append(f"{item.name}{unit} = {float(f'{shown:.4g}')!r}")

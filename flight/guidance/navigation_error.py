@@ -1,7 +1,7 @@
-"""The estimated state, which guidance steers by: the true position and velocity, and an error that wanders with time.
+"""Estimated state that guidance uses: true position and velocity plus a time-correlated error.
 
-Each axis has a second-order Gauss-Markov error, as an estimator that blends satellites with inertial sensors leaves: it
-wanders smoothly, and the velocity's error is its rate.  The autocorrelation is (1 + t / T) exp(-t / T).
+Each axis has a second-order Gauss-Markov error, typical of an estimator that blends satellite and inertial navigation:
+it varies smoothly, and the velocity error is its rate. The autocorrelation is (1 + t / T) exp(-t / T).
 """
 
 import math
@@ -18,15 +18,16 @@ Floats = NDArray[np.float64]
 ERRORS = {"perfect": (0.0, 1.0), "rtk": (0.05, 5.0), "gnss": (1.5, 20.0)}
 # Position (m) and velocity over the ground (m/s) in map axes, true or estimated.
 MOTION = record_dtype("east", "north", "up", "velocity_east", "velocity_north", "velocity_up")
-_MOTION = field_names(MOTION)
-# Two lags in a row for each of the three axes, of unit variance.
+# Names of the fields of `MOTION`.
+_MOTION_FIELDS = field_names(MOTION)
+# Two lags in series of unit variance for each of the three axes.
 NAVIGATION_LAGS = record_dtype(("first", np.float64, (3,)), ("second", np.float64, (3,)))
 
 
 def start_navigation(noise: Floats, lags: Record) -> None:
     """Draw the stationary state of the lags, a record of `NAVIGATION_LAGS`, from (6,) unit normals."""
     lags.first = noise[:3]
-    # As in `flight.simulation.turbulence.start_gusts`.
+    # See `flight.simulation.turbulence.start_gusts`.
     lags.second = 0.5 * noise[:3] + 0.5 * noise[3:]
 
 
@@ -40,12 +41,14 @@ def navigate(
     time_constant: float,
     dt: float,
 ) -> None:  # pragma: no cover - compiled
-    """Fill the estimated state with the true one and its error, and advance the error.
+    """Set the estimated state to the true state plus the error, and advance the error.
 
-    true, estimated: records of `MOTION`.  lags: of `NAVIGATION_LAGS`.  noise: (3,) unit normals.
+    true, estimated: records of `MOTION`.
+    lags: a record of `NAVIGATION_LAGS`.
+    noise: (3,) unit normals.
     """
     if sigma == 0.0:
-        for name in literal_unroll(_MOTION):
+        for name in literal_unroll(_MOTION_FIELDS):
             estimated[name] = true[name]
         return
     east, velocity_east = _error(lags, 0, noise, sigma, time_constant, dt)
@@ -63,9 +66,9 @@ def navigate(
 def _error(
     lags: Record, axis: int, noise: Floats, sigma: float, time_constant: float, dt: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Error of the position (m) and of the velocity (m/s) on one axis, a tick on."""
+    """Return the errors of position (m) and velocity (m/s) on one axis, one tick later."""
     decay = math.exp(-dt / time_constant)
-    # The second lag's variance is a half of the first's.
+    # The second lag's variance is half of the first lag's variance.
     scale = sigma * math.sqrt(2.0)
     first, second = lags.first, lags.second
     before = first[axis]

@@ -1,9 +1,9 @@
-"""The path that a fixed wing can fly: straight legs joined by fly-by arcs, slopes joined by parabolas.
+"""Fly-by path of a fixed wing: straight legs joined by fly-by arcs, slopes joined by parabolas.
 
-A fly-by arc has the bank-limited radius for the highest ground speed on its way, and the corners of a loiter that of
-its circle.  Where the legs are too short for their turns, arcs are drawn tighter than the bank limit so that the path
-stays whole: the flight will then leave it, and the verdict says so.  A fly-over waypoint is passed through: its corner
-stays sharp, as do U-turns.
+A fly-by arc has the bank-limited radius for the highest ground speed in the turn, and the corners of a loiter have the
+loiter's radius. If the legs are too short for their turns, arcs are drawn tighter than the bank limit so that the path
+stays continuous: the flight will then leave it, and the verdict says so. A fly-over waypoint is passed through: its
+    corner stays sharp, as do U-turns.
 """
 
 import math
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
-# Where on a `FlyByPath` one is, its curvature, its height: for the compiled loop.
+# Position on a `FlyByPath`, its curvature and its altitude, for the compiled loop.
 
 
 # A straight piece or an arc of the path.
@@ -38,21 +38,24 @@ PIECE = record_dtype(
     "north",
     "course",  # rad, at its start
     "curvature",  # 1/m, positive to the right
-    ("leg", np.int64),  # of its start
-    "leg_change",  # m along the path where the next leg begins; infinite where it does not
+    ("leg", np.int64),  # leg at its start
+    "leg_change",  # m along the path where the next leg begins; infinite if it does not begin on this piece
 )
-# A corner of the height profile and the parabola that blends it.
+# A corner of the altitude profile and the parabola that blends it.
 NODE = record_dtype(
     "distance",  # m along the path
     "height",  # m
-    "slope",  # tangent, after it
+    "slope",  # tangent, after the corner
     "half_length",  # m, of its parabola
 )
 
 
 @inner
 def project(piece: Record, east: float, north: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Distance along a piece (m), cross-track error to the right (m) and the path's course there (rad)."""
+    """Return the distance along a piece (m), the cross-track error (m) and the path's course there (rad).
+
+    The cross-track error is positive to the right.
+    """
     course, curvature = piece.course, piece.curvature
     de, dn = east - piece.east, north - piece.north
     if curvature == 0.0:
@@ -61,7 +64,7 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
             de * math.cos(course) - dn * math.sin(course),
             course,
         )
-    # From the centre, which lies right of the start by 1 / curvature.
+    # From the center, which lies right of the start by 1 / curvature.
     ve = de - math.cos(course) / curvature
     vn = dn + math.sin(course) / curvature
     side = math.copysign(1.0, curvature)
@@ -74,10 +77,11 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
 
 @inner
 def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:  # pragma: no cover - compiled
-    """Note in the memory where on the path the aircraft is, and return the path's course there, rad.
+    """Update the position along the path in the memory, and return the path's course there, rad.
 
-    estimated: a record of `flight.guidance.navigation_error.MOTION`.  pieces: of `PIECE`.  memory: a record of
-    `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
+    estimated: a record of `flight.guidance.navigation_error.MOTION`.
+    pieces: of `PIECE`.
+    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
     k = memory.piece
     along, cross, course = project(pieces[k], estimated.east, estimated.north)
@@ -95,9 +99,9 @@ def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:  
 
 @inner
 def leave_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:  # pragma: no cover - compiled
-    """Move on in the memory behind sharp corners to the leg that an autopilot has turned to.
+    """Advance the memory past sharp corners to the leg that an autopilot has turned to.
 
-    It may turn back before it passes the end of the leg before.  The others are as `find_on_path` takes them.
+    The autopilot may turn back before it passes the end of the leg before. Other arguments as for `find_on_path`.
     """
     while memory.piece + 1 < pieces.shape[0] and pieces[memory.piece].leg < leg:
         piece, following = pieces[memory.piece], pieces[memory.piece + 1]
@@ -109,7 +113,7 @@ def leave_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:  # p
 
 @inner
 def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
-    """Mean curvature of the path between two distances, both at or after piece ``k``, 1/m."""
+    """Return the mean curvature of the path between two distances, both at or after piece ``k``, 1/m."""
     total = 0.0
     for i in range(k, pieces.shape[0]):
         piece = pieces[i]
@@ -124,7 +128,10 @@ def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float: 
 
 @inner
 def max_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
-    """Sharpest curvature of the path between two distances, both at or after piece ``k``, 1/m, positive."""
+    """Return the largest curvature of the path between two distances, 1/m, positive.
+
+    Both distances are at or after piece ``k``.
+    """
     sharpest = 0.0
     for i in range(k, pieces.shape[0]):
         piece = pieces[i]
@@ -137,7 +144,7 @@ def max_curvature(pieces: Records, k: int, start: float, end: float) -> float:  
 
 @compiled
 def profile(nodes: Records, s: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Height (m), slope (tangent) and its change per metre of the height profile at distance ``s``."""
+    """Return altitude (m), slope (tangent) and slope change per meter of the altitude profile at ``s``."""
     k = 0
     while k + 1 < nodes.shape[0] and nodes[k + 1].distance <= s:
         k += 1
@@ -153,16 +160,16 @@ def profile(nodes: Records, s: float) -> tuple[float, float, float]:  # pragma: 
     return node.height + node.slope * (s - node.distance), node.slope, 0.0
 
 
-# Chords of an arc turn by at most this, rad.
+# Largest turn per chord of an arc, rad.
 CHORD = math.radians(5.0)
 
 
 @dataclass(frozen=True, slots=True)
 class FlyByPath:
-    """A path by distance along it.
+    """A fly-by path by the distance along it.
 
     pieces: (p,) of `PIECE`, straight pieces and arcs.
-    nodes: (k,) of `NODE`, the corners of the height profile.
+    nodes: (k,) of `NODE`, the corners of the altitude profile.
     length: m.
     """
 
@@ -176,23 +183,25 @@ class FlyByPath:
         self.nodes.setflags(write=False)
 
 
-# Sides of the turn behind a waypoint that is flown over.
+# Sides of the turn after a waypoint that is flown over.
 Swing = Literal["none", "short", "long"]
 # Turns within this angle of 180 degrees may go to either side, rad: a navigation error of 5 m over ArduPlane's L1
 # distance of 60 m at 25 m/s.
 REVERSAL_SIDE_TOLERANCE_RAD = math.radians(5.0)
 
-# Corners of the height profile along a leg that follows the ground are this far apart, m: ArduPlane's TERRAIN_SPACING.
+# Distance between corners of the altitude profile along a leg that follows the ground, m: ArduPlane's TERRAIN_SPACING.
 GROUND_STEP_M = 100.0
 
 
 def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, swing: Swing = "short") -> FlyByPath:
-    """Join the legs of a route.  The route has at least one leg; only the first may have no length.
+    """Join the legs of a route to a fly-by path.
 
-    An arc leads by each waypoint; behind one that is flown over, arcs lead back to the next leg.
-    terrain: what legs follow that are flown above ground; None flies them straight.
-    swing: "none" leaves such corners sharp, as the reference of an autopilot that turns by a law of its own; "long"
-        turns at `reversals` to the side of the longer turn.
+    The route has at least one leg, and only its first leg may have no length. An arc passes each waypoint; after one
+    that is flown over, arcs lead back to the next leg.
+
+    terrain: ground that legs at a height above ground follow; None flies them straight.
+    swing: "none" leaves such corners sharp, as the reference of an autopilot with its own turn law; "long" turns at
+        `reversals` to the side of the longer turn.
 
     A right angle, flown with 0.5 rad of bank at 25 m/s in calm air, is an arc of 117 m:
 
@@ -209,18 +218,18 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, sw
     """
     points = route.waypoints
     courses, runs, turns = leg_courses(points), leg_runs(points), _turns(route, swing)
-    tangents, radii, back = _arcs(route, limits, courses, runs, turns)
+    tangents, radii, back = _arcs_at_waypoints(route, limits, courses, runs, turns)
     back *= swing != "none"
     pieces: list[tuple[float, ...]] = []
     nodes: list[tuple[float, float]] = [(0.0, float(points[0, 2]))]
-    # A circle that the flight begins on may end where it begins.
+    # A loiter that the flight begins on may end where it begins.
     slopes = np.divide(np.diff(points[:, 2]), runs, out=np.zeros_like(runs), where=runs > 0.0)
     at, begin = 0.0, points[0, :2].copy()
     for leg in range(route.legs):
         straight = runs[leg] - tangents[leg] - back[leg] - tangents[leg + 1]
         course = float(courses[leg])
         if terrain is not None and math.isfinite(route.above_ground[leg + 1]):
-            nodes += _above_ground(route, terrain, leg, begin, course, at, straight)
+            nodes += _ground_profile_corners(route, terrain, leg, begin, course, at, straight)
         if straight > 1e-6 or not pieces:
             pieces.append((at, straight, *begin, course, 0.0, leg, math.inf))
             at += straight
@@ -232,7 +241,7 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, sw
         turn, after = float(turns[leg]), float(courses[leg + 1])
         if back[leg + 1] > 0.0:
             # Through the waypoint, and back to the next leg on arcs.
-            for place, heading, curvature, length in _swing(corner[:2], course, turn, radii[leg + 1]):
+            for place, heading, curvature, length in _fly_over_arcs(corner[:2], course, turn, radii[leg + 1]):
                 pieces.append((at, length, *place, heading, curvature, leg + 1, math.inf))
                 at += length
             begin = corner[:2] + back[leg + 1] * np.array([math.sin(after), math.cos(after)])
@@ -245,11 +254,11 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, sw
         at += length
         begin = corner[:2] + tangents[leg + 1] * np.array([math.sin(after), math.cos(after)])
         nodes.append((at, float(corner[2] + slopes[leg + 1] * tangents[leg + 1])))
-    return FlyByPath(np.array(pieces, PIECE), _profile(nodes, limits, route), float(at))
+    return FlyByPath(np.array(pieces, PIECE), _altitude_profile(nodes, limits, route), float(at))
 
 
 def reversals(route: Route) -> NDArray[np.int64]:
-    """Return the indices of the waypoints that are flown over and reverse the course, so that either side is turned to.
+    """Return the indices of fly-over waypoints that reverse the course: either turn side is possible.
 
     >>> way = np.array([[0.0, 0.0, 90.0], [0.0, 900.0, 90.0], [60.0, 0.0, 90.0], [900.0, 0.0, 90.0]])
     >>> over = np.array([False, True, True, False])
@@ -261,7 +270,7 @@ def reversals(route: Route) -> NDArray[np.int64]:
 
 
 def _turns(route: Route, swing: Swing) -> Floats:
-    """Return the turn at each inner waypoint, (w - 2,) rad, positive to the right; as of `fly_by_path`."""
+    """Return the turn at each inner waypoint, (w - 2,) rad, positive to the right; see `fly_by_path`."""
     turns = signed_turns(route.waypoints)
     if swing == "long":
         corners = reversals(route) - 1
@@ -269,13 +278,16 @@ def _turns(route: Route, swing: Swing) -> Floats:
     return turns
 
 
-def _above_ground(
+def _ground_profile_corners(
     route: Route, terrain: Terrain, leg: int, begin: Floats, course: float, at: float, straight: float
 ) -> list[tuple[float, float]]:
-    """Return corners (distance along the path, altitude; m) of the height profile of a leg that follows the ground.
+    """Return corners (distance along the path, altitude; m) of the altitude profile of a leg above ground.
 
-    The height above ground changes evenly from its value at the leg's start to the value that is asked for.
-    begin: (2,) m, where the leg's straight part begins, at a distance along the path (m).  straight: its length, m.
+    The height above ground changes linearly from its value at the leg's start to the stated value at its end.
+
+    begin: (2,) m, start of the leg's straight part.
+    at: distance of that start along the path, m.
+    straight: length of the straight part, m.
     """
     first, end = route.waypoints[leg], float(route.above_ground[leg + 1])
     start = float(first[2]) - float(terrain.height(first[0], first[1]))
@@ -291,11 +303,13 @@ def _above_ground(
     return corners
 
 
-def _arcs(route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Floats) -> tuple[Floats, Floats, Floats]:
+def _arcs_at_waypoints(
+    route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Floats
+) -> tuple[Floats, Floats, Floats]:
     """Return the arcs at each waypoint, (w,) m each.
 
-    They are the tangent lengths of fly-by arcs, shrunk where a leg is too short for them; the radii; and, for waypoints
-    that are flown over, the length of the next leg until the path is back on it, 0 where that leg is too short.
+    They are the tangent lengths of fly-by arcs, shortened if a leg is too short for them; the radii; and, for waypoints
+    that are flown over, the length of the next leg until the path is back on it, 0 if that leg is too short.
     """
     count = len(route.waypoints)
     tangents, radii, back = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -314,7 +328,7 @@ def _arcs(route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Fl
     sharp = np.concatenate([[False], np.abs(turns) > SHARPEST_FLY_BY, [False]])
     short = tangents[:-1] + tangents[1:] > runs
     tangents[sharp & (np.append(short, False) | np.append(False, short))] = 0.0
-    # Where the wind leaves no way along a leg there is no radius; the longest that fits is drawn.
+    # A leg that cannot be flown in this wind has no radius; draw the longest arc that fits.
     tangents[1:-1] = np.minimum(tangents[1:-1], np.minimum(runs[:-1], runs[1:]))
     wanted = tangents.copy()
     for leg in range(len(runs)):
@@ -325,21 +339,27 @@ def _arcs(route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Fl
             tangents[leg + 1] = min(tangents[leg + 1], wanted[leg + 1] * share)
     drawn = np.flatnonzero(tangents)
     radii[drawn] = tangents[drawn] / np.tan(np.abs(turns[drawn - 1]) / 2)
-    # A leg that is too short for its path back keeps its corner.
+    # A leg that is too short for its return arcs keeps a sharp corner.
     back[:-1][back[:-1] + tangents[1:] > runs] = 0.0
     return tangents, radii, back
 
 
 def _overshoot_angle(turn: float) -> float:
-    """Return the angle by which a fly-over turn (rad) goes beyond the next leg's course, cos phi = (1 + cos turn)/2."""
+    """Return the angle by which a fly-over turn (rad) overshoots the next course.
+
+    It follows from cos phi = (1 + cos turn) / 2.
+    """
     return math.acos(0.5 * (1.0 + math.cos(turn)))
 
 
-def _swing(corner: Floats, course: float, turn: float, radius: float) -> list[tuple[Floats, float, float, float]]:
+def _fly_over_arcs(
+    corner: Floats, course: float, turn: float, radius: float
+) -> list[tuple[Floats, float, float, float]]:
     """Return the arcs of a fly-over turn: start (2,) m, course there (rad), curvature (1/m), length (m).
 
-    Two arcs turn beyond the next leg's course, each by less than `flight.guidance.path.project` can tell from a turn
-    the other way, and the third leads back onto that leg.
+    Two arcs turn past the next leg's course, each by an angle small enough for `flight.guidance.path.project` to tell
+    its direction, and the third leads back onto that leg.
+
     turn: rad, positive to the right.
     """
     side, beyond = math.copysign(1.0, turn), _overshoot_angle(abs(turn))
@@ -353,11 +373,11 @@ def _swing(corner: Floats, course: float, turn: float, radius: float) -> list[tu
     return arcs
 
 
-def _profile(corners: list[tuple[float, float]], limits: Limits, route: Route) -> Records:
-    """Corners of the height profile with the parabola that blends each."""
+def _altitude_profile(corners: list[tuple[float, float]], limits: Limits, route: Route) -> Records:
+    """Return the corners of the altitude profile with the parabolas that blend them."""
     at, up = np.array(corners).T
     keep = np.concatenate([[True], np.diff(at) > 1e-3])
-    # Of two corners at one distance the later one is on the leg that follows.
+    # Of two corners at the same distance keep the later one, which is on the next leg.
     at, up = at[keep], up[keep]
     slopes = np.diff(up) / np.diff(at)
     after = np.concatenate([slopes, slopes[-1:]])
@@ -376,13 +396,14 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
     """Return the (w,) records of `flight.guidance.lateral_reference_laws.WAYPOINT`.
 
     The last waypoint has the airspeed of the leg before it.
-    mission: the route's, which states how its loiters end; None ends them all by their turns.
-    fly_over: True if the scenario asks the autopilot to fly over waypoints without an acceptance radius.
+
+    mission: mission of the route, which states how its loiters end; None ends them all after their turns.
+    fly_over: True if the scenario requires that waypoints without an acceptance radius are flown over.
     """
     waypoints: Records = np.zeros(len(route.waypoints), WAYPOINT)
     waypoints["east"], waypoints["north"] = route.waypoints[:, 0], route.waypoints[:, 1]
     waypoints["turn"][1:-1] = np.abs(signed_turns(route.waypoints))
-    # An acceptance radius that the mission states switches legs, whatever the scenario asks for.
+    # A stated acceptance radius switches legs, whatever the scenario states.
     waypoints["fly_over"] = fly_over & (route.acceptance == 0.0) & (route.arcs == 0.0)
     waypoints["acceptance"] = route.acceptance
     waypoints["over_ground"] = np.isfinite(route.above_ground)
@@ -404,21 +425,21 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
         names = ("centre_east", "centre_north", "up", "circle", "slope_base")
         for name, value in zip(names, route.return_to, strict=True):
             back[name] = value
-        # Nothing says how the next leg turns: as at a mission's end, it is a right angle.
+        # How the next leg turns is unknown: assume a right angle, as at a mission's end.
         waypoints["turn"][route.return_from] = 0.5 * math.pi
     return waypoints
 
 
 def _set_circles(corners: Records, route: Route) -> None:
-    """Radius and centre of the loiter that each of a route's corners belongs to."""
+    """Set radius and center of the loiter that each of a route's corners belongs to."""
     turns, courses = signed_turns(route.waypoints), leg_courses(route.waypoints)
     corners["circle"] = np.where(np.abs(turns) < 1e-6, 0.0, np.copysign(route.arcs[1:-1], turns))
-    # The centre is square to the course in the middle of the turn.
+    # The center lies at a right angle to the course halfway through the turn.
     middle = courses[:-1] + 0.5 * turns
     out = corners["circle"] / np.cos(0.5 * turns)
     corners["centre_east"] = corners["east"] + out * np.cos(middle)
     corners["centre_north"] = corners["north"] - out * np.sin(middle)
-    # A loiter's height is that of its item, which the last of its corners has.
+    # A loiter's altitude is its item's altitude, which the last of its corners has.
     stops = route.stops[1:-1]
     for i in range(len(corners) - 2, -1, -1):
         if corners[i].circle != 0.0 and corners[i + 1].circle != 0.0 and stops[i] == stops[i + 1]:
@@ -426,7 +447,7 @@ def _set_circles(corners: Records, route: Route) -> None:
 
 
 def _set_loiters(waypoints: Records, items: dict[int, MissionItem]) -> None:
-    """How each corner's loiter ends, by its item."""
+    """Set how each corner's loiter ends, according to its item."""
     waypoints["stays"] = math.nan
     for k in np.flatnonzero(waypoints["circle"]).tolist():
         item = items.get(int(waypoints["item"][k]))
@@ -446,7 +467,7 @@ def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:
 
 
 def _points_at(path: FlyByPath, distances: Floats) -> Floats:
-    """Points (n, 3) of the path at distances (n,) along it, m."""
+    """Return the points (n, 3) of the path at distances (n,) along it, m."""
     pieces = path.pieces[_piece_index(path, distances)]
     course, curvature, along = pieces["course"], pieces["curvature"], distances - pieces["start"]
     straight = curvature == 0.0
@@ -458,9 +479,9 @@ def _points_at(path: FlyByPath, distances: Floats) -> Floats:
 
 
 def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
-    """The path as a chain of points (n, 3), and the leg of each of its n - 1 segments.
+    """Return the path as a chain of points (n, 3), and the leg of each of its n - 1 segments.
 
-    Chords of arcs turn by at most `CHORD`; on a 160 m radius they leave the arc by 0.15 m.
+    Chords of arcs turn by at most `CHORD`; on a 160 m radius they deviate from the arc by 0.15 m.
 
     >>> level = np.array([(0.0, 500.0, 0.0, 0.0), (900.0, 500.0, 0.0, 0.0)], NODE)
     >>> north = np.array([(0.0, 900.0, 0.0, 0.0, 0.0, 0.0, 0, math.inf)], PIECE)
@@ -486,7 +507,9 @@ def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
 
 
 def arc_point(piece: Record, along: float) -> tuple[float, float]:
-    """East and north (m) on a piece, a record of `flight.guidance.path.PIECE`, ``along`` m from its start.
+    """Return east and north (m) on a piece, ``along`` m from its start.
+
+    piece: a record of `flight.guidance.path.PIECE`.
 
     >>> quarter = np.array([(0.0, 157.0, 0.0, 0.0, 0.0, 0.01, 0, math.inf)], PIECE)[0]
     >>> east, north = arc_point(quarter, 50.0 * math.pi)

@@ -1,1 +1,1 @@
-"""A mission and what it asks for: its items, its itinerary, the route, fences and loiters."""
+"""A mission and its route: items, itinerary, fences and loiters."""

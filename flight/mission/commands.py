@@ -1,12 +1,12 @@
-"""MAVLink's commands, and what ArduPlane and PX4 make of each of them in the mission of a fixed wing.
+"""MAVLink commands, and their treatment by ArduPlane and PX4 in a fixed-wing mission.
 
-One table for the itinerary, which flies the items, for the mission rule, which judges them, and for the list in
-docs/your-mission-file.md, which is made of it.  A command that the table lacks is refused by both autopilots.
+One table serves the itinerary, which flies the items, the mission rule, which judges them, and the list in
+docs/your-mission-file.md, which is generated from it. Both autopilots refuse a command that is not in the table.
 
-ArduPlane 4.6: `AP_Mission::mavlink_int_to_mission_cmd` decides what is taken, `AP_Mission::start_command` and
-`Plane::start_command` (ArduPlane/commands_logic.cpp) what is done.  PX4: `parse_mavlink_mission_item`
-(mavlink_mission.cpp) and `FeasibilityChecker::checkMissionItemValidity` decide what is taken, `MissionBlock`
-(mission_block.cpp) what is done.
+ArduPlane 4.6: `AP_Mission::mavlink_int_to_mission_cmd` decides which commands are accepted, `AP_Mission::start_command`
+and `Plane::start_command` (ArduPlane/commands_logic.cpp) what they do. PX4: `parse_mavlink_mission_item`
+(mavlink_mission.cpp) and `FeasibilityChecker::checkMissionItemValidity` decide which commands are accepted,
+`MissionBlock` (mission_block.cpp) what they do.
 """
 
 from enum import IntEnum, StrEnum
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 
 class Command(IntEnum):
-    """Every MAV_CMD of MAVLink's dialects common and ardupilotmega, by its name without MAV_CMD_."""
+    """All MAV_CMD of MAVLink's dialects common and ardupilotmega, by their names without MAV_CMD_."""
 
     NAV_WAYPOINT = 16
     NAV_LOITER_UNLIM = 17
@@ -223,16 +223,16 @@ class Treatment(StrEnum):
 
     # The flight does what the autopilot does.
     FLOWN = "flown"
-    # The autopilot takes it, and it changes nothing of the flight path.
+    # The autopilot accepts it, and it does not change the flight path.
     NO_EFFECT = "no effect on the path"
-    # The autopilot takes it, it may change the flight path, and it is not flown: the verdict is open.
+    # The autopilot accepts it, it may change the flight path, and it is not flown: the verdict is open.
     OPEN = "not judged"
-    # The autopilot refuses a mission with it.
+    # The autopilot refuses a mission that contains it.
     REFUSED = "refused"
 
 
 class Support(NamedTuple):
-    """Treatment of a command by each autopilot, and the reason in a few words, for people."""
+    """Treatment of a command by each autopilot, with a short reason for people."""
 
     arduplane: Treatment
     px4: Treatment
@@ -245,14 +245,14 @@ _NO_EFFECT = Treatment.NO_EFFECT
 _OPEN = Treatment.OPEN
 _REFUSED = Treatment.REFUSED
 
-# What commands without an effect on the path are for.
+# Purposes of commands without an effect on the path.
 CAMERA = "the camera's, nothing to fly"
 _GIMBAL = "points a camera, not the aircraft"
-# ArduPlane: `Plane::start_command` knows no such command, `Plane::verify_command` takes it for done.
+# ArduPlane: `Plane::start_command` does not know such a command, `Plane::verify_command` reports it as done.
 PASSED_OVER = "ArduPlane takes it and passes it over"
 _HOLDS_BACK = "holds back the commands behind it; open where one of them is flown"
 
-# What the autopilots make of each command that one of them takes; both refuse any other.
+# Treatment of each command that at least one autopilot accepts; both refuse any other.
 SUPPORT: dict[Command, Support] = {
     C.NAV_WAYPOINT: Support(_FLOWN, _FLOWN, "a place to fly to"),
     C.NAV_LOITER_UNLIM: Support(_FLOWN, _FLOWN, "a loiter without end, of which a minute is flown"),
@@ -261,31 +261,33 @@ SUPPORT: dict[Command, Support] = {
     C.NAV_RETURN_TO_LAUNCH: Support(_FLOWN, _FLOWN, "a return to launch"),
     C.NAV_LAND: Support(_FLOWN, _FLOWN, "a landing; flown to the ground where the scenario has a [landing]"),
     C.NAV_TAKEOFF: Support(_FLOWN, _FLOWN, "a take-off; flown from the ground where the scenario has a [launch]"),
-    # `Plane::verify_continue_and_change_alt`: straight on, climbing at what the aircraft can, until it is there.
+    # `Plane::verify_continue_and_change_alt`: straight on at the aircraft's best climb rate until the altitude is
+    # reached.
     C.NAV_CONTINUE_AND_CHANGE_ALT: Support(_OPEN, _REFUSED, "ArduPlane flies straight on to an altitude"),
     C.NAV_LOITER_TO_ALT: Support(_FLOWN, _FLOWN, "a loiter to an altitude"),
     # PX4 writes it as DO_SET_ROI.
     C.NAV_ROI: Support(_REFUSED, _NO_EFFECT, _GIMBAL),
-    # `Plane::do_altitude_wait`: servos at trim and no throttle until an altitude or a sink rate (under a balloon).
+    # `Plane::do_altitude_wait`: servos at trim and no throttle until an altitude or a sink rate is reached (balloon
+    # launch).
     C.NAV_ALTITUDE_WAIT: Support(_OPEN, _REFUSED, "ArduPlane does not steer until an altitude is reached"),
     C.NAV_VTOL_TAKEOFF: Support(_OPEN, _OPEN, "a VTOL aircraft climbs straight up"),
     C.NAV_VTOL_LAND: Support(_OPEN, _OPEN, "a VTOL aircraft lands straight down"),
     C.NAV_GUIDED_ENABLE: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
-    # `ModeAuto::verify_nav_delay` is done at once while the motor is armed; PX4 (NAV_CMD_DELAY) waits in the air.
+    # `ModeAuto::verify_nav_delay` is done at once while the motor is armed; PX4 (NAV_CMD_DELAY) waits in flight.
     C.NAV_DELAY: Support(_NO_EFFECT, _OPEN, "ArduPlane does not wait in the air; PX4 does"),
     C.NAV_PAYLOAD_PLACE: Support(_OPEN, _REFUSED, "a QuadPlane lands to place its payload"),
-    # They hold back the DO commands behind them, see `flight.mission.itinerary`; by themselves they do nothing.
+    # They delay the DO commands after them, see `flight.mission.itinerary`; by themselves they do nothing.
     C.CONDITION_DELAY: Support(_FLOWN, _REFUSED, _HOLDS_BACK),
     C.CONDITION_DISTANCE: Support(_FLOWN, _REFUSED, _HOLDS_BACK),
     C.CONDITION_YAW: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
     C.DO_JUMP: Support(_FLOWN, _FLOWN, "a jump to another item"),
     C.DO_CHANGE_SPEED: Support(_FLOWN, _FLOWN, "another airspeed"),
-    # `Plane::do_set_home`.  PX4 takes coordinates in frame 2 alone, where they are no coordinates.
+    # `Plane::do_set_home`. PX4 accepts coordinates only in frame 2, where they are not coordinates.
     C.DO_SET_HOME: Support(_FLOWN, _OPEN, "another home, for the altitudes and returns behind it"),
-    # A relay of another function than a plain one, as of an ignition, is not switched by it (AP_Relay).
+    # It switches only plain relays, not one with another function such as an ignition (AP_Relay).
     C.DO_SET_RELAY: Support(_NO_EFFECT, _REFUSED, "switches a plain relay"),
     C.DO_REPEAT_RELAY: Support(_NO_EFFECT, _REFUSED, "switches a plain relay"),
-    # `AP_ServoRelayEvents::do_set_servo` moves no channel that has a function, so no control surface and no throttle.
+    # `AP_ServoRelayEvents::do_set_servo` moves only channels without a function: no control surface and no throttle.
     C.DO_SET_SERVO: Support(_NO_EFFECT, _NO_EFFECT, "moves a servo that does not steer"),
     C.DO_REPEAT_SERVO: Support(_NO_EFFECT, _REFUSED, "moves a servo that does not steer"),
     C.DO_RETURN_PATH_START: Support(_NO_EFFECT, _REFUSED, "a mark that returns may go on from"),
@@ -308,14 +310,14 @@ SUPPORT: dict[Command, Support] = {
     C.DO_PARACHUTE: Support(_OPEN, _REFUSED, "may release the parachute, or let it be released"),
     C.DO_INVERTED_FLIGHT: Support(_OPEN, _REFUSED, "ArduPlane flies on inverted"),
     C.DO_GRIPPER: Support(_NO_EFFECT, _NO_EFFECT, "the payload's; its mass is not flown"),
-    # `Plane::autotune_enable`: the gains of roll and pitch change in flight.
+    # `Plane::autotune_enable`: the roll and pitch gains change in flight.
     C.DO_AUTOTUNE_ENABLE: Support(_OPEN, _REFUSED, "ArduPlane changes its own gains in flight"),
     C.NAV_SET_YAW_SPEED: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
     C.DO_SET_CAM_TRIGG_INTERVAL: Support(_REFUSED, _NO_EFFECT, CAMERA),
     C.DO_SET_RESUME_REPEAT_DIST: Support(_NO_EFFECT, _REFUSED, "for a mission that is broken off and resumed"),
     C.DO_SPRAYER: Support(_NO_EFFECT, _REFUSED, "the payload's, nothing to fly"),
     C.DO_SEND_SCRIPT_MESSAGE: Support(_OPEN, _REFUSED, "a script on board may do anything"),
-    # `RC_Channel::run_aux_function`: modes, motor stop and returns are among them.
+    # `RC_Channel::run_aux_function`: its functions include modes, motor stop and returns.
     C.DO_AUX_FUNCTION: Support(_OPEN, _REFUSED, "an auxiliary switch, which may change the mode or stop the motor"),
     C.DO_GUIDED_LIMITS: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
     C.DO_ENGINE_CONTROL: Support(_OPEN, _REFUSED, "starts or stops the engine"),
@@ -340,17 +342,17 @@ SUPPORT: dict[Command, Support] = {
     C.NAV_ATTITUDE_TIME: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
 }
 
-# Commands that do nothing where they stand, and that something else leads to.
+# Commands that do nothing themselves, and that other commands or modes lead to.
 MARKS = frozenset({C.DO_RETURN_PATH_START, C.DO_LAND_START, C.DO_GO_AROUND, C.JUMP_TAG})
 
 _UNKNOWN = Support(_REFUSED, _REFUSED, "no autopilot takes it in a mission")
 
 
 def support_of(command: int) -> Support:
-    """Return what each autopilot makes of a command in a mission.
+    """Return the treatment of a command in a mission by each autopilot.
 
     >>> support_of(Command.DO_JUMP).px4, support_of(Command.JUMP_TAG).px4, support_of(50_000).arduplane
     (<Treatment.FLOWN: 'flown'>, <Treatment.REFUSED: 'refused'>, <Treatment.REFUSED: 'refused'>)
     """
-    # A number that is no member is not found.
+    # A number that is not a member is not found.
     return SUPPORT.get(command, _UNKNOWN)  # type: ignore[call-overload, no-any-return]

@@ -1,4 +1,4 @@
-"""Geofences and rally points: shapes, exchange with the scenario's zones, and whether a path keeps to them."""
+"""Geofences and rally points: shapes, conversion from and to zones, and a test of positions."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -18,20 +18,24 @@ Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
-# A scenario's zones as the fence that they are, and what of them a fence cannot hold.
+# A scenario's zones as fence items, and notes on what a fence cannot represent.
 
-_CIRCLES = {
+# Fence command of a circle, by the kind of zone.
+_CIRCLE_COMMANDS = {
     "inclusion": Command.NAV_FENCE_CIRCLE_INCLUSION,
     "exclusion": Command.NAV_FENCE_CIRCLE_EXCLUSION,
 }
-_POLYGONS = {
+# Fence command of a polygon's vertex, by the kind of zone.
+_POLYGON_COMMANDS = {
     "inclusion": Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION,
     "exclusion": Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
 }
 
 
 def fence_item(origin: GeoOrigin, command: Command, p1: float, position: Sequence[float] | Floats) -> MissionItem:
-    """An item of a fence at a position (east, north, m); p1: corners of its polygon, or radius of its circle, m.
+    """Return a fence item at a position (east, north, m).
+
+    p1: number of corners of its polygon, or radius of its circle, m.
 
     >>> item = fence_item(GeoOrigin(36.5, -84.2), Command.NAV_FENCE_CIRCLE_EXCLUSION, 200.0, (0.0, 0.0))
     >>> item.params[0], round(item.lat_deg, 6)
@@ -43,10 +47,11 @@ def fence_item(origin: GeoOrigin, command: Command, p1: float, position: Sequenc
 
 
 def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionItem], list[str]]:
-    """Fence items of zones, and notes for people on what a fence cannot hold.
+    """Return the fence items of zones, and notes for people on what a fence cannot represent.
 
-    A cylinder is a circle and an outline a polygon.  A hole of an inclusion is an exclusion.  A hole of an exclusion is
-    closed with it, and an inclusion of several parts has no fence: every inclusion counts.  No fence has a height.
+    A cylinder becomes a circle, and an outline a polygon. A hole of an inclusion becomes an exclusion. A hole of an
+    exclusion is closed, and an inclusion of several parts is left out, since a position must be inside every inclusion.
+    No fence has a floor or a ceiling.
 
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
     >>> items, notes = zone_fences([zone], GeoOrigin(36.5, -84.2))
@@ -76,13 +81,13 @@ def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionI
 
 def _zone_items(zone: Zone, origin: GeoOrigin) -> Iterator[MissionItem]:
     if isinstance(zone.shape, Cylinder):
-        yield fence_item(origin, _CIRCLES[zone.kind], zone.shape.radius, (zone.shape.east, zone.shape.north))
+        yield fence_item(origin, _CIRCLE_COMMANDS[zone.kind], zone.shape.radius, (zone.shape.east, zone.shape.north))
         return
     for ring in zone.shape.rings:
         if not is_hole(ring):
-            yield from _ring_items(ring, _POLYGONS[zone.kind], origin)
+            yield from _ring_items(ring, _POLYGON_COMMANDS[zone.kind], origin)
         elif zone.kind == "inclusion":
-            yield from _ring_items(ring, _POLYGONS["exclusion"], origin)
+            yield from _ring_items(ring, _POLYGON_COMMANDS["exclusion"], origin)
 
 
 def _ring_items(ring: Ring, command: Command, origin: GeoOrigin) -> Iterator[MissionItem]:
@@ -91,26 +96,28 @@ def _ring_items(ring: Ring, command: Command, origin: GeoOrigin) -> Iterator[Mis
 
 
 def _names(names: list[str]) -> str:
-    """Up to three names, and how many more."""
+    """Return up to three names, and the number of others."""
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(names[:3]) + more + (" is" if len(names) == 1 else " are")
 
 
 # ----------------------------------------------------------------------
-# Geofences and rally points: made of a scenario, grouped into shapes, and asked whether a position is allowed.
+# Geofences and rally points: made from a scenario, grouped into shapes, and tested for a position.
 
 
+# Commands of a polygon's vertices.
 POLYGONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION)
+# Commands of inclusions.
 INCLUSIONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_CIRCLE_INCLUSION)
 
-# Shapes that are left out, by their names in a note.
-_NAMED = 12
+# Largest number of omitted shapes that a note lists by name.
+_MAX_NAMES = 12
 
 
 def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list[tuple[MissionItem, ...]]:
-    """Items of each shape: a polygon's corners together, a circle alone.
+    """Group fence items into shapes: a polygon's corners together, a circle alone.
 
-    Raises MissionError for a polygon of fewer corners than it counts.
+    Raise MissionError for a polygon with fewer corners than stated.
     """
     shapes = []
     k = 0
@@ -131,11 +138,10 @@ def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list
 def fence_problem(
     fences: tuple[MissionItem, ...], origin: GeoOrigin, east: float, north: float
 ) -> tuple[str, int] | None:
-    """First fence that a position violates: how, as text for people, and its first item's number; None for none.
+    """Return the first fence that a position violates, as text and its first item's number, or None.
 
-    fences: items 5001..5004, a polygon's corners together.  Inclusions count together: a position must be in all of
-    them.  east, north: m on the map about ``origin``.  Raises MissionError for a polygon of fewer corners than it
-    counts.
+    fences: items 5001..5004, a polygon's corners together. A position must be inside all inclusions.
+    east, north: m on the map about ``origin``. Raise MissionError for a polygon with fewer corners than stated.
 
     >>> radius = (500.0, 0.0, 0.0, 0.0)
     >>> circle = MissionItem(0, Command.NAV_FENCE_CIRCLE_INCLUSION, Frame.GLOBAL, radius, 36.5, -84.2, 0.0)
@@ -160,19 +166,19 @@ def fence_problem(
     return None
 
 
-# Says whether a mission's path goes through a shape of a fence, given as its items, at any height.
+# Test whether a mission's path passes through a fence shape, given as its items, at any altitude.
 PassTest = Callable[[tuple[MissionItem, ...]], bool]
 
 
 def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple[Mission, tuple[str, ...]]:
-    """Mission with a scenario's area, threats and zones as its fence, its own beside, the ends as rally points; notes.
+    """Return a mission with a scenario's area, threats and zones as fence, and notes for people.
 
-    The area becomes an inclusion polygon, its four corners; each missile's kill radius an exclusion circle, which has
-    no height.  Radars are no fence: being detected is not forbidden.  Zones follow as `zone_fences` makes them.  An
-    exclusion that the mission passes above or below, as ``passes`` tells, is left out: an autopilot with such a fence
-    refuses the mission or breaks it off.  Rally points are the first and last position of the mission, at the mission's
-    height over home; a mission with rally points, and one from or to the ground, keeps its own.  The notes say, for
-    people, what a fence cannot hold, and what was left out for it.
+    The area becomes an inclusion polygon of four corners, and each missile's kill radius an exclusion circle without
+    altitude limits. Radars are left out: detection is not forbidden. Zones follow as `zone_fences` converts them. The
+    mission's own fence is kept. An exclusion that the mission passes above or below, according to ``passes``, is left
+    out: an autopilot with such a fence refuses the mission or aborts it. Rally points are the first and last position
+    of the mission, at the mission's height above home; a mission with rally points, and one from or to the ground,
+    keeps its own. The notes list what a fence cannot represent, and what was left out.
 
     >>> from world.scenario import load_scenario
     >>> fenced, notes = with_fences(Mission(None, ()), load_scenario("tight"), lambda shape: False)
@@ -184,8 +190,8 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
     (west, east), (south, north) = scenario.bounds
     corners = np.array([[west, south], [east, south], [east, north], [west, north]])
     fences = [fence_item(scenario.origin, Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, 4.0, point) for point in corners]
-    missiles, crossed = _kept(_missile_zones(scenario), scenario.origin, passes)
-    zones, passed = _kept(scenario.zones, scenario.origin, passes)
+    missiles, crossed = _split_kept(_missile_zones(scenario), scenario.origin, passes)
+    zones, passed = _split_kept(scenario.zones, scenario.origin, passes)
     fences += zone_fences(missiles, scenario.origin)[0]
     items, of_zones = zone_fences(zones, scenario.origin)
     fences += items
@@ -196,7 +202,9 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
         notes.append(f"{count} {became}: a fence has no height, so that each is a cylinder")
     left_out = [*crossed, *passed]
     if left_out:
-        names = ", ".join(left_out[:_NAMED]) + (f" and {len(left_out) - _NAMED} more" if len(left_out) > _NAMED else "")
+        names = ", ".join(left_out[:_MAX_NAMES]) + (
+            f" and {len(left_out) - _MAX_NAMES} more" if len(left_out) > _MAX_NAMES else ""
+        )
         notes.append(
             f"left out of the fence, as the mission passes above or below: {names}; a fence has no height, and an"
             " autopilot with it in its fence refuses the mission or breaks it off"
@@ -206,14 +214,14 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
         above = f"{scenario.limits.max_height_m:g} m above ground"
         notes.append(f"a fence does not follow the ground: the greatest height of {above} is not in it")
     every = numbered([*fences, *mission.fences])
-    # A mission that begins or ends on the ground has its scenario's: its last position is where it lands.
+    # A mission that begins or ends on the ground keeps its rally points: its last position is where it lands.
     grounded = bool(mission.rally) or scenario.launch is not None or scenario.landing is not None
     rally = mission.rally if grounded else numbered(_rally(mission))
     return replace(mission, fences=every, rally=rally), tuple(notes)
 
 
 def _missile_zones(scenario: Scenario) -> list[Zone]:
-    """What each missile reaches on the map."""
+    """Return the area that each missile reaches on the map."""
     threats = scenario.threats
     return [
         Zone(str(name), "exclusion", make_cylinder(float(position[0]), float(position[1]), float(radius)))
@@ -222,8 +230,8 @@ def _missile_zones(scenario: Scenario) -> list[Zone]:
     ]
 
 
-def _kept(zones: Sequence[Zone], origin: GeoOrigin, passes: PassTest) -> tuple[list[Zone], list[str]]:
-    """The zones that a mission keeps at every height, and the names of the others."""
+def _split_kept(zones: Sequence[Zone], origin: GeoOrigin, passes: PassTest) -> tuple[list[Zone], list[str]]:
+    """Return the zones that stay fences at every altitude, and the names of the others."""
     kept, passed = [], []
     for zone in zones:
         if zone.kind == "exclusion" and passes(numbered(zone_fences([zone], origin)[0])):
@@ -242,18 +250,18 @@ def _rally(mission: Mission) -> list[MissionItem]:
     return [
         MissionItem(
             0, int(Command.NAV_RALLY_POINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4, end.lat_deg, end.lon_deg,
-            round(end.alt - _zero(end, home), 3),
+            round(end.alt - _home_offset(end, home), 3),
         )
         for end in ends
     ]  # fmt: skip
 
 
-def _zero(item: MissionItem, home: Home) -> float:
+def _home_offset(item: MissionItem, home: Home) -> float:
     return home.alt if item.frame in (Frame.GLOBAL, Frame.GLOBAL_INT) else 0.0
 
 
 def numbered(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
-    """Items of a fence or of rally points with their numbers from 0, as their lists on a vehicle count.
+    """Return fence items or rally points numbered from 0, as a vehicle numbers them in its lists.
 
     >>> item = MissionItem(7, Command.NAV_RALLY_POINT, Frame.GLOBAL, (0.0,) * 4, 36.5, -84.2, 0.0)
     >>> [one.seq for one in numbered([item, item])]
@@ -263,7 +271,7 @@ def numbered(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
 
 
 def _in_polygon(corners_east: Floats, corners_north: Floats, east: float, north: float) -> bool:
-    """Whether a position lies in a polygon, by the crossings of a ray to the east."""
+    """Return True if a position lies in a polygon, by counting the crossings of a ray to the east."""
     e0, n0 = corners_east, corners_north
     e1, n1 = np.roll(e0, -1), np.roll(n0, -1)
     spans = (n0 > north) != (n1 > north)
@@ -273,14 +281,16 @@ def _in_polygon(corners_east: Floats, corners_north: Floats, east: float, north:
 
 
 # ----------------------------------------------------------------------
-# A mission's own fence as zones of airspace: the one place where its latitudes and longitudes become metres.
+# A mission's own fence as airspace zones: the only place where its latitudes and longitudes become meters.
 
 
 def fence_zones(fences: tuple[MissionItem, ...], origin: GeoOrigin, source: str = "fence") -> tuple[Zone, ...]:
-    """Zones of a fence's items 5001..5004, without floor and ceiling: MAVLink's fences have none.
+    """Return the zones of fence items 5001..5004, without floor and ceiling, which MAVLink's fences lack.
 
-    source: names the mission in messages.  Each zone is named by its first item.  Raises MissionError for a polygon of
-    fewer corners than it counts, and for a shape that is none.
+    source: name of the mission in messages.
+
+    Each zone is named after its first item. Raise MissionError for a polygon with fewer corners than stated, and for an
+    invalid shape.
 
     >>> from flight.mission.items import Command, Frame
     >>> radius = (500.0, 0.0, 0.0, 0.0)

@@ -1,8 +1,8 @@
-"""What of a mission's ground ends and returns will not do as it stands: a note for people each.
+"""Preflight notes on a mission's take-off, landing, home, rally points and return.
 
-Whether an aircraft hits something is for the verdict.  These are what a pilot finds out on the field: wind from behind,
-a home that is somewhere else, a rally point in the ground or out of reach, a return below the hills about home, a
-landing sequence that keeps an autopilot from arming, and the ground that a mission lands on without a stated strip.
+The verdict judges collisions. These notes cover what a pilot would find out on the field: tail wind, a home in another
+place, a rally point below ground or out of range, a return below the hills around home, a landing sequence that
+prevents arming, and the ground under a landing without a stated strip.
 """
 
 import math
@@ -23,42 +23,46 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-# m/s.  Less wind from behind is none.
+# Wind component below which no wind is noted, m/s.
 CALM = 0.05
-# m.  A mission's home this far from the scenario's is another one.
+# Distance from the scenario's home beyond which a mission's home is another one, m.
 HOME_APART = 50.0
-# m.  A return circles home this far out at least: with WP_LOITER_RAD 60, circles of up to 260 m were flown.
+# Smallest radius about home that a return needs, m: with WP_LOITER_RAD 60, loiters of up to 260 m were flown.
 MIN_CIRCLE = 260.0
-# Rings and directions that the ground about home is looked at on.
-_RINGS, _DIRECTIONS = 13, 72
+# Number of rings about home on which the ground is checked.
+_RING_COUNT = 13
+# Number of directions on each ring.
+_DIRECTION_COUNT = 72
 
 
 def field_notes(
     mission: Mission, route: Route, scenario: Scenario, rules: ReturnRules, parameters: Mapping[str, float]
 ) -> tuple[str, ...]:
-    """Notes on a mission's launch, landing, home, rally points and return.
+    """Return notes on a mission's launch, landing, home, rally points and return.
 
-    rules: how whoever flies returns.  parameters: the autopilot's, by name, as far as somebody states them.
+    rules: return rules of the autopilot.
+    parameters: the autopilot's parameters by name, as far as they are stated.
     """
     beyond: tuple[str, ...] = ()
     try:
         places = return_places(mission, scenario.origin, scenario.terrain)
     except MissionError as error:
-        # Left over from another field: nothing flies there but a return, which is refused itself.
+        # Rally points left over from another field: only a return would fly to them, and such a return is refused
+        # itself.
         places, beyond = (), (str(error),)
     return (
         *beyond,
         *_tail_winds(route, scenario),
         *_home_elsewhere(mission, scenario),
-        *_rally(places[1:], route, scenario, rules),
+        *_rally_points(places[1:], route, scenario, rules),
         *_low_return(places[:1], scenario, rules),
-        *_not_armed(mission, parameters),
-        *_landed_on(mission, route, scenario),
+        *_forbidden_landing_sequence(mission, parameters),
+        *_landing_ground(mission, route, scenario),
     )
 
 
 def _tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
-    """Wind from behind at a launch, or at a landing, that the scenario asks for."""
+    """Note tail wind at a launch or a landing that the scenario states."""
     courses = leg_courses(route.waypoints)
     launch, landing = scenario.launch, scenario.landing
     ends = []
@@ -74,7 +78,7 @@ def _tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
 
 
 def _home_elsewhere(mission: Mission, scenario: Scenario) -> Iterator[str]:
-    """A mission's home far from the scenario's, where the launch is."""
+    """Note a mission's home that is far from the scenario's home, where the launch is."""
     home, stated = mission.home, scenario.home
     if home is None or stated is None:
         return
@@ -84,8 +88,10 @@ def _home_elsewhere(mission: Mission, scenario: Scenario) -> Iterator[str]:
         yield f"the mission's home is {away:.0f} m from the scenario's: launched there, heights count from elsewhere"
 
 
-def _rally(points: tuple[ReturnPlace, ...], route: Route, scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
-    """Rally points in the ground, and those that no return from the route flies to for their distance."""
+def _rally_points(
+    points: tuple[ReturnPlace, ...], route: Route, scenario: Scenario, rules: ReturnRules
+) -> Iterator[str]:
+    """Note rally points below ground, and those beyond the distance limit of every return from the route."""
     for point in points:
         name = f"rally point {point.number}"
         under = math.nan if scenario.terrain is None else float(scenario.terrain.height(point.east, point.north))
@@ -99,7 +105,7 @@ def _rally(points: tuple[ReturnPlace, ...], route: Route, scenario: Scenario, ru
 
 
 def _distance(way: Floats, spot: tuple[float, float]) -> float:
-    """Least distance of a place from a way (w, 3) across the ground, m."""
+    """Return the smallest horizontal distance of a point from a path (w, 3), m."""
     begin, step = way[:-1, :2], np.diff(way[:, :2], axis=0)
     length2 = np.maximum(1e-12, (step**2).sum(axis=1))
     share = np.clip(((np.array(spot) - begin) * step).sum(axis=1) / length2, 0.0, 1.0)
@@ -107,12 +113,12 @@ def _distance(way: Floats, spot: tuple[float, float]) -> float:
 
 
 def _low_return(home: tuple[ReturnPlace, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
-    """A return to home whose height is below the ground where it circles."""
+    """Note a return to home whose altitude is below the ground under its loiter."""
     if not home or scenario.terrain is None or math.isnan(rules.height):
         return
     radius = max(MIN_CIRCLE, abs(rules.radius))
-    angle = np.linspace(0.0, 2.0 * math.pi, _DIRECTIONS, endpoint=False)
-    reach = np.linspace(0.0, radius, _RINGS)[:, None]
+    angle = np.linspace(0.0, 2.0 * math.pi, _DIRECTION_COUNT, endpoint=False)
+    reach = np.linspace(0.0, radius, _RING_COUNT)[:, None]
     ground = scenario.terrain.height(home[0].east + reach * np.sin(angle), home[0].north + reach * np.cos(angle))
     highest = float(np.nanmax(ground, initial=-math.inf)) - home[0].up
     if highest >= rules.height:
@@ -122,24 +128,25 @@ def _low_return(home: tuple[ReturnPlace, ...], scenario: Scenario, rules: Return
         )
 
 
-def _not_armed(mission: Mission, parameters: Mapping[str, float]) -> Iterator[str]:
-    """A landing sequence that a parameter forbids: ArduPlane's check before arming (AP_Arming.cpp)."""
+def _forbidden_landing_sequence(mission: Mission, parameters: Mapping[str, float]) -> Iterator[str]:
+    """Note a landing sequence that a parameter forbids: ArduPlane's check before arming (AP_Arming.cpp)."""
     marks = [item.seq for item in mission.items if item.command == Command.DO_LAND_START]
     if marks and parameters.get("RTL_AUTOLAND") == 0.0:
         yield f"item {marks[0]}: DO_LAND_START with RTL_AUTOLAND 0: ArduPlane does not arm"
 
 
-_LEVEL = "is level"
+# Text for level ground.
+_LEVEL_TEXT = "is level"
 
 
-def _sloping(slope: float) -> str:
-    """How the ground slopes (m per m), in words."""
+def _slope_text(slope: float) -> str:
+    """Describe the slope of the ground (m per m) in words."""
     shown = f"{abs(slope):.1%}"
-    return _LEVEL if shown == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {shown}"
+    return _LEVEL_TEXT if shown == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {shown}"
 
 
-def _landed_on(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
-    """What is known of the ground where a mission lands whose scenario states no strip."""
+def _landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
+    """Note what is known of the ground at a landing for which the scenario states no strip."""
     last = int(route.items[-1])
     lands = any(item.seq == last and item.command == Command.NAV_LAND for item in mission.items)
     if scenario.landing is not None or not lands:
@@ -156,10 +163,10 @@ def _landed_on(mission: Mission, route: Route, scenario: Scenario) -> Iterator[s
     if scenario.terrain is not None:
         slopes = strip_slopes(scenario.terrain, strip, course)
     if not any(math.isnan(one) for one in slopes):
-        along, across = (_sloping(one) for one in slopes)
+        along, across = (_slope_text(one) for one in slopes)
         ground = f"over {strip.length:.0f} m about its point the ground {along} along it, and {across} to the right"
-        if along == across == _LEVEL:
-            ground = f"over {strip.length:.0f} m about its point the ground {_LEVEL}"
+        if along == across == _LEVEL_TEXT:
+            ground = f"over {strip.length:.0f} m about its point the ground {_LEVEL_TEXT}"
         if max(abs(one) for one in slopes) > STEEPEST_STRIP:
             ground += f" ({STEEPEST_STRIP:.0%} is the most that a plan lands on)"
     unknown = "no [landing] states its strip: touch-down and way to rest are not judged"

@@ -1,4 +1,4 @@
-"""A plan as a mission: speed, then waypoints above mean sea level in the world's frame."""
+"""Convert a plan to a mission: a speed change, then waypoints AMSL in the world's frame."""
 
 import math
 from collections.abc import Iterator
@@ -18,32 +18,37 @@ from world.wind import W20
 
 Floats = NDArray[np.float64]
 
-# Added to the fly-by offset of a waypoint, m: the tolerance of the verdict's waypoint rule.
+# Margin added to the fly-by offset of a waypoint, m: the tolerance of the verdict's waypoint rule.
 ACCEPTANCE_TOLERANCE = 10.0
-# Least pitch of a take-off, degrees: the first number of NAV_TAKEOFF.  With 10 ArduPlane's Aerosonde climbed at 5 m/s
-# and 26 m/s from a catapult of 20 m/s; with 15 at 6 m/s and 24 m/s.
+# Minimum pitch of a take-off, degrees: the first parameter of NAV_TAKEOFF. With 10 ArduPlane's Aerosonde climbed at 5
+# m/s and 26 m/s from a catapult of 20 m/s; with 15 at 6 m/s and 24 m/s.
 LAUNCH_PITCH = 12.0
-# Sharpest turn whose arc has that on top, and the sharpest that has an arc at all, rad.
-_SHARPEST, _U_TURN = math.radians(150.0), math.radians(179.0)
+# Sharpest turn whose arc gets that margin, rad.
+_MAX_OFFSET_TURN_RAD = math.radians(150.0)
+# Sharpest turn that has an arc at all, rad.
+_MAX_ARC_TURN_RAD = math.radians(179.0)
 
 
 def plan_mission(
     plan: Plan, airspeed: float, max_bank: float, source: str = "plan", tracking: TrackingError | None = None
 ) -> Mission:
-    """Mission of a plan: it starts at the first waypoint and ends at the last, or on the ground where the plan does.
+    """Return the mission of a plan, from its first waypoint to its last, with its ground ends if any.
 
-    airspeed: m/s.  max_bank: rad.  Home is the scenario's, or the ground below the start.  A plan with ways from and to
-    the ground begins with NAV_TAKEOFF at home and ends with DO_LAND_START, two places to line up at and NAV_LAND, whose
-    first number is the height over home of a go-around.  The scenario's rally points come with it.
+    airspeed: m/s.
+    max_bank: rad.
 
-    Positions are put on the 1e-7 degree grid of MISSION_ITEM_INT and heights on whole millimetres, so every form of the
-    mission carries the same numbers; that moves a waypoint by less than 8 mm on the map.
+    Home is the scenario's home, or the ground below the start. A plan with a departure and an approach begins with
+    NAV_TAKEOFF at home and ends with DO_LAND_START, two places to line up at and NAV_LAND, whose first parameter is the
+    go-around height above home. The scenario's rally points are included.
 
-    The acceptance radius is the fly-by offset, how far a turn at this speed and bank, in the scenario's wind from
-    behind, passes from its waypoint, R(1/cos(theta/2) - 1), and `ACCEPTANCE_TOLERANCE` more, up to a whole metre: no
-    arc of the flight misses it.  PX4 has its own on fixed wings.  An autopilot of which it is known how it tracks its
-    legs gets the radius with which it strays least from them: ArduPlane turns to the next leg that far before a
-    waypoint.
+    Positions are put on the 1e-7 degree grid of MISSION_ITEM_INT and altitudes on whole millimeters, so that every form
+    of the mission carries the same numbers; that moves a waypoint by less than 8 mm on the map.
+
+    The acceptance radius is the fly-by offset R(1/cos(theta/2) - 1), the distance at which a turn at this speed and
+    bank passes its waypoint with the scenario's wind from behind, plus `ACCEPTANCE_TOLERANCE`, rounded up to a whole
+    meter: no arc of the flight misses it. PX4 has its own radius on fixed wings. If the tracking error of an autopilot
+    is known, the
+    radius is the one with the smallest error: ArduPlane turns to the next leg at that distance before a waypoint.
 
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
@@ -57,13 +62,13 @@ def plan_mission(
     [(178, 25.0), (16, 10.0), (16, 20.0), (16, 10.0)]
     """
     ways = plan.ways or GroundWays()
-    points = _way(plan, ways)
+    points = _all_places(plan, ways)
     radii = acceptance_radii(plan.scenario, points, airspeed, max_bank, tracking)
     home = _home(plan)
-    builder = _Items(plan.scenario.origin)
+    builder = _ItemBuilder(plan.scenario.origin)
     if ways.climb is not None:
         builder.add(Command.NAV_TAKEOFF, (LAUNCH_PITCH, 0.0, 0.0, 0.0), np.append(ways.climb.home[:2], ways.climb.up))
-    builder.add(Command.DO_CHANGE_SPEED, (0.0, _milli(airspeed), -1.0, 0.0))
+    builder.add(Command.DO_CHANGE_SPEED, (0.0, _round_to_thousandths(airspeed), -1.0, 0.0))
     first = 0 if ways.climb is None else 1
     last = len(points) if ways.descent is None else len(points) - 3
     for k in range(first, last):
@@ -75,27 +80,35 @@ def plan_mission(
         builder.add(Command.NAV_LAND, (ways.descent.go_around, 0.0, 0.0, 0.0), ways.descent.point)
     returns = plan.scenario.returns
     rally = () if returns is None else tuple(_rally(plan.scenario.origin, returns.rally, home))
-    return Mission(home=home, items=tuple(builder.items), rally=rally, cruise_speed=_milli(airspeed), source=source)
+    return Mission(
+        home=home, items=tuple(builder.items), rally=rally, cruise_speed=_round_to_thousandths(airspeed), source=source
+    )
 
 
-class _Items:
-    """Mission items in the making, in the world's frame."""
+class _ItemBuilder:
+    """Builder of mission items in the world's frame."""
 
     def __init__(self, origin: GeoOrigin) -> None:
         self.items: list[MissionItem] = []
         self._origin = origin
 
     def add(self, command: Command, params: tuple[float, float, float, float], place: Floats | None = None) -> None:
-        """Add an item; place: (3,) m, None for a command without one."""
+        """Add an item.
+
+        place: (3,) m, None for a command without a position.
+        """
         frame, lat, lon, up = Frame.MISSION, 0.0, 0.0, 0.0
         if place is not None:
-            frame, up = Frame.GLOBAL, _milli(float(place[2]))
+            frame, up = Frame.GLOBAL, _round_to_thousandths(float(place[2]))
             lat, lon = (on_grid(float(value)) for value in to_geo(self._origin, place[0], place[1]))
         self.items.append(MissionItem(len(self.items) + 1, int(command), int(frame), params, lat, lon, up))
 
 
-def _way(plan: Plan, ways: GroundWays) -> Floats:
-    """All that is flown to, (w, 3) m: from over home, and to the landing point at the height of the line-up."""
+def _all_places(plan: Plan, ways: GroundWays) -> Floats:
+    """Return all places flown to, (w, 3) m, from above home to the landing point.
+
+    The landing point has the line-up's altitude.
+    """
     parts = [plan.waypoints]
     if (up := ways.climb) is not None:
         parts = [np.append(up.home[:2], up.up)[None], up.waypoints, *parts]
@@ -106,27 +119,27 @@ def _way(plan: Plan, ways: GroundWays) -> Floats:
 
 
 def _home(plan: Plan) -> Home:
-    """The scenario's home, or the ground below the start; of a start over unknown ground its own height."""
+    """Return the scenario's home, or the ground below the start, or the start if the ground is unknown."""
     scenario, first = plan.scenario, plan.waypoints[0]
     place = scenario.home if scenario.home is not None else first
     lat, lon = to_geo(scenario.origin, place[:1], place[1:2])
     under = math.nan if scenario.terrain is None else float(scenario.terrain.height(place[0], place[1]))
     up = float(place[2]) if math.isnan(under) else under
-    return Home(on_grid(float(lat[0])), on_grid(float(lon[0])), _milli(up))
+    return Home(on_grid(float(lat[0])), on_grid(float(lon[0])), _round_to_thousandths(up))
 
 
 def _rally(origin: GeoOrigin, points: Floats, home: Home) -> Iterator[MissionItem]:
-    """Rally points (n, 3) m as items, at heights over home, as ground stations write them."""
+    """Yield rally points (n, 3) m as items, with heights above home, as ground stations write them."""
     for number, (east, north, up) in enumerate(points.tolist()):
         lat, lon = to_geo(origin, east, north)
-        place = on_grid(float(lat)), on_grid(float(lon)), _milli(up - home.alt)
+        place = on_grid(float(lat)), on_grid(float(lon)), _round_to_thousandths(up - home.alt)
         yield MissionItem(number, int(Command.NAV_RALLY_POINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4, *place)
 
 
 def acceptance_radii(
     scenario: Scenario, points: Floats, airspeed: float, max_bank: float, tracking: TrackingError | None
 ) -> Floats:
-    """The acceptance radius at each place that a planned mission flies to, (w,) m, whole; as of `plan_mission`.
+    """Return the acceptance radius at each place of a planned mission, (w,) whole m; see `plan_mission`.
 
     points: (w, 3) m, in flying order.
     """
@@ -135,21 +148,21 @@ def acceptance_radii(
     wind = max(math.hypot(*scenario.wind.at(float(amsl))) for amsl in points[:, 2])
     turns, pull = turning_angles(points), GRAVITY * math.tan(max_bank)
     radii = np.full(len(points), ACCEPTANCE_TOLERANCE)
-    radii[1:-1] += _offsets(np.minimum(turns, _SHARPEST), (airspeed + wind) ** 2 / pull)
-    # Arcs are drawn with room for a gust; one sharper than these passes where it passes, and a U-turn's at infinity.
+    radii[1:-1] += _fly_by_offsets(np.minimum(turns, _MAX_OFFSET_TURN_RAD), (airspeed + wind) ** 2 / pull)
+    # Arcs are drawn with a margin for a gust; a sharper turn's arc passes wherever it passes, a U-turn's at infinity.
     gust = 0.1 * W20[scenario.wind.turbulence]
-    arcs = _offsets(np.minimum(turns, _U_TURN), (airspeed + wind + gust) ** 2 / pull)
+    arcs = _fly_by_offsets(np.minimum(turns, _MAX_ARC_TURN_RAD), (airspeed + wind + gust) ** 2 / pull)
     radii[1:-1] = np.maximum(radii[1:-1], arcs)
     return np.ceil(radii - 1e-6)
 
 
-def _offsets(turns: Floats, radius: float) -> Floats:
-    """How far arcs of this radius (m) pass from the corners of these turns (rad), m."""
+def _fly_by_offsets(turns: Floats, radius: float) -> Floats:
+    """Return the distances at which arcs of a radius (m) pass the corners of turns (rad), m."""
     return np.asarray(radius * (1.0 / np.cos(turns / 2.0) - 1.0))
 
 
 def _turn_distances(scenario: Scenario, points: Floats, airspeed: float, tracking: TrackingError) -> Floats:
-    """(w,) m, whole: for each corner at the highest ground speed on the way from one course to the other."""
+    """Return the radii (w,), whole m, for the highest ground speed between the two courses of each corner."""
     radii = np.full(len(points), tracking.corner_acceptance(0.0, airspeed))
     speeds = corner_speeds(scenario, points, airspeed)
     for i, (turn, fastest) in enumerate(zip(turning_angles(points), speeds, strict=True), 1):
@@ -158,9 +171,9 @@ def _turn_distances(scenario: Scenario, points: Floats, airspeed: float, trackin
 
 
 def corner_speeds(scenario: Scenario, points: Floats, airspeed: float) -> list[float]:
-    """Highest ground speed (m/s) at each corner of a path (w, 3), from one course to the other, w - 2 of them.
+    """Return the highest ground speed (m/s) in the turn at each of the w - 2 corners of a path (w, 3).
 
-    airspeed: equivalent, m/s; where a course cannot be held, the true one counts.
+    airspeed: equivalent, m/s; for a course that cannot be held, the true airspeed is used.
     """
     courses, speeds = leg_courses(points), []
     for i in range(1, len(points) - 1):
@@ -172,11 +185,11 @@ def corner_speeds(scenario: Scenario, points: Floats, airspeed: float) -> list[f
             ground_speed(speed, east * math.sin(c) + north * math.cos(c), east * math.cos(c) - north * math.sin(c))
             for c in between.tolist()
         ]
-        # NaN, where a course cannot be held, is no speed.
+        # The ground speed is NaN on a course that cannot be held.
         speeds.append(max((v for v in over_ground if v > 0.0), default=speed))
     return speeds
 
 
-def _milli(value: float) -> float:
-    """Double nearest to whole thousandths."""
+def _round_to_thousandths(value: float) -> float:
+    """Return a number rounded to whole thousandths."""
     return round(value * 1e3) / 1e3

@@ -1,8 +1,8 @@
-"""The flown ways from the ground and to it: where a mission's take-off begins and ends, and where its landing does.
+"""Departure and landing that are flown: where a mission's take-off and landing begin and end.
 
-A take-off is flown where the scenario says how the aircraft is launched and the mission begins with a take-off item; a
-landing where the scenario has a strip and the mission ends with a landing item.  Everything else begins and ends in the
-air.
+A take-off is flown if the scenario states how the aircraft is launched and the mission begins with a take-off item; a
+landing is flown if the scenario has a strip and the mission ends with a landing item. All other flights begin and end
+in the air.
 """
 
 import math
@@ -20,24 +20,28 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-# Pitch (rad) that a take-off item without one climbs at: ArduPlane's own where the first number is 0.
+# Climb pitch of a take-off item that states none, rad: ArduPlane's own where the first parameter is 0.
 USUAL_PITCH = math.radians(4.0)
-# So high a catapult's rail begins over the ground, and so high a hand lets go, m.
-_RAIL, _HAND = 1.0, 1.8
+# Height above ground at which a catapult's rail begins, m.
+_RAIL_HEIGHT_M = 1.0
+# Height above ground at which a hand launch releases the aircraft, m.
+_HAND_RELEASE_HEIGHT_M = 1.8
 
 
 @dataclass(frozen=True, slots=True)
 class TakeOff:
     """A take-off that is flown.
 
-    launch: the scenario's.
-    item: the mission item's number.
-    home: (3,) m, on the ground there.
-    course: of the launch, rad on the map.
-    top: height at which it ends, m AMSL; base: home's, that the autopilot counts from.
-    pitch: least of the climb, rad.
-    waypoint: of the route, from which the mission goes on.
-    speed: where the launch ends, over the ground, m/s.  acceleration: along it, m/s^2; 0 of a runway.
+    launch: the scenario's launch.
+    item: number of the mission item.
+    home: (3,) m, on the ground.
+    course: launch course, rad on the map.
+    top: altitude at which it ends, m AMSL.
+    base: altitude of home, m AMSL, to which the autopilot's heights are relative.
+    pitch: minimum climb pitch, rad.
+    waypoint: index of the route's waypoint from which the mission continues.
+    speed: ground speed at the end of the launch, m/s.
+    acceleration: acceleration along the launch, m/s^2; 0 for a runway.
     """
 
     launch: Launch
@@ -52,21 +56,21 @@ class TakeOff:
     acceleration: float
 
     def release(self) -> tuple[Floats, Floats]:
-        """Where the aircraft leaves rail or hand, and its velocity: (3,) m and m/s, east, north, up.
+        """Return the position and velocity at release from rail or hand, (3,) m and m/s, east, north, up.
 
-        Of a runway the place is the ground, for whoever knows how high the aircraft stands.
+        On a runway the position is on the ground; the caller adds the height at which the aircraft stands.
         """
         launch, along = self.launch, np.array([math.sin(self.course), math.cos(self.course)])
         if launch.method == "runway":
             return self.home.copy(), np.zeros(3)
         level, rise = math.cos(launch.incline), math.sin(launch.incline)
         run = launch.run if launch.method == "catapult" else 0.0
-        above = _RAIL + run * rise if launch.method == "catapult" else _HAND
+        above = _RAIL_HEIGHT_M + run * rise if launch.method == "catapult" else _HAND_RELEASE_HEIGHT_M
         place = np.array([*(self.home[:2] + run * level * along), self.home[2] + above])
         return place, self.speed * np.array([*(level * along), rise])
 
     def described(self) -> str:
-        """How it begins, in words."""
+        """Describe how the flight begins, in words."""
         how = {"catapult": "from a catapult", "hand": "by hand", "runway": "on a runway"}[self.launch.method]
         course = math.degrees(self.course) % 360.0
         return (
@@ -79,13 +83,15 @@ class TakeOff:
 class Approach:
     """A landing that is flown.
 
-    strip: the scenario's.
-    item: the mission item's number.
-    leg: of the route, the last: it leads to the landing point.
-    point: (3,) m, the landing point at the height that the mission states.
-    course: of the landing, rad.  run: length of the leg, m.  begin: height at its beginning, m AMSL.
-    tail_wind: m/s on that course at the landing point.
-    base: height of home, m AMSL; the landing point's of a mission without one.
+    strip: the scenario's landing strip.
+    item: number of the mission item.
+    leg: index of the route's last leg, which leads to the landing point.
+    point: (3,) m, the landing point at the altitude that the mission states.
+    course: landing course, rad.
+    run: length of the leg, m.
+    begin: altitude at the start of the leg, m AMSL.
+    tail_wind: tail wind on that course at the landing point, m/s.
+    base: altitude of home, m AMSL; the landing point's altitude if the mission has no home.
     """
 
     strip: LandingStrip
@@ -99,23 +105,23 @@ class Approach:
     base: float
 
     def place(self, position: Floats) -> tuple[Floats, Floats]:
-        """How far beyond the landing point, and to the right of its course, positions (n, 3) are, (n,) m."""
-        return _along_aside(position, self.point, self.course)
+        """Return the distances of positions (n, 3) past the landing point and right of its course, (n,) m."""
+        return _along_and_right(position, self.point, self.course)
 
     def on_strip(self, position: Floats) -> tuple[Floats, Floats]:
-        """How far along the strip beyond its middle, and aside of that line, positions (n, 3) are, (n,) m.
+        """Return the distances of positions (n, 3) along the strip from its center, and to its right, (n,) m.
 
-        The strip lies where the scenario has it, along its stated course, or along the landing's where none is stated.
-        A landing against the stated course is one along the same strip.
+        The strip lies where the scenario has it, on its stated course, or on the landing's course if none is stated. A
+        landing against the stated course uses the same strip.
         """
         axis = self.course if self.strip.course is None else self.strip.course
         if math.cos(self.course - axis) < 0.0:
             axis += math.pi
-        return _along_aside(position, np.array([self.strip.east, self.strip.north]), axis)
+        return _along_and_right(position, np.array([self.strip.east, self.strip.north]), axis)
 
 
-def _along_aside(position: Floats, begin: Floats, course: float) -> tuple[Floats, Floats]:
-    """How far positions (n, 3) are ahead of a place on a course (rad), and to the right of it, (n,) m."""
+def _along_and_right(position: Floats, begin: Floats, course: float) -> tuple[Floats, Floats]:
+    """Return the distances of positions (n, 3) ahead of a point on a course (rad) and to its right, m."""
     east, north = position[..., 0] - begin[0], position[..., 1] - begin[1]
     sin, cos = math.sin(course), math.cos(course)
     return east * sin + north * cos, east * cos - north * sin
@@ -123,9 +129,9 @@ def _along_aside(position: Floats, begin: Floats, course: float) -> tuple[Floats
 
 @dataclass(frozen=True, slots=True)
 class GroundWays:
-    """What of a flight is flown from the ground and to it; None for what is not.
+    """Take-off and landing of a flight; None for one that is not flown.
 
-    notes: why a launch or a strip of the scenario is not flown, in sentences.
+    notes: reasons why a launch or a strip of the scenario is not flown, in sentences.
     """
 
     take_off: TakeOff | None = None
@@ -133,14 +139,14 @@ class GroundWays:
     notes: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        """Whether any of it is flown."""
+        """Return True if a take-off or a landing is flown."""
         return self.take_off is not None or self.approach is not None
 
 
 def find_ground_ways(scenario: Scenario, mission: Mission, route: Route, slowest: float) -> GroundWays:
-    """What of a mission is flown from the ground and to it in a scenario, whose route this is.
+    """Find the take-off and the landing of a mission that are flown in a scenario, on the mission's route.
 
-    slowest: of level flight, m/s, by which a launch goes that states no speed.
+    slowest: lowest speed of level flight, m/s, which sets the launch speed if none is stated.
 
     >>> from world.scenario import load_scenario
     >>> bool(find_ground_ways(load_scenario("tight"), Mission(None, ()), None, 15.0))
@@ -156,7 +162,7 @@ def find_ground_ways(scenario: Scenario, mission: Mission, route: Route, slowest
 
 
 def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: float) -> tuple[TakeOff | None, str]:
-    """The take-off, or why none is flown."""
+    """Return the take-off, or the reason why none is flown."""
     launch, base = scenario.launch, home_place(mission, scenario.origin, scenario.terrain)
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_TAKEOFF}
     numbers = route.items.tolist()
@@ -171,7 +177,7 @@ def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: 
     ground = scenario.terrain.height(*here) if scenario.terrain is not None else base.up
     if math.isnan(ground):
         return None, "[launch]: the ground at home is not known: the flight begins in the air"
-    # Where the take-off item has a place of its own, ArduPlane does not go there: the next item is the first place.
+    # ArduPlane does not fly to a take-off item's own position: the next item is the first place.
     ahead = route.waypoints[first + 1, :2] - here
     course = launch.course if launch.course is not None else math.atan2(ahead[0], ahead[1])
     home = np.array([*here, float(ground)])
@@ -181,13 +187,13 @@ def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: 
 
 
 def climb_pitch(item: MissionItem) -> float:
-    """Least pitch of the climb that a take-off item asks for, rad."""
+    """Return the minimum climb pitch that a take-off item states, rad."""
     pitch = item.params[0]
     return math.radians(pitch) if pitch > 0.0 else USUAL_PITCH
 
 
 def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[Approach | None, str]:
-    """The landing, or why none is flown."""
+    """Return the landing, or the reason why none is flown."""
     strip, last = scenario.landing, route.legs
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_LAND}
     if strip is None or not items or int(route.items[last]) not in items or last < 2:
@@ -208,15 +214,15 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
 
 
 def airborne_route(route: Route, ways: GroundWays, begun: Floats | None) -> Route:
-    """The part of a route that is flown in the air, of which the usual rules judge.
+    """Return the part of a route that is flown in the air, to which the usual rules apply.
 
-    begun: (3,) m, where the take-off ended and the first leg begins; None for where the route begins.
-    Without the leg to the landing point; numbers of legs and waypoints stay.
+    begun: (3,) m, where the take-off ended and the first leg begins; None for the start of the route. The leg to the
+        landing point is left out; numbers of legs and waypoints stay.
     """
     points = np.array(route.waypoints)
     if ways.take_off is not None and begun is not None:
         points[: ways.take_off.waypoint + 1] = begun
-        # Waypoints before it are none of the flight's: each a little before the next, so that legs have a length.
+        # Waypoints before it are not flown: place each slightly before the next, so that every leg has a length.
         for k in range(ways.take_off.waypoint - 1, -1, -1):
             step = points[k + 1, :2] - points[k + 2, :2]
             points[k, :2] += step / max(1e-6, float(np.hypot(*step)))
@@ -225,9 +231,9 @@ def airborne_route(route: Route, ways: GroundWays, begun: Floats | None) -> Rout
 
 
 def shown_waypoints(route: Route, ways: GroundWays) -> Floats:
-    """A route's waypoints (w, 3) m as pictures and tables show them: with the ends that are flown on the ground there.
+    """Return a route's waypoints (w, 3) m for pictures and tables, with flown ends on the ground.
 
-    The route itself begins at the height where a take-off ends, and its leg to a landing point is level.
+    The route itself begins at the altitude where a take-off ends, and its leg to a landing point is level.
     """
     points = np.array(route.waypoints)
     if ways.take_off is not None:
@@ -238,7 +244,7 @@ def shown_waypoints(route: Route, ways: GroundWays) -> Floats:
 
 
 def flown_notes(route: Route, ways: GroundWays) -> tuple[str, ...]:
-    """A route's notes without that of a landing which is flown."""
+    """Return a route's notes without the note on a landing that is flown."""
     if ways.approach is None:
         return route.notes
     return tuple(note for note in route.notes if LANDING_NOTE not in note)

@@ -1,4 +1,4 @@
-"""A scenario made around an external mission: a file that came without one."""
+"""Build a scenario around a mission file that came without one."""
 
 import math
 import re
@@ -20,16 +20,16 @@ from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
-# The area extends this far (m) beyond the mission's positions, and the ceiling above its highest.
+# Margin of the area around the mission's positions, and of the ceiling above its highest, m.
 AREA_BUFFER = 2000.0
-# A home further than this (m) from the first position is not where the mission is flown: ground stations write a
-# default position of their own where none was set.
-_HOME_DISTANCE = 100_000.0
+# Largest distance between home and the first position, m: a home further away is not the mission's, since ground
+# stations write a default position of their own if none was set.
+_MAX_HOME_DISTANCE_M = 100_000.0
 
 
 @dataclass(frozen=True, slots=True)
 class ImpliedScenario:
-    """The scenario made around a mission, and the mission's places in it."""
+    """The scenario built around a mission, and the mission's places in it."""
 
     scenario: Scenario
     placed: PlacedMission
@@ -38,17 +38,19 @@ class ImpliedScenario:
 def implied_scenario(
     mission: Mission, terrain_path: str | None, flight: FlightTable | None = None, *, vertical_legs: bool = False
 ) -> ImpliedScenario:
-    """Scenario for a mission that has none: its surroundings, no threats, default limits, ``external`` set.
+    """Build a scenario for a mission without one, with ``external`` set.
 
-    terrain_path: an elevation file or embedded name, None for no terrain at all.
-    flight: the aircraft and how it flies, the defaults if None.
-    vertical_legs: as for `flight.mission.placing.place_stops`.
+    It has the mission's surroundings, no threats and default limits.
 
-    The area is the box of the positions flown to, their circles and 2 km around, clipped at the tile's edge; a mission
-    that ends with a return has the nearest rally point among them.  Start
-    and destination are the first and last of these positions; where they are not above ground they are lifted to 1 m,
-    because a scenario's ends must be, while the route (and its verdict) keeps the mission's heights.  Raises
-    MissionError, and TerrainError where the mission leaves the tile.
+    terrain_path: an elevation file or embedded name, None for no terrain.
+    flight: the aircraft and how it flies, defaults if None.
+    vertical_legs: see `flight.mission.placing.place_stops`.
+
+    The area is the box of the positions flown to and their loiters, with a margin of 2 km, clipped at the tile's edge;
+    for a mission that ends with a return it includes the nearest rally point. Start and destination are the first and
+    last of these positions. If they are not above ground they are raised to 1 m, as a scenario requires, while the
+    route (and its verdict) keeps the mission's altitudes. Raise MissionError, and TerrainError if the mission leaves
+    the tile.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
@@ -82,10 +84,11 @@ def implied_scenario(
 
 
 def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOrigin:
-    """Where the map of a mission without a scenario has its origin: home, or the first position flown to.
+    """Return the map origin of a mission without a scenario: home, or the first position flown to.
 
-    stops: of the mission's itinerary.  Home counts if it is within 100 km of that position.  Raises MissionError beyond
-    89 degrees of latitude.
+    stops: stops of the mission's itinerary.
+
+    Home is used if it is within 100 km of that position. Raise MissionError beyond 89 degrees of latitude.
     """
     first = stops[0]
     positions = [item for item in mission.items if item.has_position and item.seq >= first.item]
@@ -98,23 +101,23 @@ def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOri
     home = mission.home
     if home is not None and abs(home.lat_deg) <= 89.0:
         east, north = to_map(origin, home.lat_deg, home.lon_deg)
-        if math.hypot(float(east), float(north)) <= _HOME_DISTANCE:
+        if math.hypot(float(east), float(north)) <= _MAX_HOME_DISTANCE_M:
             origin = GeoOrigin(home.lat_deg, home.lon_deg)
     return origin
 
 
 def _boxes(mission: Mission, itinerary: Itinerary, origin: GeoOrigin) -> tuple[Floats, Floats]:
-    """Area, and smallest box of the positions flown to; both (2, 2) [[e0, e1], [n0, n1]] m."""
+    """Return the area, and the smallest box of the positions flown to; both (2, 2) [[e0, e1], [n0, n1]] m."""
     stops = itinerary.stops
     points = on_map(mission.source, stops, origin)
     flown = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
     around = AREA_BUFFER + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
     area = flown
     if itinerary.returns and (rally := rally_stops(mission)):
-        # Which of them the aircraft may be near enough to fly to is not known here: the nearest to where it turns back.
+        # Which rally points are in range is unknown here: take the nearest to where the return begins.
         far = on_map(mission.source, rally, origin)
         away = np.hypot(*(far - points[max(0, len(points) - 2)]).T)
-        if away.min() <= _HOME_DISTANCE:
+        if away.min() <= _MAX_HOME_DISTANCE_M:
             nearest = far[[int(np.argmin(away))]].T
             area = np.stack([np.minimum(flown[:, 0], nearest[:, 0]), np.maximum(flown[:, 1], nearest[:, 0])], axis=1)
     return np.clip(area + np.array([-around, around]), -MAP_EXTENT, MAP_EXTENT), flown
@@ -123,7 +126,7 @@ def _boxes(mission: Mission, itinerary: Itinerary, origin: GeoOrigin) -> tuple[F
 def _ground(
     path: str | None, origin: GeoOrigin, box: Floats, flown: Floats
 ) -> tuple[Terrain | None, TerrainTable, Floats]:
-    """Terrain, its table, and the area clipped at the tile's edge."""
+    """Return the terrain, its table, and the area clipped at the tile's edge."""
     if path is None:
         return None, TerrainTable(kind="none"), box
     raster = open_raster(path)

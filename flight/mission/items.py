@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from flight.mission.commands import Command as Command
 
 # ----------------------------------------------------------------------
-# What is not flown as a mission has it, a note a reason, with the items that it is about.
+# Notes on items that are not flown as written, grouped by reason.
 
 
 @dataclass(slots=True)
@@ -26,13 +26,13 @@ class Notes:
     _items: dict[str, list[int]] = field(default_factory=dict)
 
     def add(self, text: str, seq: int | None = None) -> None:
-        """Note something, about an item or the whole mission; the same note twice counts once."""
+        """Add a note on an item or on the whole mission; a repeated note is kept once."""
         items = self._items.setdefault(text, [])
         if seq is not None and seq not in items[-1:]:
             items.append(seq)
 
     def lines(self) -> tuple[str, ...]:
-        """One line a note: "items 3-5, 9: DO_SET_SERVO: not flown"."""
+        """Return one line per note: "items 3-5, 9: DO_SET_SERVO: not flown"."""
         found = []
         for text, items in self._items.items():
             numbers = sorted(set(items))
@@ -42,7 +42,7 @@ class Notes:
 
 
 def _ranges(numbers: list[int]) -> str:
-    """Sorted numbers as "3-5, 9"."""
+    """Return sorted numbers as "3-5, 9"."""
     parts: list[list[int]] = []
     for number in numbers:
         if not parts or number > parts[-1][1] + 1:
@@ -51,15 +51,19 @@ def _ranges(numbers: list[int]) -> str:
     return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in parts)
 
 
-# Most items that a mission file may hold, and the largest file (bytes): far beyond what any autopilot stores.
+# Largest number of items in a mission file, far beyond what any autopilot stores.
 MAX_ITEMS = 20_000
+# Largest mission file, bytes.
 MAX_BYTES = 16 * 2**20
 
-# The largest number that MAVLink can carry in a parameter, a float32.
-_FLOAT32 = 3.4028234663852886e38
-_INT32 = 2**31 - 1
-# Above any aircraft of ours, below any dry land.
-_LOWEST, _HIGHEST = -1000.0, 20_000.0
+# Largest number that MAVLink can carry in a parameter, a float32.
+_MAX_FLOAT32 = 3.4028234663852886e38
+# Largest number that MISSION_ITEM_INT can carry in its coordinates, an int32.
+_MAX_INT32 = 2**31 - 1
+# Lowest altitude of an item, m: below any dry land.
+_MIN_ALTITUDE_M = -1000.0
+# Highest altitude of an item, m: above the ceiling of any aircraft here.
+_MAX_ALTITUDE_M = 20_000.0
 
 
 C = Command
@@ -68,11 +72,14 @@ PLACES = frozenset(
     {C.NAV_WAYPOINT, C.NAV_LOITER_UNLIM, C.NAV_LOITER_TURNS, C.NAV_LOITER_TIME, C.NAV_LOITER_TO_ALT}
     | {C.NAV_SPLINE_WAYPOINT, C.NAV_PAYLOAD_PLACE}
 )
+# Commands that take off.
 TAKEOFFS = frozenset({C.NAV_TAKEOFF, C.NAV_VTOL_TAKEOFF})
+# Commands that land.
 LANDINGS = frozenset({C.NAV_LAND, C.NAV_VTOL_LAND})
+# Commands that jump to another item.
 JUMPS = frozenset({C.DO_JUMP, C.DO_JUMP_TAG})
-# Steps of a flight that no fixed wing takes, and whose they are.  ArduPlane goes on to the next command
-# (`Plane::start_command`), so that of the way a piece is missing; but for QuadPlanes, which land to place a payload.
+# Navigation commands for other vehicles, with the kind of vehicle. ArduPlane goes on to the next command
+# (`Plane::start_command`), so that a piece of the path is missing; except QuadPlanes, which land to place a payload.
 OTHER_VEHICLES = {
     C.NAV_SPLINE_WAYPOINT: "a multicopter",
     C.NAV_GUIDED_ENABLE: "a multicopter or a rover",
@@ -83,18 +90,20 @@ OTHER_VEHICLES = {
     C.NAV_VTOL_LAND: "a VTOL aircraft",
     C.DO_VTOL_TRANSITION: "a VTOL aircraft",
 }
+# Commands of fence items.
 FENCES = frozenset(range(5001, 5005))
-# Other commands whose fifth to seventh numbers are latitude, longitude and height.
-_LOCATED_DO = frozenset(
+# Other commands whose fifth to seventh parameters are latitude, longitude and altitude.
+_LOCATED_COMMANDS = frozenset(
     {C.DO_SET_HOME, C.DO_LAND_START, C.DO_SET_ROI_LOCATION, C.DO_SET_ROI, C.CONDITION_GATE, C.NAV_RALLY_POINT}
 )
-_LAST_NAV = 95
-# Steps of the flight beyond `_LAST_NAV` (`AP_Mission::is_nav_cmd`).
-_NAV_BEYOND = frozenset({C.NAV_SET_YAW_SPEED, C.NAV_SCRIPT_TIME, C.NAV_ATTITUDE_TIME})
+# Last of the contiguous navigation commands.
+_LAST_NAV_COMMAND = 95
+# Navigation commands beyond `_LAST_NAV_COMMAND` (`AP_Mission::is_nav_cmd`).
+_OTHER_NAV_COMMANDS = frozenset({C.NAV_SET_YAW_SPEED, C.NAV_SCRIPT_TIME, C.NAV_ATTITUDE_TIME})
 
 
 class Frame(IntEnum):
-    """MAV_FRAME numbers; heights are AMSL, relative to home, or above terrain."""
+    """MAV_FRAME numbers; altitudes are AMSL, relative to home, or above terrain."""
 
     GLOBAL = 0
     MISSION = 2
@@ -105,28 +114,34 @@ class Frame(IntEnum):
     GLOBAL_TERRAIN_ALT_INT = 11
 
 
+# All frames, as numbers.
 _FRAMES = tuple(int(frame) for frame in Frame)
+# Frames with altitudes above mean sea level.
 AMSL = frozenset({Frame.GLOBAL, Frame.GLOBAL_INT})
+# Frames with heights above home.
 OVER_HOME = frozenset({Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT})
+# Frames with heights above terrain.
 OVER_TERRAIN = frozenset({Frame.GLOBAL_TERRAIN_ALT, Frame.GLOBAL_TERRAIN_ALT_INT})
 
 
 def is_located(command: int, frame: int) -> bool:
-    """Whether the fifth to seventh numbers of such an item are a latitude, a longitude and a height."""
-    return frame != Frame.MISSION and (command <= _LAST_NAV or command in FENCES or command in _LOCATED_DO)
+    """Return True if the fifth to seventh parameters of such an item are latitude, longitude and altitude."""
+    return frame != Frame.MISSION and (
+        command <= _LAST_NAV_COMMAND or command in FENCES or command in _LOCATED_COMMANDS
+    )
 
 
 def is_navigation(command: int) -> bool:
-    """Return True if a command is a step of the flight, so that what stands behind it waits until it is done.
+    """Return True if a command is a navigation command: commands after it wait until it is done.
 
     >>> is_navigation(Command.NAV_WAYPOINT), is_navigation(Command.DO_SET_CAM_TRIGG_DIST)
     (True, False)
     """
-    return command <= _LAST_NAV or command in _NAV_BEYOND
+    return command <= _LAST_NAV_COMMAND or command in _OTHER_NAV_COMMANDS
 
 
 def command_name(command: int) -> str:
-    """Return the MAVLink name of a command without "MAV_CMD_", or its number where MAVLink has none.
+    """Return the MAVLink name of a command without "MAV_CMD_", or its number if MAVLink has none.
 
     >>> command_name(16), command_name(50_000)
     ('NAV_WAYPOINT', 'command 50000')
@@ -138,7 +153,7 @@ def command_name(command: int) -> str:
 
 
 def on_grid(degrees: float) -> float:
-    """Double nearest to whole 1e-7 degrees, rounded, never truncated; NaN stays NaN.
+    """Return degrees rounded to whole 1e-7 degrees, never truncated; NaN stays NaN.
 
     >>> on_grid(36.50000006), on_grid(-84.19999994)
     (36.5000001, -84.1999999)
@@ -150,14 +165,14 @@ def on_grid(degrees: float) -> float:
 class MissionItem:
     """One mission item.
 
-    seq: its number in the file it came from (home is not an item).
+    seq: its number in its file (home is not an item).
     command: MAV_CMD.
     frame: MAV_FRAME.
     params: p1..p4, NaN where unset.
     lat_deg, lon_deg: degrees on the 1e-7 grid of MISSION_ITEM_INT, NaN where unset; for a command without a position,
         its fifth and sixth parameters as written.
     alt: m in the item's frame, NaN where unset.
-    autocontinue: whether the mission goes on by itself after the item.
+    autocontinue: True if the mission continues by itself after the item.
     """
 
     seq: int
@@ -171,9 +186,9 @@ class MissionItem:
 
     @property
     def x(self) -> int:
-        """Latitude as MISSION_ITEM_INT carries it: 1e-7 degrees, rounded; INT32_MAX where unset (MAVLink).
+        """Latitude as MISSION_ITEM_INT carries it: 1e-7 degrees, rounded; INT32_MAX if unset (MAVLink).
 
-        A command without a position has its fifth parameter there, unscaled.
+        For a command without a position it is the fifth parameter, unscaled.
         """
         return self._scaled(self.lat_deg)
 
@@ -184,12 +199,12 @@ class MissionItem:
 
     def _scaled(self, value: float) -> int:
         if not math.isfinite(value):
-            return _INT32
+            return _MAX_INT32
         return round(value * 1e7) if is_located(self.command, self.frame) else round(value)
 
     @property
     def has_position(self) -> bool:
-        """Whether its latitude and longitude are a position (0, 0 and NaN mean that they do not)."""
+        """True if its latitude and longitude are a position; 0, 0 and NaN are not."""
         if not (math.isfinite(self.lat_deg) and math.isfinite(self.lon_deg)):
             return False
         return is_located(self.command, self.frame) and (self.x, self.y) != (0, 0)
@@ -206,11 +221,12 @@ class Home:
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """A camera that looks straight down, and what is asked of its photos.
+    """A camera that looks straight down, and the photo overlap that is required.
 
-    across, along: what a photo shows beside and along the way, m per m above ground.
-    front, side: share of it that a photo is to share with the next, and with those of the next line; None for nothing.
-    interval: least time between photos, s; 0 where it is not known.
+    across, along: footprint of a photo across and along the track, m per m above ground.
+    front, side: required overlap with the next photo and with the photos of the next line, as a fraction of the
+        footprint; None for no requirement.
+    interval: shortest time between photos, s; 0 if unknown.
     """
 
     across: float
@@ -222,11 +238,11 @@ class Camera:
 
 @dataclass(frozen=True, slots=True)
 class SurveyPlan:
-    """What a ground station keeps of a survey beside its items.
+    """Settings of a survey that a ground station stores in addition to its items.
 
-    photo: the way between photos that its items state, m, by which it is known; 0 for none, None for any survey.
-    turn_around: how far its lines go on beyond their photos, m.
-    camera: None where only distances are known.
+    photo: distance between photos that its items state, m, which identifies it; 0 for none, None for any survey.
+    turn_around: how far its lines extend beyond their photos, m.
+    camera: None if only distances are known.
     """
 
     photo: float | None
@@ -236,17 +252,18 @@ class SurveyPlan:
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """A mission: what a .waypoints file, a .plan file or an upload holds.
+    """A mission: the content of a .waypoints file, a .plan file or an upload.
 
-    home: None where the file has none, or 0,0.
+    home: None if the file has none, or 0,0.
     items: seq strictly increasing.
     fences: items 5001..5004, one per vertex or circle.
-    rally: items 5100.  Those four decide whether two missions are equal.
-    cruise_speed: m/s, what a .plan file's author had the ground station assume; it is never sent to an aircraft.
-    warnings: what was odd about the file but could be read.
-    source: names it in messages.
-    survey_plans: of its surveys, where the file keeps more of them than their items.
-    autopilot: that a .plan file was written for, by the name that scenarios state; "" where nothing says so.
+    rally: items 5100. These four fields decide whether two missions are equal.
+    cruise_speed: m/s, the speed that a .plan file's author entered for the ground station's estimates; it is never sent
+        to an aircraft.
+    warnings: oddities of the file that could still be read.
+    source: name of the mission in messages.
+    survey_plans: settings of its surveys, if the file stores more of them than their items.
+    autopilot: autopilot that a .plan file was written for, by its name in scenarios; "" if unknown.
     """
 
     home: Home | None
@@ -261,9 +278,9 @@ class Mission:
 
 
 def renumbered(mission: Mission) -> Mission:
-    """Mission whose items are numbered from 1 without gaps, as ground stations count them; 0 is home's in both forms.
+    """Return a mission whose items are numbered from 1 without gaps, as ground stations number them.
 
-    The targets of jumps move with them; a jump to an item that is not there stays one.
+    Number 0 is home in both forms. The targets of jumps are renumbered too; a jump to a missing item stays one.
 
     >>> way = tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (0, 1, 5))
     >>> [item.seq for item in renumbered(Mission(None, way)).items]
@@ -283,7 +300,7 @@ def renumbered(mission: Mission) -> Mission:
 
 
 def shifted(items: Iterable[MissionItem], shift: int) -> tuple[MissionItem, ...]:
-    """Items with a number added to each seq, and to the targets of jumps.
+    """Return items with a number added to each seq, and to the targets of jumps.
 
     >>> jump = MissionItem(3, int(Command.DO_JUMP), 2, (1.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0)
     >>> [(item.seq, item.params[0]) for item in shifted([jump], 1)]
@@ -299,7 +316,10 @@ def shifted(items: Iterable[MissionItem], shift: int) -> tuple[MissionItem, ...]
 
 
 class ItemProblem(NamedTuple):
-    """Fault of an item: the field, the value there, and what is allowed or amiss; as text "field value: allowed"."""
+    """Fault of an item: the field, its value, and the allowed values or a description of the fault.
+
+    Its text is "field value: allowed".
+    """
 
     field: str
     value: float
@@ -309,12 +329,16 @@ class ItemProblem(NamedTuple):
         return f"{self.field} {self.value:.10g}: {self.allowed}"
 
     def at(self, file: str, where: object) -> dict[str, Any]:
-        """What makes a `MissionError` of it: file: that holds the item.  where: what the message begins with."""
+        """Return the arguments of a `MissionError` for this problem.
+
+        file: file that holds the item.
+        where: beginning of the message.
+        """
         return {"message": f"{where}: {self}", "file": file, **self._asdict()}
 
 
 def position_problem(lat_deg: float, lon_deg: float) -> ItemProblem | None:
-    """Fault of a latitude and longitude in degrees; None if nothing is."""
+    """Return the fault of a latitude and longitude in degrees, or None."""
     if abs(lat_deg) > 90.0:
         swapped = " (latitude and longitude swapped?)" if abs(lon_deg) <= 90.0 else ""
         return ItemProblem("latitude", lat_deg, f"allowed -90..90 degrees{swapped}")
@@ -324,7 +348,7 @@ def position_problem(lat_deg: float, lon_deg: float) -> ItemProblem | None:
 
 
 def item_problem(item: MissionItem) -> ItemProblem | None:
-    """Fault of an item that no autopilot could make sense of; None if nothing is.
+    """Return the fault of an item that no autopilot could interpret, or None.
 
     >>> print(item_problem(MissionItem(1, 16, 0, (0.0,) * 4, 91.0, 8.0, 75.0)))
     latitude 91: allowed -90..90 degrees (latitude and longitude swapped?)
@@ -332,17 +356,17 @@ def item_problem(item: MissionItem) -> ItemProblem | None:
     if item.frame not in _FRAMES:
         return ItemProblem("frame", item.frame, f"allowed {', '.join(map(str, _FRAMES))}")
     for k, value in enumerate(item.params, 1):
-        if abs(value) > _FLOAT32:
+        if abs(value) > _MAX_FLOAT32:
             return ItemProblem(f"p{k}", value, "beyond what MAVLink carries (3.4e38)")
     if is_located(item.command, item.frame):
         wrong = position_problem(item.lat_deg, item.lon_deg)
-        if wrong is None and not (_LOWEST <= item.alt <= _HIGHEST or math.isnan(item.alt)):
-            wrong = ItemProblem("altitude", item.alt, f"allowed {_LOWEST:.0f}..{_HIGHEST:.0f} m")
+        if wrong is None and not (_MIN_ALTITUDE_M <= item.alt <= _MAX_ALTITUDE_M or math.isnan(item.alt)):
+            wrong = ItemProblem("altitude", item.alt, f"allowed {_MIN_ALTITUDE_M:.0f}..{_MAX_ALTITUDE_M:.0f} m")
         return wrong or _count_problem(item)
     for name, value in (("latitude", item.lat_deg), ("longitude", item.lon_deg)):
-        if abs(value) > _INT32:
+        if abs(value) > _MAX_INT32:
             return ItemProblem(name, value, "beyond what MISSION_ITEM_INT carries (2147483647)")
-    if abs(item.alt) > _FLOAT32:
+    if abs(item.alt) > _MAX_FLOAT32:
         return ItemProblem("altitude", item.alt, "beyond what MAVLink carries (3.4e38)")
     if item.command in PLACES | TAKEOFFS | LANDINGS and (item.lat_deg or item.lon_deg):
         allowed = f"has no coordinates, and {command_name(item.command)} gives some; 2 is for the rest"
@@ -351,7 +375,7 @@ def item_problem(item: MissionItem) -> ItemProblem | None:
 
 
 def _count_problem(item: MissionItem) -> ItemProblem | None:
-    """Fault of the parameters that count something."""
+    """Return the fault of parameters that are counts or sizes, or None."""
     p1, p2 = item.params[:2]
     if item.command in JUMPS:
         if not (p1 >= 0 and p1 == int(p1)):

@@ -1,10 +1,10 @@
-"""A mission's items in flying order: jumps unrolled, speeds assigned, a note for all that is not flown as written.
+"""A mission's items in flying order: jumps unrolled, speeds assigned, deviations noted.
 
-ArduPlane and PX4 reach the same places in the same order, but run the commands between them at different times.  PX4
-runs each where it stands (`MissionBase::advance_mission`).  ArduPlane runs the first before the next place, and the
-others one after another while it flies there, from the first on and through jumps as their counters stand by then
-(`AP_Mission::advance_current_nav_cmd`, `advance_current_do_cmd`): what stands behind a jump that was just taken for
-the last time is run a round early (ArduPilot #30376).
+ArduPlane and PX4 reach the same places in the same order, but run the commands between them at different times. PX4
+runs each where it stands (`MissionBase::advance_mission`). ArduPlane runs the first before the next place, and the
+others one after another while it flies there, from the first on and through jumps by the state of their counters at
+that time (`AP_Mission::advance_current_nav_cmd`, `advance_current_do_cmd`): commands after a jump that has just been
+taken for the last time are run a round early (ArduPilot #30376).
 """
 
 import math
@@ -31,31 +31,34 @@ from flight.mission.items import (
 )
 from world.errors import MissionError
 
-# A mission unrolls to no more places than this, and no more items are walked through on the way.
+# Largest number of places that a mission may unroll to.
 MAX_STOPS = 10_000
+# Largest number of items that may be stepped through while unrolling it.
 _MAX_STEPS = 200_000
 
-# A loiter without end is flown for this long, s, and the mission ends there.
+# Time for which a loiter without end is flown, s; the mission ends there.
 UNLIMITED = 60.0
 
-# Noted of items behind a mission's end.
+# Note on items after a mission's end.
 NEVER_REACHED = "never reached"
-# Noted of a landing item, but where its landing is flown.
+# Note on a landing item whose landing is not flown.
 LANDING_NOTE = "not flown to the ground; the flight ends above it at the last height"
 
 
 @dataclass(frozen=True, slots=True)
 class Loiter:
-    """A circle to fly.
+    """A loiter to fly.
 
     radius: m, positive to the right, 0 for the aircraft's own.
-    turns, seconds: how long, 0 for what does not count; neither is shortened, and the circle is left on the first
-        tangent to the next position after them.
-    timed: whether the item is one for a time, be that none.
-    to_height: until the item's height is reached.
-    endless: whether the item asks for a circle without end, of which ``seconds`` are flown.
-    on_course: whether the item asks to leave it on the course to what follows, as PX4 reads it; ArduPlane always does.
-    on_tangent: whether it asks for a line there that begins on its rim (PX4) or where it is left (ArduPlane).
+    turns, seconds: duration, 0 if it does not apply; neither is shortened, and the circle is left afterwards on the
+        first tangent to the next position.
+    timed: True if the item states a time, even 0.
+    to_height: True if it lasts until the item's altitude is reached.
+    endless: True if the item states a loiter without end, of which ``seconds`` are flown.
+    on_course: True if the item states an exit on the course to the next place, as PX4 reads it; ArduPlane always does
+        so.
+    on_tangent: True if the item states a line to the next place that begins on the circle (PX4) or at the exit
+        (ArduPlane).
     """
 
     radius: float
@@ -68,12 +71,15 @@ class Loiter:
     on_tangent: bool = False
 
     def sweep(self, airspeed: float, radius: float) -> float:
-        """Angle to fly around at least, rad.  In wind a circle over the ground takes longer than the air distance."""
+        """Return the minimum angle to fly around the circle, rad.
+
+        In wind a circle over the ground takes longer than its air distance.
+        """
         return max(2.0 * math.pi * self.turns, self.seconds * airspeed / radius)
 
 
 def loiter_of(item: MissionItem) -> Loiter | None:
-    """Circle that an item asks for; None for any other command."""
+    """Return the loiter that an item states, or None for any other command."""
     p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
     if item.command == Command.NAV_LOITER_UNLIM:
         return Loiter(p3, seconds=UNLIMITED, endless=True)
@@ -90,7 +96,8 @@ def loiter_of(item: MissionItem) -> Loiter | None:
 class OpenItem(NamedTuple):
     """An item that changes the flight path and is not flown as the autopilot would.
 
-    item: the mission item's seq.  text: its command, and what is not flown.
+    item: seq of the mission item.
+    text: its command, and the part that is not flown.
     """
 
     item: int
@@ -98,9 +105,10 @@ class OpenItem(NamedTuple):
 
 
 class Gate(NamedTuple):
-    """A CONDITION_GATE on the way to a stop: what the mission orders after it counts from when it is passed.
+    """A CONDITION_GATE on the leg to a stop: commands after it take effect when it is passed.
 
-    item: the mission item's seq.  airspeed: m/s until it is passed, NaN for the aircraft's own.
+    item: seq of the mission item.
+    airspeed: airspeed until it is passed, m/s; NaN for the aircraft's own.
     """
 
     item: int
@@ -113,15 +121,15 @@ class Gate(NamedTuple):
 class ItineraryStop:
     """A position to fly to.
 
-    item: the mission item's seq, -1 where no item asks for it.
-    command: the item's MAV_CMD.
-    alt: m in the item's frame, NaN to keep the last height.
-    frame: the item's MAV_FRAME.
-    airspeed: m/s on the leg that ends here, NaN for the aircraft's own.
-    acceptance: radius, m, 0 where none is stated.
-    loiter: the circle flown about it, None for none.
-    airspeed_by_value: as ``airspeed`` by an autopilot that reads items as PX4 does.
-    gates: on the way to it, in order.
+    item: seq of the mission item, -1 without one.
+    command: MAV_CMD of the item.
+    alt: m in the item's frame, NaN to keep the last altitude.
+    frame: MAV_FRAME of the item.
+    airspeed: airspeed on the leg that ends here, m/s; NaN for the aircraft's own.
+    acceptance: acceptance radius, m, 0 if none is stated.
+    loiter: the loiter about it, or None.
+    airspeed_by_value: airspeed as PX4 reads the items.
+    gates: gates on the leg to it, in order.
     """
 
     item: int
@@ -139,18 +147,17 @@ class ItineraryStop:
 
 @dataclass(frozen=True, slots=True)
 class Itinerary:
-    """Where a mission goes: at least one stop.
+    """Stops of a mission in flying order, at least one.
 
-    home: the mission's, or the first position item with height NaN.
-    has_home: whether it is the mission's.
-    takeoff: the item that the flight starts with, None for none.
-    notes: what is not flown as written, with item numbers.
+    home: the mission's home, or the first position item with altitude NaN.
+    has_home: True if it is the mission's own.
+    takeoff: the item that the flight starts with, or None.
+    notes: items that are not flown as written, with their numbers.
     endless: seq of a jump without end, -1 for none.
-    landing: the place to land at, None for none; the flight ends above it.
-    notes_by_value: as ``notes`` by an autopilot that reads items as PX4 does: of a change of speed the value alone, and
-        gates.
-    open_items, open_by_value: what leaves the verdict open, by an autopilot that reads items as ArduPlane or PX4 does.
-    last_home: home at the mission's end, which a return flies to; another than ``home`` after a DO_SET_HOME.
+    landing: the landing place, or None; the flight ends above it.
+    notes_by_value: notes for an autopilot that reads items as PX4 does: only the value of a speed change, and gates.
+    open_items, open_by_value: items that leave the verdict open, as ArduPlane and as PX4 reads them.
+    last_home: home at the mission's end, which a return flies to; it differs from ``home`` after a DO_SET_HOME.
     """
 
     stops: tuple[ItineraryStop, ...]
@@ -167,15 +174,18 @@ class Itinerary:
 
     @property
     def returns(self) -> bool:
-        """Whether it ends with a return to launch; the last stop is then home, at the height before it."""
+        """True if it ends with a return to launch.
+
+        The last stop is then home, at the altitude of the stop before.
+        """
         return self.stops[-1].command == Command.NAV_RETURN_TO_LAUNCH
 
 
 def make_itinerary(mission: Mission) -> Itinerary:
-    """Walk through the mission as an autopilot would.
+    """Unroll a mission as an autopilot would.
 
-    Raises MissionError for a mission without a position, a jump to an item that is not there, and a mission that
-    unrolls to more than `MAX_STOPS` places.
+    Raise MissionError for a mission without a position, for a jump to a missing item, and for a mission that unrolls to
+    more than `MAX_STOPS` places.
     """
     walk, steps = _Walk(mission), _Steps(mission)
     for step in steps:
@@ -215,12 +225,12 @@ def make_itinerary(mission: Mission) -> Itinerary:
 
 
 class _Step(NamedTuple):
-    """The way to the next step of the flight.
+    """The next navigation item, and the commands before it.
 
-    between: the commands that stand before it, jumps followed, as PX4 runs them.
-    early: that of them which ArduPlane runs before the step, None for none.
-    late: those that ArduPlane runs on the way.
-    to: the step, None at the mission's end.
+    between: the commands before it, following jumps, as PX4 runs them.
+    early: the command that ArduPlane runs before the item, or None.
+    late: the commands that ArduPlane runs on the leg to the item.
+    to: the navigation item, None at the mission's end.
     """
 
     between: tuple[MissionItem, ...]
@@ -230,10 +240,12 @@ class _Step(NamedTuple):
 
 
 class _Steps:
-    """The steps of a mission with jumps followed; a jump's counter is never reset, as in ArduPlane 4.6 and in PX4.
+    """Navigation items of a mission, following jumps.
 
-    reached: numbers of the items that are come to so far, jumps included.
-    endless: seq of the jump without end that ended it, -1 for none; one is taken once.
+    Jump counters are never reset, as in ArduPlane 4.6 and PX4.
+
+    reached: numbers of the items reached, including jumps.
+    endless: seq of the jump without end that ended it, -1 for none; such a jump is taken once.
     """
 
     def __init__(self, mission: Mission) -> None:
@@ -242,22 +254,22 @@ class _Steps:
         self.tags: dict[int, int] = {}
         for k, item in enumerate(mission.items):
             if item.command == Command.JUMP_TAG:
-                # The first of a number counts, wherever the jump stands (`AP_Mission::get_index_of_jump_tag`).
+                # The first tag of a number applies, wherever the jump stands (`AP_Mission::get_index_of_jump_tag`).
                 self.tags.setdefault(int(item.params[0]), k)
         self.taken: dict[int, int] = {}
         self.reached: set[int] = set()
         self.endless, self._walked = -1, 0
 
     def __iter__(self) -> Iterator[_Step]:
-        """Go from step to step, counting jumps."""
+        """Iterate over the navigation items, counting jumps."""
         k: int | None = 0
         while k is not None:
             between: list[int] = []
-            k = self._next(k, counting=True)
+            k = self._next_item(k, counting=True)
             while k is not None and not is_navigation(self.items[k].command):
                 between.append(k)
-                k = self._next(k + 1, counting=True)
-            late = self._late(between[0]) if between and k is not None else []
+                k = self._next_item(k + 1, counting=True)
+            late = self._late_commands(between[0]) if between and k is not None else []
             self.reached |= {self.items[one].seq for one in late}
             yield _Step(
                 tuple(self.items[one] for one in between),
@@ -267,17 +279,17 @@ class _Steps:
             )
             k = None if k is None else k + 1
 
-    def _late(self, first: int) -> list[int]:
-        """Return the places of the commands that ArduPlane runs on the way to a step, after the first of them."""
+    def _late_commands(self, first: int) -> list[int]:
+        """Return the indices of the commands after the first that ArduPlane runs on the leg to an item."""
         found: list[int] = []
-        k = self._next(first + 1, counting=False)
+        k = self._next_item(first + 1, counting=False)
         while k is not None and k not in found and not is_navigation(self.items[k].command):
             found.append(k)
-            k = self._next(k + 1, counting=False)
+            k = self._next_item(k + 1, counting=False)
         return found
 
-    def _next(self, k: int, *, counting: bool) -> int | None:
-        """Return the place of the next item from a place on, jumps followed; None at the end (`get_next_cmd`)."""
+    def _next_item(self, k: int, *, counting: bool) -> int | None:
+        """Return the index of the next item, following jumps, or None at the end (`get_next_cmd`)."""
         first = -1
         while k < len(self.items):
             item = self.items[k]
@@ -285,7 +297,7 @@ class _Steps:
                 self._count_step(item)
             if item.command not in JUMPS:
                 return k
-            target, repeats = self._target(item), int(item.params[1])
+            target, repeats = self._jump_target(item), int(item.params[1])
             if not counting and k == first:
                 return None
             first = k if first < 0 else first
@@ -310,8 +322,8 @@ class _Steps:
                 field=f"item {item.seq}",
             )
 
-    def _target(self, jump: MissionItem) -> int:
-        """Return the place that a jump leads to.  Raises MissionError for one that leads nowhere."""
+    def _jump_target(self, jump: MissionItem) -> int:
+        """Return the index that a jump leads to. Raise MissionError if there is no such item."""
         tagged, number = jump.command == Command.DO_JUMP_TAG, int(jump.params[0])
         places = self.tags if tagged else self.index
         if number not in places:
@@ -321,27 +333,27 @@ class _Steps:
         return places[number]
 
 
-class _BothNotes:
-    """Notes for both ways to read a change of speed, which differ by what they say of that."""
+class _NotesOfBothReadings:
+    """Notes for both readings of a speed change, ArduPlane's and PX4's."""
 
     def __init__(self) -> None:
         self.usual, self.by_value = Notes(), Notes()
 
     def add(self, text: str, seq: int | None = None) -> None:
-        """Note something that holds either way."""
+        """Add a note for both readings."""
         self.usual.add(text, seq)
         self.by_value.add(text, seq)
 
 
 class _Walk:
-    """Stops, speed, home and notes after the items so far."""
+    """Stops, speed, home and notes while a mission is unrolled."""
 
     def __init__(self, mission: Mission) -> None:
         self.source = mission.source
         self.last_seq = mission.items[-1].seq if mission.items else -1
         self.airspeed = self.airspeed_by_value = math.nan
-        self.notes = _BothNotes()
-        # Dictionaries for their order; nothing is named twice.
+        self.notes = _NotesOfBothReadings()
+        # Dictionaries without duplicates that keep their order.
         self.open: dict[OpenItem, None] = {}
         self.open_by_value: dict[OpenItem, None] = {}
         self.stops: list[ItineraryStop] = []
@@ -353,19 +365,19 @@ class _Walk:
         self.first_home = self.home = mission.home or _first_position(mission)
 
     def take(self, step: _Step) -> None:
-        """Take the way to a step of the flight into account, and the step."""
+        """Process the commands before a navigation item, and the item."""
         for item in step.between:
             self._run_by_value(item)
         run = () if step.early is None else (step.early, *step.late)
         for k, item in enumerate(run):
-            # A home that is set on the way does not move the altitude of the step that is already flown to.
+            # A home that is set on a leg does not move the altitude of the item that is already flown to.
             if k == 0 or item.command != Command.DO_SET_HOME:
                 self._run(item, run[k + 1 :])
         for item in step.late:
             if item not in step.between:
                 self.notes.usual.add(f"{command_name(item.command)}: run a round early, as ArduPlane does", item.seq)
         if step.to is not None:
-            self._fly(step.to)
+            self._fly_item(step.to)
         else:
             for item in step.between[1:]:
                 text = f"{command_name(item.command)}: not run, for nothing to fly to comes after it"
@@ -375,7 +387,7 @@ class _Walk:
                 self._set_home(item)
 
     def leave_open(self, text: str, seq: int, *, usual: bool = True, by_value: bool = True) -> None:
-        """Note what is not flown although it changes the path, by ArduPlane's reading, PX4's reading or both."""
+        """Note an item that changes the path and is not flown, in ArduPlane's reading, PX4's reading or both."""
         for counts, notes, left in (
             (usual, self.notes.usual, self.open),
             (by_value, self.notes.by_value, self.open_by_value),
@@ -385,7 +397,10 @@ class _Walk:
                 left[OpenItem(seq, text)] = None
 
     def _run(self, item: MissionItem, behind: Sequence[MissionItem]) -> None:
-        """Run a command as ArduPlane does.  behind: what is run after it on the way to the same step."""
+        """Run a command as ArduPlane does.
+
+        behind: commands that are run after it on the leg to the same item.
+        """
         if item.command == Command.DO_CHANGE_SPEED:
             self._change_speed(item)
         elif item.command == Command.DO_SET_HOME:
@@ -401,21 +416,21 @@ class _Walk:
             else:
                 self.notes.usual.add(text, item.seq)
         else:
-            self._pass_over(item, by_value=False)
+            self._note_not_flown(item, by_value=False)
 
     def _run_by_value(self, item: MissionItem) -> None:
         """Run a command as PX4 does."""
         if not item.autocontinue:
-            self._hold(item)
+            self._note_wait(item)
         if item.command == Command.DO_CHANGE_SPEED:
             self._change_by_value(item)
         elif item.command == Command.CONDITION_GATE:
-            self._gate(item)
+            self._add_gate(item)
         else:
-            self._pass_over(item, by_value=True)
+            self._note_not_flown(item, by_value=True)
 
-    def _pass_over(self, item: MissionItem, *, by_value: bool) -> None:
-        """Note what becomes of a command that is not flown."""
+    def _note_not_flown(self, item: MissionItem, *, by_value: bool) -> None:
+        """Note the treatment of a command that is not flown."""
         name, support = command_name(item.command), support_of(item.command)
         treatment = support.px4 if by_value else support.arduplane
         notes = self.notes.by_value if by_value else self.notes.usual
@@ -428,31 +443,31 @@ class _Walk:
         else:
             notes.add(f"{name}: not flown", item.seq)
 
-    def _hold(self, item: MissionItem) -> None:
-        """Note an item after which PX4 waits (`MissionBase::on_active`); ArduPlane does not read that."""
+    def _note_wait(self, item: MissionItem) -> None:
+        """Note an item after which PX4 waits (`MissionBase::on_active`); ArduPlane does not read that flag."""
         self.notes.usual.add("autocontinue is 0: flown on, as ArduPlane does", item.seq)
         if item.seq == self.last_seq:
             self.notes.by_value.add("autocontinue is 0 at the mission's end: nothing comes after it", item.seq)
         else:
             self.leave_open("autocontinue is 0, where PX4 would wait: flown on", item.seq, usual=False)
 
-    def _fly(self, item: MissionItem) -> None:
-        """Take a step of the flight into account."""
+    def _fly_item(self, item: MissionItem) -> None:
+        """Process a navigation item."""
         if not item.autocontinue:
-            self._hold(item)
+            self._note_wait(item)
         if item.command in TAKEOFFS:
             self._take_off(item)
         elif item.command in PLACES:
-            self._go(item)
+            self._fly_to(item)
         elif item.command == Command.NAV_RETURN_TO_LAUNCH:
             self._return(item)
         elif item.command in LANDINGS:
             self._land(item)
         else:
-            self._pass_over(item, by_value=False)
-            self._pass_over(item, by_value=True)
+            self._note_not_flown(item, by_value=False)
+            self._note_not_flown(item, by_value=True)
 
-    def _stop(self, item: MissionItem, acceptance: float = 0.0) -> ItineraryStop:
+    def _make_stop(self, item: MissionItem, acceptance: float = 0.0) -> ItineraryStop:
         lat, lon, loiter, alt, frame = item.lat_deg, item.lon_deg, loiter_of(item), item.alt, item.frame
         gates, self.gates = tuple(self.gates), []
         if self.home is not self.first_home and frame in OVER_HOME:
@@ -462,8 +477,8 @@ class _Walk:
             *(self.airspeed, acceptance, loiter, self.airspeed_by_value, gates),
         )
 
-    def _gate(self, item: MissionItem) -> None:
-        """Note a gate, as PX4 does; it passes one without a place, or before the start, at once."""
+    def _add_gate(self, item: MissionItem) -> None:
+        """Note a gate as PX4 does, which passes a gate without a position, or before the start, at once."""
         if item.has_position and self.stops:
             self.gates.append(Gate(item.seq, item.lat_deg, item.lon_deg, self.airspeed_by_value))
         else:
@@ -475,7 +490,7 @@ class _Walk:
         if self.stops:
             if item.has_position and not vertical:
                 self.leave_open(f"{name} in the air: flown through as a waypoint", item.seq)
-                self.stops.append(self._stop(item))
+                self.stops.append(self._make_stop(item))
             else:
                 self.leave_open(f"{name} in the air: not flown", item.seq)
             return
@@ -486,18 +501,18 @@ class _Walk:
         if vertical:
             self.leave_open(f"{name}: not flown straight up", item.seq)
         home = self.first_home
-        over_home = replace(self._stop(item), lat_deg=home.lat_deg, lon_deg=home.lon_deg)
+        over_home = replace(self._make_stop(item), lat_deg=home.lat_deg, lon_deg=home.lon_deg)
         goes_on = item.has_position and (item.lat_deg, item.lon_deg) != (home.lat_deg, home.lon_deg)
         if goes_on and vertical:
-            # ArduPlane climbs where it stands and goes on at the height (QuadPlane::takeoff_controller and
-            # verify_vtol_takeoff); a fixed wing of it passes the item over.
+            # ArduPlane climbs where it stands and continues at that altitude (QuadPlane::takeoff_controller and
+            # verify_vtol_takeoff); its fixed wings skip the item.
             self.notes.add(f"{name}: its place is not flown to, as in ArduPlane; PX4 would", item.seq)
         if goes_on and not vertical:
-            self.stops += [replace(over_home, item=-1), self._stop(item)]
+            self.stops += [replace(over_home, item=-1), self._make_stop(item)]
         else:
             self.stops.append(over_home)
 
-    def _go(self, item: MissionItem) -> None:
+    def _fly_to(self, item: MissionItem) -> None:
         name = command_name(item.command)
         if not item.has_position and loiter_of(item) is not None and self.stops:
             text = f"{name} without a position: flown about the place before"
@@ -513,7 +528,7 @@ class _Walk:
             return
         if item.command == Command.NAV_WAYPOINT:
             if item.params[0] > 0.0:
-                # No fixed wing holds: ArduPlane stores no time, PX4 (`MissionBlock::get_time_inside`) takes none.
+                # No fixed wing holds: ArduPlane stores no time, PX4 (`MissionBlock::get_time_inside`) reads none.
                 self.notes.add("NAV_WAYPOINT with a time to hold: flown through", item.seq)
             if item.params[2] > 0.0:
                 # `Plane::verify_nav_wp`; PX4 does not read it.
@@ -528,7 +543,7 @@ class _Walk:
         if math.isnan(item.alt):
             self.notes.add(f"{name} without an altitude: keeps the last height", item.seq)
         radius = item.params[1] if item.command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT) else 0.0
-        self.stops.append(self._stop(item, radius if radius > 0.0 else 0.0))
+        self.stops.append(self._make_stop(item, radius if radius > 0.0 else 0.0))
 
     def _return(self, item: MissionItem) -> None:
         if not self.has_home and self.home is self.first_home:
@@ -536,9 +551,10 @@ class _Walk:
         elif not self.stops:
             self.leave_open("NAV_RETURN_TO_LAUNCH before the start: not flown", item.seq)
         else:
-            # Where to and how high is for who flies: `flight.mission.return_path`.  No speed that was set counts there.
+            # The autopilot chooses destination and altitude: `flight.mission.return_path`. No speed that was set
+            # applies there.
             home = replace(item, lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg, alt=math.nan)
-            self.stops.append(replace(self._stop(home), airspeed=math.nan, airspeed_by_value=math.nan))
+            self.stops.append(replace(self._make_stop(home), airspeed=math.nan, airspeed_by_value=math.nan))
             self.ended = True
 
     def _land(self, item: MissionItem) -> None:
@@ -549,7 +565,7 @@ class _Walk:
         self.ended = True
         if item.has_position:
             self.notes.add(f"{name}: {LANDING_NOTE}", item.seq)
-            self.landing = self._stop(item)
+            self.landing = self._make_stop(item)
             self.stops.append(replace(self.landing, alt=math.nan))
         else:
             self.leave_open(f"{name} without a position: not flown; the flight ends at the place before", item.seq)
@@ -557,7 +573,7 @@ class _Walk:
             self.leave_open(f"{name}: not flown straight down", item.seq)
 
     def _set_home(self, item: MissionItem) -> None:
-        """Set another home, as ArduPlane does (`Plane::do_set_home`): altitudes and returns behind it count from it."""
+        """Set another home, as ArduPlane does (`Plane::do_set_home`), for the altitudes and returns after it."""
         name = command_name(item.command)
         if item.params[0] == 1.0:
             if self.stops:
@@ -575,19 +591,19 @@ class _Walk:
         self.home = Home(item.lat_deg, item.lon_deg, up)
 
     def _change_speed(self, item: MissionItem) -> None:
-        """Read a change of speed as ArduPlane does (`Plane::do_change_speed`)."""
+        """Read a speed change as ArduPlane does (`Plane::do_change_speed`)."""
         kind, speed, throttle = item.params[:3]
         notes = self.notes.usual
         applies = kind == 1.0 or (kind == 0.0 and (speed > 0.0 or speed == -2.0))
         if throttle > 0.0 and not applies:
-            # Where no speed is taken, TRIM_THROTTLE is changed.
+            # If no speed is set, TRIM_THROTTLE is changed.
             self.leave_open("DO_CHANGE_SPEED's throttle: not flown", item.seq, by_value=False)
         elif throttle > 0.0:
             notes.add("DO_CHANGE_SPEED's throttle: ignored", item.seq)
         if kind not in (0.0, 1.0):
             notes.add(f"DO_CHANGE_SPEED of type {kind:g}, neither airspeed nor ground speed: ignored", item.seq)
         elif kind == 1.0:
-            # It sets the least ground speed (MIN_GROUNDSPEED), and leaves the airspeed.
+            # It sets the minimum ground speed (MIN_GROUNDSPEED), and keeps the airspeed.
             self.leave_open("DO_CHANGE_SPEED of ground speed: flown as airspeed", item.seq, by_value=False)
             self.airspeed = speed if speed > 0.0 else self.airspeed
         elif speed == -2.0:
@@ -598,7 +614,7 @@ class _Walk:
             notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: ignored", item.seq)
 
     def _change_by_value(self, item: MissionItem) -> None:
-        """Read a change of speed as PX4 does (`navigator_main.cpp`, VEHICLE_CMD_DO_CHANGE_SPEED)."""
+        """Read a speed change as PX4 does (`navigator_main.cpp`, VEHICLE_CMD_DO_CHANGE_SPEED)."""
         kind, speed, throttle = item.params[:3]
         notes = self.notes.by_value
         if speed > 0.0:
@@ -613,7 +629,7 @@ class _Walk:
 
 
 def _first_position(mission: Mission) -> Home:
-    """Place of the first item that has one, at a height not known."""
+    """Return the position of the first item that has one, with unknown altitude."""
     for item in mission.items:
         if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position:
             return Home(item.lat_deg, item.lon_deg, math.nan)

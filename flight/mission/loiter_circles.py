@@ -1,8 +1,8 @@
-"""Loiters on the map: where a route joins a circle, how far around it goes, and where it leaves.
+"""Loiters on the map: where a route joins a loiter, how far around it goes, and where it leaves.
 
-A circle is flown as the corners of a polygon around it, each with an arc of the circle's radius: the arcs touch, so the
-path is the circle, while turns, legs, heights and clearances are judged as everywhere else.  It is joined and left on
-tangents.
+A loiter is laid out as the corners of a polygon around its circle, each with an arc of the circle's radius. The arcs
+touch, so that the path is the circle, while turns, legs, altitudes and clearances are judged as everywhere else. The
+circle is joined and left on tangents.
 """
 
 import math
@@ -20,56 +20,60 @@ from world.errors import MissionError
 
 Floats = NDArray[np.float64]
 
-# Course change at a corner of the polygon at most, rad: its corners then lie 8 % of the radius outside the circle.
+# Largest course change at a corner of the polygon, rad: the corners then lie 8 % of the radius outside the circle.
 CORNER = math.pi / 4.0
-# Radii (m) that are flown.  Below the smallest a corner's legs would be no legs; no aircraft of ours turns as tightly.
-TIGHTEST, WIDEST = 10.0, 20_000.0
-# A stop must be this far (m) outside a circle to have a tangent to it.
-_CLEAR = 2.0
-# Places nearer to each other than this, m, are one; heights that differ by no more than this, m, are flown as one.
-_SAME_PLACE, _SAME_HEIGHT = 1.0, 10.0
-# Slope (tangent) of a spiral where no aircraft is known.
+# Smallest loiter radius that is flown, m: below it a corner's legs vanish, and no aircraft here turns as tightly.
+TIGHTEST = 10.0
+# Largest loiter radius that is flown, m.
+WIDEST = 20_000.0
+# Smallest distance of a stop from a circle for a tangent between them, m.
+_MIN_TANGENT_CLEARANCE_M = 2.0
+# Largest distance between two positions that are the same place, m.
+_SAME_PLACE_M = 1.0
+# Largest difference between two altitudes that are flown as one, m.
+_SAME_ALTITUDE_M = 10.0
+# Slope (tangent) of a spiral without a known aircraft.
 PLAIN_SLOPE = 0.05
 
-# Who leaves a circle heading for what follows does so this much before the tangent, rad; and it turned so far, rad,
-# from its way to the middle to the tangent that the circle is drawn from.
+# Angle before the tangent at which an autopilot that exits on heading leaves its loiter, rad.
 LINED_UP = math.radians(10.0)
-_TO_TANGENT = 0.5 * math.pi
+# Angle it has turned by then, from its path to the center to the tangent at which the drawn loiter begins, rad.
+_TURN_TO_TANGENT_RAD = 0.5 * math.pi
 
-# Steepest climb and dive (tangents) that a spiral at this airspeed (m/s) and height (m AMSL) is flown with.
+# Steepest climb and descent (tangents) in a spiral at an airspeed (m/s) and an altitude (m AMSL).
 SpiralSlopes = Callable[[float, float], tuple[float, float]]
-# Radius (m) of a loiter that states none, at this airspeed and height.
+# Radius (m) of a loiter that states none, at an airspeed (m/s) and an altitude (m AMSL).
 OwnRadius = Callable[[float, float], float]
 
 
 def as_stated(loiter: Loiter) -> float:
-    """Radius that a loiter's item states, m, 0 for none."""
+    """Return the radius that a loiter's item states, m, 0 for none."""
     return abs(loiter.radius)
 
 
 def as_at_sea(up: float) -> float:
-    """By how much a circle is wider at a height (m AMSL) than at sea level: not at all."""
+    """Return the ratio of a loiter's radius at an altitude (m AMSL) to its radius at sea level: here 1."""
     return 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class LoiterRules:
-    """How an autopilot flies loiters.
+    """Rules by which an autopilot flies loiters.
 
-    radius: of a loiter that states none, m, negative to the left; 0 for a radius of the aircraft's own.
-    radius_name: the parameter that sets it, "" for none.
-    radius_of: the radius of a loiter's item that is read, m, 0 for none.
-    growth: by how much a circle is wider at a height (m AMSL) than is stated.
-    at_middle: whether it flies at the circle's middle until it comes to the rim, and leaves as soon as the loiter is
-        over for the line that begins in the middle; else it joins and leaves the circle on tangents.
-    lines_up: whether, flying at the middle, it counts from where it turns away from that, and goes on when the loiter
-        is over until it heads for what follows, within `LINED_UP`.
-    holds_height: whether on the way to a loiter to a height it holds the height at which it set out.
-    climb, sink: its fastest in circles, m/s.
-    short: by how much a height may be missed, m.
-    ends_in_circle: whether after a mission's last waypoint it circles about that without end.
-    unflown: what of its circles is not flown, a note for people, "" for nothing.
-    before_return: how it leaves a circle that a return to launch follows, where that is not flown, a note for people.
+    radius: radius of a loiter that states none, m, negative to the left; 0 for the aircraft's own radius.
+    radius_name: name of the parameter that sets it, "" for none.
+    radius_of: radius that the autopilot reads from a loiter's item, m, 0 for none.
+    growth: ratio of the flown radius at an altitude (m AMSL) to the stated radius.
+    at_middle: True if it steers to the loiter's center until it reaches the circle, and leaves as soon as the loiter is
+        over for the line that begins at the center; otherwise it joins and leaves the circle on tangents.
+    lines_up: True if, steering to the center, it counts turns from where it turns away from the center, and continues
+        after the loiter is over until it heads for the next waypoint within `LINED_UP`.
+    holds_height: True if it holds its altitude on the leg to a loiter that climbs or descends to an altitude.
+    climb, sink: fastest climb and descent in a loiter, m/s.
+    short: altitude tolerance, m.
+    ends_in_circle: True if it loiters without end about a mission's last waypoint.
+    unflown: note for people on the parts of its loiters that are not flown, "" for none.
+    before_return: note for people on how it leaves a loiter before a return to launch, if that is not flown.
 
     >>> LoiterRules().radius, LoiterRules().at_middle
     (0.0, False)
@@ -90,7 +94,7 @@ class LoiterRules:
     before_return: str = ""
 
     def end_note(self) -> str:
-        """What comes after the mission's end, a note for people.
+        """Return a note for people on what happens after the mission's end.
 
         >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
         'after the last waypoint it circles about that without end, with NAV_LOITER_RAD, 80 m: flown once by its law'
@@ -100,12 +104,15 @@ class LoiterRules:
         return f"after the last waypoint it circles about that without end, {circle}: flown once by its law"
 
 
-# Of an autopilot that has none of its own.
+# Rules of an autopilot without its own.
 USUAL_LOITERS = LoiterRules()
 
 
 class PlacedStop(NamedTuple):
-    """A stop of the itinerary on the map; position: (3,) east, north, up, m."""
+    """A stop of the itinerary on the map.
+
+    position: (3,) east, north, up, m.
+    """
 
     stop: ItineraryStop
     position: Floats
@@ -115,9 +122,9 @@ class PlacedStop(NamedTuple):
 class RoutePoint:
     """One waypoint of a route.
 
-    stop: the stop that it belongs to.
+    stop: stop of the itinerary that it belongs to.
     position: east, north, up, m.
-    arc: radius that the path turns with there, m, 0 for the bank limit's.
+    arc: radius of the turn there, m, 0 for the radius at the bank limit.
     """
 
     stop: ItineraryStop
@@ -126,10 +133,11 @@ class RoutePoint:
 
 
 class Unjoined(NamedTuple):
-    """A stop of a mission that is not laid out where its item says, for no tangent joins it to a circle.
+    """A stop that is not laid out where its item says, since no tangent joins it to a circle.
 
-    item, circle: seqs of its item and of the circle's.
-    is_circle: whether it is a circle itself, laid out on the other; else it lies inside that, and is left out.
+    item, circle: seq of its item, and seq of the circle's item.
+    is_circle: True if it is a circle, which is laid out on the other circle; otherwise it lies inside that circle and
+        is left out.
     """
 
     item: int
@@ -141,7 +149,7 @@ class Unjoined(NamedTuple):
 class Node:
     """A stop as a point, or as a circle about it; east, north, up in m.
 
-    turn: the circle's radius, m, positive to the right, 0 for a point.
+    turn: radius of the circle, m, positive to the right, 0 for a point.
     """
 
     stop: ItineraryStop
@@ -151,7 +159,7 @@ class Node:
     turn: float = 0.0
 
     def away(self, other: "Node") -> float:
-        """How far apart the middles are, m."""
+        """Return the distance between the centers, m."""
         return math.hypot(other.east - self.east, other.north - self.north)
 
 
@@ -163,11 +171,16 @@ def lay_circles(
     slopes: SpiralSlopes,
     rules: LoiterRules = USUAL_LOITERS,
 ) -> tuple[list[RoutePoint], tuple[Unjoined, ...]]:
-    """Waypoints of a route through points and around circles, and the stops that are not laid out as asked for.
+    """Lay out the waypoints of a route through points and around circles.
 
-    source: names the mission in errors.  own_radius, slopes: of the aircraft.  rules: of whoever flies.  Stops inside a
-    circle before or after them are left out, with a note: no straight leg joins them.  Raises MissionError for a loiter
-    too wide or too long to lay out.
+    Return them, and the stops that are not laid out as stated.
+
+    source: name of the mission in errors.
+    own_radius, slopes: abilities of the aircraft.
+    rules: loiter rules of the autopilot.
+
+    Stops inside a circle before or after them are left out, with a note, since no straight leg joins them. Raise
+    MissionError for a loiter too wide or too long to lay out.
     """
     unjoined: list[Unjoined] = []
     nodes = _nodes(source, stops, notes, own_radius, rules, unjoined)
@@ -183,7 +196,7 @@ def lay_circles(
         onward = courses[k] if k < len(courses) else None
         run = math.hypot(node.east - points[-1].position[0], node.north - points[-1].position[1]) if points else 0.0
         tightest = own_radius(node.stop.airspeed, node.up) if rules.lines_up else 0.0
-        laid = _around(source, node, into, onward, up, run, tightest, slopes, rules)
+        laid = _corners_around(source, node, into, onward, up, run, tightest, slopes, rules)
         if not k:
             laid.insert(0, RoutePoint(node.stop, (*on_rim(node, into), laid[0].position[2])))
         up = laid[-1].position[2]
@@ -199,32 +212,34 @@ def _nodes(
     source: str, stops: list[PlacedStop], notes: Notes, own_radius: OwnRadius, rules: LoiterRules,
     unjoined: list[Unjoined],
 ) -> list[Node]:  # fmt: skip
-    """Points and circles in flying order, each with a tangent to the next; ``unjoined`` gets the others.
+    """Return points and circles in flying order, each with a tangent to the next.
 
-    A flight that takes off inside its first circle begins on that: of take-offs nothing is flown.
+    ``unjoined`` gets the others.
+
+    A flight that takes off inside its first circle begins on that circle: no part of its take-off is flown.
     """
     nodes: list[Node] = []
     for stop, (east, north, up) in stops:
         node = Node(stop, float(east), float(north), float(up))
         if stop.loiter is not None:
-            node = replace(node, turn=_turn(source, stop, stop.loiter, float(up), notes, own_radius, rules))
-            while nodes and nodes[-1].turn == 0.0 and nodes[-1].away(node) < abs(node.turn) + _CLEAR:
+            node = replace(node, turn=_signed_radius(source, stop, stop.loiter, float(up), notes, own_radius, rules))
+            while nodes and nodes[-1].turn == 0.0 and nodes[-1].away(node) < abs(node.turn) + _MIN_TANGENT_CLEARANCE_M:
                 inside = nodes.pop()
-                _left_out(inside.stop, node.stop, notes)
-                # Who flies at the middle comes past a place there, and needs no take-off's.
-                on_the_way = inside.away(node) < _SAME_PLACE and abs(inside.up - node.up) <= _SAME_HEIGHT
+                _note_left_out(inside.stop, node.stop, notes)
+                # An autopilot that steers to the center passes a place there, and a take-off there needs no leg.
+                on_the_way = inside.away(node) < _SAME_PLACE_M and abs(inside.up - node.up) <= _SAME_ALTITUDE_M
                 if inside.stop.item >= 0 and inside.stop.command not in TAKEOFFS and not on_the_way:
                     unjoined.append(Unjoined(inside.stop.item, stop.item, is_circle=False))
         before = nodes[-1] if nodes else None
         if before is not None and before.turn != 0.0 and not is_joined(before, node):
             if node.turn == 0.0:
-                _left_out(stop, before.stop, notes)
+                _note_left_out(stop, before.stop, notes)
                 unjoined.append(Unjoined(stop.item, before.stop.item, is_circle=False))
                 continue
-            # Two circles of one item's radius about one place differ by what their heights make of it.
+            # Two loiters of one stated radius about one place may differ by the growth at their altitudes.
             wide, own = abs(before.turn) / rules.growth(before.up), abs(node.turn) / rules.growth(node.up)
             one_side = math.copysign(1.0, before.turn) == math.copysign(1.0, node.turn)
-            if before.away(node) >= _SAME_PLACE or abs(wide - own) >= _SAME_PLACE or not one_side:
+            if before.away(node) >= _SAME_PLACE_M or abs(wide - own) >= _SAME_PLACE_M or not one_side:
                 unjoined.append(Unjoined(stop.item, before.stop.item, is_circle=True))
             notes.add(
                 f"its circle has no tangent from that of item {before.stop.item}: flown on that circle", stop.item
@@ -234,15 +249,15 @@ def _nodes(
     return nodes
 
 
-def _left_out(stop: ItineraryStop, circle: ItineraryStop, notes: Notes) -> None:
+def _note_left_out(stop: ItineraryStop, circle: ItineraryStop, notes: Notes) -> None:
     name = f"lies inside the circle of item {circle.item}, which is joined on a tangent: not flown to"
     notes.add(name if stop.item >= 0 else f"home {name}", stop.item if stop.item >= 0 else None)
 
 
-def _turn(
+def _signed_radius(
     source: str, stop: ItineraryStop, loiter: Loiter, up: float, notes: Notes, own_radius: OwnRadius, rules: LoiterRules
 ) -> float:
-    """Signed radius of a loiter, m."""
+    """Return the signed radius of a loiter, m."""
     radius, stated = rules.radius_of(loiter), abs(loiter.radius)
     if radius > WIDEST:
         allowed = f"allowed up to {WIDEST:,.0f}"
@@ -267,23 +282,23 @@ def _turn(
 
 
 def is_joined(a: Node, b: Node) -> bool:
-    """Whether a tangent leads from one circle to another circle or point, or both are one circle."""
+    """Return True if a tangent joins a circle to another circle or point, or both are the same circle."""
     apart = a.away(b)
-    return apart > abs(b.turn - a.turn) + _CLEAR or (apart < 1.0 and abs(a.turn - b.turn) < 1.0)
+    return apart > abs(b.turn - a.turn) + _MIN_TANGENT_CLEARANCE_M or (apart < 1.0 and abs(a.turn - b.turn) < 1.0)
 
 
 def tangent_course(a: Node, b: Node) -> float:
-    """Course of the tangent from one circle (or point) to the next, rad; of one circle to itself, north."""
+    """Return the course of the tangent from a circle or point to the next, rad; 0 for the same circle."""
     apart = a.away(b)
     if apart < 1.0:
         return 0.0
     bearing = math.atan2(b.east - a.east, b.north - a.north)
-    # Square to the tangent, the centres lie b.turn - a.turn apart.
+    # Across the tangent, the centers are b.turn - a.turn apart.
     return bearing - math.asin(min(1.0, max(-1.0, (b.turn - a.turn) / apart)))
 
 
 def on_rim(node: Node, course: float, out: float = 1.0) -> tuple[float, float]:
-    """Where the circle is flown on this course; ``out``: that many radii from the centre instead."""
+    """Return the point on a circle where its course is ``course``, or ``out`` radii from the center."""
     return (
         node.east - node.turn * out * math.cos(course),
         node.north + node.turn * out * math.sin(course),
@@ -291,7 +306,7 @@ def on_rim(node: Node, course: float, out: float = 1.0) -> tuple[float, float]:
 
 
 def circle_corners(node: Node, into: float, sweep: float) -> list[tuple[float, float]]:
-    """East and north (m) of the corners around a circle, joined on a course and flown around by an angle, rad.
+    """Return the corners (east, north, m) around a circle, joined on a course and flown by an angle, rad.
 
     >>> point = ItineraryStop(1, 16, 0.0, 0.0, 0.0, 0, 25.0)
     >>> [(round(e), round(n)) for e, n in circle_corners(Node(point, 100.0, 0.0, 0.0, 100.0), 0.0, math.pi / 2.0)]
@@ -302,16 +317,19 @@ def circle_corners(node: Node, into: float, sweep: float) -> list[tuple[float, f
     return [on_rim(node, into + side * (k + 0.5) * step, 1.0 / math.cos(0.5 * step)) for k in range(count)]
 
 
-def _around(
+def _corners_around(
     source: str, node: Node, into: float, onward: float | None, up: float, run: float, tightest: float,
     slopes: SpiralSlopes, rules: LoiterRules,
 ) -> list[RoutePoint]:  # fmt: skip
-    """Corners around a circle, joined on one course and left on another (None: the mission ends there).
+    """Return the corners around a circle, joined on one course and left on another.
 
-    up: height where the leg before started, m.  run: its length, m.  tightest: radius of the aircraft's own, m, that a
-    smaller circle is flown wider to; 0 where that is not known.
+    into, onward: those courses, rad; ``onward`` is None at the mission's end.
 
-    For whoever leaves as soon as its time is over, the circle is drawn to the last tangent before that.
+    up: altitude at the start of the leg before, m AMSL.
+    run: length of that leg, m.
+    tightest: the aircraft's own radius, m, to which a smaller circle is widened in flight; 0 if unknown.
+
+    For an autopilot that leaves as soon as its time is over, the circle ends at the last tangent before that.
     """
     radius, side = abs(node.turn), math.copysign(1.0, node.turn)
     first, wanted = node.up, 0.0
@@ -322,12 +340,12 @@ def _around(
         first = up if rules.holds_height else min(max(node.up, up - dive * run), up + climb * run)
         missing = max(0.0, abs(node.up - first) - rules.short)
         if missing > 0.0:
-            # Heights are counted between the corners, of which there is one more than spaces between them.
+            # Altitudes are interpolated between the corners, of which there is one more than intervals.
             wanted = missing / (climb if node.up > first else dive) / radius + CORNER
     elif loiter is not None:
         wanted = loiter.sweep(node.stop.airspeed, max(radius, tightest))
         if rules.lines_up:
-            wanted = max(0.0, wanted - _TO_TANGENT)
+            wanted = max(0.0, wanted - _TURN_TO_TANGENT_RAD)
     sweep = wanted
     if onward is not None:
         part = (side * (onward - into)) % (2.0 * math.pi)

@@ -1,4 +1,4 @@
-"""The places of a mission on the map: east and north of its stops, and their heights above mean sea level."""
+"""Place a mission's stops on the map: east, north and altitude above mean sea level."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -31,22 +31,26 @@ from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
-# Positions nearer to each other than this (m) are one.
+# Distance below which two positions are the same place, m.
 SAME_PLACE = 1.0
-# Horizontal length of a vertical leg, m: a metre of height on it is 89.4 degrees.
+# Horizontal length of a vertical leg, m: one meter of height on it is a slope of 89.4 degrees.
 VERTICAL_STEP = 0.01
-# Heights (m AMSL) that a flight may be asked to keep.
-LOWEST, HIGHEST = -500.0, 9000.0
-# A home that is further than this (m) from the ground at its place is worth a note.
-_HOME_ERROR = 30.0
+# Lowest altitude that a flight may have, m AMSL.
+LOWEST = -500.0
+# Highest altitude that a flight may have, m AMSL.
+HIGHEST = 9000.0
+# Difference between home's altitude and the ground there above which a note is added, m.
+_HOME_ALTITUDE_TOLERANCE_M = 30.0
 
 
 class PlacedLanding(NamedTuple):
-    """A landing sequence of a mission that a return to launch may go on to.
+    """A landing sequence of a mission that a return to launch may continue to.
 
-    start: where it begins.  stops: in flying order, the landing the last.
-    ground: height of the place to land at, m, NaN where it is not known.
-    notes: what of it is not flown as written.  open_items: what of it leaves the verdict open.
+    start: its start.
+    stops: its stops in flying order, the landing last.
+    ground: altitude of the landing place, m, NaN if unknown.
+    notes: parts that are not flown as written.
+    open_items: items that leave the verdict open.
     """
 
     start: LandingStart
@@ -58,16 +62,16 @@ class PlacedLanding(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PlacedMission:
-    """A mission's places on the map about ``origin``, heights above mean sea level.
+    """Places of a mission on the map about ``origin``, with altitudes AMSL.
 
-    stops: in flying order, those at the position of the one before merged with it.
-    notes: what came up in placing them, after the itinerary's.
-    takeoff_ground: height of the ground at home, m, NaN where it is not known or nothing takes off.
-    landing_ground: height of the place to land at, m, NaN where it is not known or nothing lands.
-    return_places: home, at the height that heights over home count from, and then the rally points; empty where the
-        mission does not end with a return.
-    landings: the landing sequences that such a return may go on to, and is flown on to.
-    landing_starts: where all landing sequences begin, those that no return is flown on to among them.
+    stops: in flying order; a stop at the position of the one before is merged with it.
+    notes: notes from placing them, after the itinerary's notes.
+    takeoff_ground: altitude of the ground at home, m, NaN if unknown or if nothing takes off.
+    landing_ground: altitude of the landing place, m, NaN if unknown or if nothing lands.
+    return_places: home, at the altitude that heights above home are relative to, and then the rally points; empty if
+        the mission does not end with a return.
+    landings: landing sequences that such a return may continue to, and that are flown.
+    landing_starts: starts of all landing sequences, including those that no return continues to.
     """
 
     mission: Mission
@@ -90,15 +94,15 @@ def place_stops(
     itinerary: Itinerary | None = None,
     vertical_legs: bool = False,
 ) -> PlacedMission:
-    """Places of a mission's itinerary on the map about ``origin``.
+    """Place the stops of a mission's itinerary on the map about ``origin``.
 
-    terrain: None where none is known; heights above terrain are then an error.
-    itinerary: the mission's where it has been made already.
-    vertical_legs: whether a position straight above or below the one before it becomes a leg of `VERTICAL_STEP` m,
-        which the verdict's slope rule then refuses; otherwise it is an error.
+    terrain: None if unknown; heights above terrain are then an error.
+    itinerary: the mission's itinerary if it has been made already.
+    vertical_legs: True to make a leg of `VERTICAL_STEP` m of a position straight above or below the one before it,
+        which the verdict's slope rule then refuses; otherwise such a position is an error.
 
-    Two stops of the result are at least `SAME_PLACE` apart across the ground, or `VERTICAL_STEP` if vertical.  Raises
-    MissionError, naming the item, for what cannot be placed.
+    Two stops of the result are at least `SAME_PLACE` apart across the ground, or `VERTICAL_STEP` if vertical. Raise
+    MissionError, naming the item, for a stop that cannot be placed.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5, 8.0, 700.0) for k in (1, 2)]
@@ -115,7 +119,7 @@ def place_stops(
     landing_ground = heights.touchdown(itinerary)
     back, heights_back, home = mission, heights, itinerary.last_home or itinerary.home
     if home is not itinerary.home:
-        # A return, and what it goes on to, counts from the home that a DO_SET_HOME set.
+        # A return and its landing sequence use the home that a DO_SET_HOME set.
         back, heights_back = replace(mission, home=home), _Heights(mission.source, home, origin, terrain, notes)
     places = _return_places(back, home, origin, heights_back) if itinerary.returns else ()
     marked = tuple(_marked_starts(back, origin, heights_back)) if itinerary.returns else ()
@@ -135,9 +139,9 @@ def place_stops(
 
 
 def return_places(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[ReturnPlace, ...]:
-    """Home and the rally points of any mission on the map, home first; none of a mission without a home.
+    """Return home and the rally points of a mission on the map, home first; empty without a home.
 
-    Raises MissionError, naming the rally point, for one beyond any map.
+    Raise MissionError, naming the rally point, for one beyond the largest map.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = (MissionItem(1, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5, 8.0, 700.0),)
@@ -151,7 +155,7 @@ def return_places(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) 
 
 
 def home_place(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> ReturnPlace | None:
-    """Home of a mission on the map, wherever its rally points are; None where it has none.
+    """Return a mission's home on the map, wherever its rally points are, or None if it has none.
 
     >>> home_place(Mission(Home(36.5, 8.0, 300.0), ()), GeoOrigin(36.5, 8.0), None).up
     300.0
@@ -161,9 +165,9 @@ def home_place(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> 
 
 
 def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[LandingStart, ...]:
-    """Where the landing sequences of a mission begin on the map: at the first place after each DO_LAND_START.
+    """Return the starts of a mission's landing sequences: the first place after each DO_LAND_START.
 
-    None of a mission without a home, as it has nowhere to return to.  A height that is not stated is home's.
+    A mission without a home has none, since it has nowhere to return to. An altitude that is not stated is home's.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> start = MissionItem(1, Command.DO_LAND_START, Frame.MISSION, (0.0,) * 4, 0.0, 0.0, 0.0)
@@ -178,13 +182,16 @@ def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None)
 
 
 def _marked_starts(mission: Mission, origin: GeoOrigin, heights: "_Heights") -> Iterator[tuple[int, LandingStart]]:
-    """Each DO_LAND_START that something to fly to follows, by its place in the list, and where its sequence begins."""
+    """Yield the start of each landing sequence with the list index of its DO_LAND_START.
+
+    A DO_LAND_START with nothing to fly to after it is left out.
+    """
     for k, mark in enumerate(mission.items):
         first = next((one for one in mission.items[k + 1 :] if _is_flown_to(one)), None)
         if mark.command != Command.DO_LAND_START or first is None:
             continue
         place = _placed_start(first, origin, heights)
-        onward = _sequence(mission.items[k + 1 :], origin, heights)[1:]
+        onward = _places_to_landing(mission.items[k + 1 :], origin, heights)[1:]
         counted = _place_of(mark, origin, heights) if mark.has_position else place.place
         yield k, place._replace(mark=counted, onward=onward)
 
@@ -192,7 +199,7 @@ def _marked_starts(mission: Mission, origin: GeoOrigin, heights: "_Heights") -> 
 def _landings(
     mission: Mission, origin: GeoOrigin, heights: "_Heights", marked: Sequence[tuple[int, LandingStart]]
 ) -> tuple[PlacedLanding, ...]:
-    """The landing sequences of a mission; those that begin with the landing, or cannot be placed, are none."""
+    """Return a mission's landing sequences, except those that begin with the landing or cannot be placed."""
     found = []
     for k, start in marked:
         if start.lands:
@@ -212,9 +219,9 @@ def _landings(
 def landing_sequence(
     mission: Mission, origin: GeoOrigin, terrain: Terrain | None, first: int
 ) -> tuple[LandingStart, ...]:
-    """The places of a landing sequence on the map, from an item's on to the landing, without that.
+    """Return the places of a landing sequence, from an item up to the landing, which is left out.
 
-    None of a mission without a home.  first: number of the item.
+    Empty for a mission without a home. first: number of the item.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> over, none = int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4
@@ -227,11 +234,13 @@ def landing_sequence(
     if mission.home is None:
         return ()
     heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
-    return _sequence([item for item in mission.items if item.seq >= first], origin, heights)
+    return _places_to_landing([item for item in mission.items if item.seq >= first], origin, heights)
 
 
-def _sequence(items: Sequence[MissionItem], origin: GeoOrigin, heights: "_Heights") -> tuple[LandingStart, ...]:
-    """The places among items up to the first landing."""
+def _places_to_landing(
+    items: Sequence[MissionItem], origin: GeoOrigin, heights: "_Heights"
+) -> tuple[LandingStart, ...]:
+    """Return the places of items up to the first landing."""
     found = []
     for item in items:
         if item.command in LANDINGS:
@@ -258,7 +267,7 @@ def _placed_start(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> 
 
 
 def landing_places(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, float, float], ...]:
-    """Where a mission lands on the map: item number, east and north (m) of each landing that states a place.
+    """Return where a mission lands: item number, east and north (m) of each landing that states a place.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> land = MissionItem(2, Command.NAV_LAND, Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, 36.5, 8.0, 10.0)
@@ -275,7 +284,7 @@ def landing_places(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, floa
 
 
 def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
-    """A mission's rally points as places to fly to; one at 0, 0 is none, as in ArduPlane.
+    """Return a mission's rally points as places to fly to; as in ArduPlane, a point at 0, 0 is ignored.
 
     >>> from flight.mission.items import Frame, MissionItem
     >>> point = MissionItem(0, 5100, Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, 36.5, 8.0, 90.0)
@@ -290,7 +299,10 @@ def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
 
 
 def _return_places(mission: Mission, home: Home, origin: GeoOrigin, heights: "_Heights") -> tuple[ReturnPlace, ...]:
-    """Home and the rally points on the map.  Raises MissionError, naming the rally point, for one beyond any map."""
+    """Return home and the rally points on the map.
+
+    Raise MissionError, naming the rally point, for one beyond the largest map.
+    """
     east, north = to_map(origin, home.lat_deg, home.lon_deg)
     launch = ReturnPlace(float(east), float(north), heights.home_amsl())
     places = [launch]
@@ -298,7 +310,7 @@ def _return_places(mission: Mission, home: Home, origin: GeoOrigin, heights: "_H
     numbers = [number for number, item in enumerate(mission.rally, 1) if item.has_position]
     points = on_map(mission.source, stops, origin).tolist()
     for number, stop, (point_east, point_north) in zip(numbers, stops, points, strict=True):
-        # Ground stations have no rally point without a height: one is home's.
+        # Ground stations always write a rally point's height; one without it gets home's altitude.
         up = heights.amsl(stop, point_east, point_north, launch.up)
         base = launch.up if stop.frame in OVER_HOME else 0.0
         places.append(ReturnPlace(point_east, point_north, up, base, number))
@@ -308,7 +320,7 @@ def _return_places(mission: Mission, home: Home, origin: GeoOrigin, heights: "_H
 def _placed_stops(
     source: str, itinerary: Itinerary, origin: GeoOrigin, heights: "_Heights", vertical_legs: bool
 ) -> list[PlacedStop]:
-    """Stops on the map, without those at the position of the one before."""
+    """Return the stops on the map, merging a stop with the one before at the same position."""
     notes = heights.notes
     flat = on_map(source, itinerary.stops, origin)
     kept: list[PlacedStop] = []
@@ -319,7 +331,7 @@ def _placed_stops(
         circles = circles or stop.command == Command.NAV_RETURN_TO_LAUNCH
         if kept and not circles and math.dist(kept[-1].position[:2], new.position[:2]) < SAME_PLACE:
             if vertical_legs and _is_vertical(kept[-1], new):
-                kept.append(PlacedStop(stop, _step_aside(kept, new.position)))
+                kept.append(PlacedStop(stop, _offset_vertical_leg(kept, new.position)))
                 continue
             kept[-1] = PlacedStop(_merge(source, kept[-1], new, notes), kept[-1].position)
         else:
@@ -328,7 +340,10 @@ def _placed_stops(
 
 
 def on_map(source: str, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> Floats:
-    """East and north of each stop, (n, 2) m.  Raises MissionError, naming the item, for one beyond any map."""
+    """Return east and north of each stop, (n, 2) m.
+
+    Raise MissionError, naming the item, for a stop beyond the largest map.
+    """
     east, north = to_map(origin, [stop.lat_deg for stop in stops], [stop.lon_deg for stop in stops])
     points = np.stack([east, north], axis=1)
     far = ~(np.abs(points) <= MAP_EXTENT).all(axis=1)
@@ -346,7 +361,7 @@ def on_map(source: str, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> 
 
 
 class _Heights:
-    """Heights above mean sea level of heights in any frame."""
+    """Conversion of heights in any frame to altitudes AMSL."""
 
     def __init__(self, source: str, home: Home, origin: GeoOrigin, terrain: Terrain | None, notes: Notes) -> None:
         self.source = source
@@ -357,7 +372,10 @@ class _Heights:
         self._home_amsl: float | None = None
 
     def amsl(self, stop: ItineraryStop, east: float, north: float, last: float) -> float:
-        """Height of a stop; ``last``: the one before, NaN at the first."""
+        """Return the altitude of a stop, m AMSL.
+
+        last: altitude of the stop before, NaN at the first.
+        """
         if math.isnan(stop.alt):
             if math.isnan(last):
                 message = f"{self.source}: {_name(stop)}: no altitude, and none before to keep"
@@ -384,13 +402,16 @@ class _Heights:
         return under
 
     def home_amsl(self) -> float:
-        """Height that heights over home count from."""
+        """Return the altitude that heights above home are relative to, m AMSL."""
         if self._home_amsl is None:
             self._home_amsl = self._find_home(self.home)
         return self._home_amsl
 
     def touchdown(self, itinerary: Itinerary) -> float:
-        """Height of the place to land at; NaN for none, none stated, and none to compare with the place before it."""
+        """Return the altitude of the landing place, or NaN if it is unknown.
+
+        A height above home is known only with terrain, with home's altitude, or if the stop before is above home too.
+        """
         stop = itinerary.landing
         if stop is None or math.isnan(stop.alt):
             return math.nan
@@ -402,7 +423,7 @@ class _Heights:
         return self.amsl(stop, float(east), float(north), math.nan) if known else math.nan
 
     def ground_at_home(self) -> float:
-        """Height of the ground at home, NaN where it is not known."""
+        """Return the altitude of the ground at home, NaN if unknown."""
         home = self.home
         if self.terrain is not None:
             east, north = to_map(self.origin, home.lat_deg, home.lon_deg)
@@ -413,7 +434,7 @@ class _Heights:
     def _find_home(self, home: Home) -> float:
         under = self.ground_at_home()
         if not math.isnan(home.alt):
-            if abs(home.alt - under) > _HOME_ERROR:
+            if abs(home.alt - under) > _HOME_ALTITUDE_TOLERANCE_M:
                 unset = "" if home.alt else "; ground stations write 0 where no home was set"
                 self.notes.add(
                     f"home is at {home.alt:.1f} m AMSL, and the ground there at {under:.1f} m:"
@@ -430,12 +451,15 @@ class _Heights:
 
 
 def _is_vertical(kept: PlacedStop, new: PlacedStop) -> bool:
-    """Whether a stop is straight above or below the one before, and no take-off's."""
+    """Return True if a stop is straight above or below the one before, and is not a take-off."""
     return abs(float(new.position[2] - kept.position[2])) >= SAME_PLACE and new.stop.command not in TAKEOFFS
 
 
-def _step_aside(kept: list[PlacedStop], point: Floats) -> Floats:
-    """Position `VERTICAL_STEP` m further on the course to the last one, or east of it, at the height of a point."""
+def _offset_vertical_leg(kept: list[PlacedStop], point: Floats) -> Floats:
+    """Return the last position moved by `VERTICAL_STEP` m along its course, at the altitude of a point.
+
+    Without a course the last position is moved to the east.
+    """
     course = math.pi / 2.0
     if len(kept) > 1:
         course = float(leg_courses(np.array([kept[-2].position, kept[-1].position]))[0])
@@ -444,7 +468,7 @@ def _step_aside(kept: list[PlacedStop], point: Floats) -> Floats:
 
 
 def _merge(source: str, kept: PlacedStop, new: PlacedStop, notes: Notes) -> ItineraryStop:
-    """Leave out a stop at the place of the one before it; returns the one before, under its number."""
+    """Merge a stop with the one before it at the same place; return the merged stop."""
     before, after = kept.stop, new.stop
     climb = float(new.position[2] - kept.position[2])
     if abs(climb) >= SAME_PLACE:

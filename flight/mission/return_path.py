@@ -1,12 +1,12 @@
-"""A return to launch on the map: which place it goes to, and the way there that stands for it in a route.
+"""Return to launch on the map: choose its destination, and lay out the path for the route.
 
-An autopilot returns by a law of its own, which no mission spells out: it turns at once, flies straight to the nearest
-rally point or home, sinks on a straight slope or climbs as fast as it can, and circles there.  `ReturnRules` states the
-law in numbers.  The way is drawn of the same pieces as any other: an arc, a straight leg, a circle.
+An autopilot returns by its own control law, which no mission spells out: it turns at once, flies straight to the
+nearest rally point or home, descends on a straight slope or climbs as fast as it can, and loiters there. `ReturnRules`
+states that law in numbers. The path uses the same pieces as any other: an arc, a straight leg, a loiter.
 
-The rules are those of ArduPlane 4.6 (`ModeRTL` in ArduPlane/mode_rtl.cpp, `Plane::do_RTL` in commands_logic.cpp,
+The rules follow ArduPlane 4.6 (`ModeRTL` in ArduPlane/mode_rtl.cpp, `Plane::do_RTL` in commands_logic.cpp,
 `AP_Rally::calc_best_rally_or_home_location` in libraries/AP_Rally/AP_Rally.cpp, `Plane::setup_glide_slope` in
-ArduPlane/altitude.cpp), in its names where sentences name one.
+ArduPlane/altitude.cpp), and messages use ArduPlane's parameter names.
 """
 
 import math
@@ -24,9 +24,9 @@ Place = tuple[float, float, float]
 class ReturnPlace(NamedTuple):
     """Home or a rally point on the map.
 
-    east, north, up: m, AMSL; home's height is that of its ground.
-    base: height that its own counts from as it is stated, m AMSL: home's, or 0 for one above the sea.
-    number: a rally point's, counted from 1 as they stand in the file; 0 where nobody counted.
+    east, north, up: m, up AMSL; home's altitude is the ground altitude there.
+    base: altitude that the stated altitude is relative to, m AMSL: home's altitude, or 0 for one stated AMSL.
+    number: number of a rally point in its file, from 1; 0 if it has none.
     """
 
     east: float
@@ -37,12 +37,12 @@ class ReturnPlace(NamedTuple):
 
 
 class ReturnCircle(NamedTuple):
-    """The circle that a return ends in, as the autopilot is told it.
+    """Loiter at the end of a return, as the autopilot reads it.
 
-    east, north, up: of its middle, m AMSL.
-    radius: m at sea level, negative to the left.
-    slope_base: m by which the autopilot takes the target to be lower than it is when it draws the slope down to it;
-        0 but for ArduPlane's rally points.
+    east, north, up: center, m, up AMSL.
+    radius: m at sea level, negative for a left-hand loiter.
+    slope_base: offset by which the autopilot draws the descent slope below the true target, m; 0 except for ArduPlane's
+        rally points.
     """
 
     east: float
@@ -53,14 +53,15 @@ class ReturnCircle(NamedTuple):
 
 
 class LandingStart(NamedTuple):
-    """Where a landing sequence of a mission begins: what follows a DO_LAND_START.
+    """Start of a mission's landing sequence: the first item to fly to after a DO_LAND_START.
 
-    item: the mission item's number that is flown to first.
+    item: number of that mission item.
     place: its east, north, up, m AMSL.
-    mark: east, north, up that its distance is counted to: of DO_LAND_START, where that states a place.
-    circles: whether it is a loiter.  radius: of the loiter, m, negative to the left, 0 where none is stated.
-    lands: whether it is the landing itself.
-    onward: the places after it, up to the landing, without their own.
+    mark: east, north, up that the distance to the sequence is measured to: the place that DO_LAND_START states, if any.
+    circles: True if the item is a loiter.
+    radius: loiter radius, m, negative to the left, 0 if none is stated.
+    lands: True if the item is the landing itself.
+    onward: the places after it up to the landing; their own ``onward`` is empty.
     """
 
     item: int
@@ -73,9 +74,9 @@ class LandingStart(NamedTuple):
 
 
 def nearest_landing(here: Place, landings: Sequence[LandingStart]) -> LandingStart | None:
-    """The landing sequence that ArduPlane goes to from a place (east, north, up): the nearest, height counted too.
+    """Return the landing sequence that ArduPlane chooses at a place (east, north, up): the nearest in 3D.
 
-    As `AP_Mission::get_landing_sequence_start` chooses (libraries/AP_Mission/AP_Mission.cpp); None of none.
+    It follows `AP_Mission::get_landing_sequence_start` (libraries/AP_Mission/AP_Mission.cpp). Return None without any.
 
     >>> far, near = (LandingStart(k, (x, 0.0, 50.0), (x, 0.0, 50.0)) for k, x in ((8, 900.0), (12, -500.0)))
     >>> nearest_landing((0.0, 0.0, 50.0), [far, near]).item, nearest_landing((0.0, 0.0, 50.0), [])
@@ -84,38 +85,38 @@ def nearest_landing(here: Place, landings: Sequence[LandingStart]) -> LandingSta
     return min(landings, key=lambda one: math.dist(here, one.mark), default=None)
 
 
-# What is noted of a return that the autopilot flies on to a landing sequence, and its route does not.
+# Note on a return that the autopilot continues to a landing sequence, and that the route does not.
 RETURN_NOT_FLOWN_ON = "the return is not flown on to it"
-# A turn whose tangent is shorter than this (m) is none.
-_NO_TURN = 1.0
-# A return goes on from its circle within so much of its height, m.
-_JOINS = 10.0
-# A turn by more than this (rad) to one side is one of less to the other.
-_TOO_FAR = 1.5 * math.pi
+# A turn with a tangent shorter than this is omitted, m.
+_MIN_TANGENT_M = 1.0
+# Altitude tolerance for leaving the loiter to join the landing sequence, m.
+_LANDING_JOIN_TOLERANCE_M = 10.0
+# A turn by more than this angle to one side is flown as a smaller turn to the other side, rad.
+_MAX_TURN_ANGLE_RAD = 1.5 * math.pi
 
 
 @dataclass(frozen=True, slots=True)
 class ReturnRules:
-    """How an autopilot returns to launch.
+    """Rules by which an autopilot returns to launch.
 
-    height: over home, m, at which it comes home; NaN for the height that it has when it turns back.
-    radius: of the circle there, m, negative to the left; 0 for a radius of the aircraft's own.
-    climb_first: height that it gains before it turns with all its bank, m; inf for all that is missing, 0 for none.
-    first_bank: bank limit meanwhile, rad.
+    height: height above home at the end of the return, m; NaN to keep the altitude at which it turns back.
+    radius: loiter radius there, m, negative to the left; 0 for the aircraft's own radius.
+    climb_first: height gain before it turns with its full bank limit, m; inf for the whole missing height, 0 for none.
+    first_bank: bank limit during that climb, rad.
     sink: fastest descent, m/s.
-    least_slope: m; a slope that falls less is flown as a step, at once.
-    rally_limit: m; a nearest rally point further away than this is not flown to; 0 for no limit.
-    includes_home: whether home counts where it is nearer than every rally point.
-    slope_to_stated_height: whether the slope down to a rally point is drawn to its height over home as if that were a
-        height above the sea, and flown no higher than where it begins.  ArduPlane 4.6-dev does that: it holds its
-        height at first, and comes down later than a straight slope to the point would have it.
-    rally_height: over a rally point's own height, m, at which it comes there.
-    landing_counts: whether a mission's landing is a place that it returns to, which is noted and not flown.
-    instead: what of its own rules is flown otherwise, a note for people; "" for nothing.
-    lands: whether it goes on to a landing sequence of the mission: "circle" for by its circle at home or a rally point,
-        "straight" for at once; "" where it stays in its circle.
-    holds_height: whether it holds its height until it is over its target and comes down in circles there, and climbs,
-        if it has to, in circles where it is, as PX4 does.
+    least_slope: height difference below which a descent is flown as a step, at once, m.
+    rally_limit: largest distance to the nearest rally point that is flown to, m; 0 for no limit.
+    includes_home: True if home is chosen where it is nearer than every rally point.
+    slope_to_stated_height: True if the slope down to a rally point is drawn as if its height above home were an
+        altitude AMSL, and flown no higher than its start. ArduPlane 4.6-dev does that: it holds its altitude first, and
+        descends later than on a straight slope to the point.
+    rally_height: height above a rally point's own altitude at the end of the return, m.
+    landing_counts: True if a mission's landing is a place to return to, which is noted and not flown.
+    instead: note for people on which of the autopilot's rules are flown differently; "" for none.
+    lands: "circle" if it continues to a landing sequence by a loiter at home or a rally point, "straight" if it does so
+        at once, "" if it stays in its loiter.
+    holds_height: True if it holds its altitude until it is over its target and descends in circles there, and climbs,
+        if necessary, in circles at its start, as PX4 does.
 
     >>> ReturnRules().height, ReturnRules().rally_limit
     (100.0, 5000.0)
@@ -137,22 +138,22 @@ class ReturnRules:
     lands: Literal["", "circle", "straight"] = ""
 
 
-# A slope drawn to so far (m) below its target, and flown no higher than where it begins, is none until the very end.
-_FAR_BELOW = 1e6
-# Of an autopilot that has none of its own: planfly's guidance returns as ArduPlane does by its defaults.
+# Slope base that puts the target of a slope far below, m: a slope flown no higher than its start is then level.
+_LEVEL_SLOPE_BASE_M = 1e6
+# Rules of an autopilot without its own: planfly's guidance returns as ArduPlane does with its default parameters.
 USUAL_RULES = ReturnRules()
 
 
 class ReturnTarget(NamedTuple):
-    """Where a return goes.
+    """Destination of a return.
 
-    position: east, north, up of the circle's middle, m.
-    name: "home" or "rally point 2", counted from 1 as they stand in the file.
-    reason: why there, a clause for people; "" where there is nothing to choose.
-    distance: m, across the ground.
-    slope_base: as of `ReturnCircle`.
-    landing: the landing sequence that it goes on to, None for none.
-    straight: whether it goes there at once, and ``position`` is where that begins.
+    position: east, north, up of the loiter's center, m.
+    name: "home" or "rally point 2", numbered from 1 in the order of the file.
+    reason: reason for this choice, a clause for people; "" if there is no choice.
+    distance: horizontal distance, m.
+    slope_base: see `ReturnCircle`.
+    landing: landing sequence that it continues to, or None.
+    straight: True if it goes there at once, and ``position`` is the start of the sequence.
     """
 
     position: Place
@@ -165,10 +166,10 @@ class ReturnTarget(NamedTuple):
 
 
 class ReturnAbility(NamedTuple):
-    """What the aircraft can, for the way back to be drawn.
+    """Abilities of the aircraft that the return path depends on.
 
-    turn_radius: of an arc at the bank limit between two courses (rad) at a height (m AMSL), m.
-    circle: least radius of a circle, m.
+    turn_radius: radius of an arc at the bank limit between two courses (rad) at an altitude (m AMSL), m.
+    circle: smallest loiter radius, m.
     climb, dive: tangents of slopes that it can hold in any direction and in turns.
     max_bank: rad.
     airspeed: m/s.
@@ -183,9 +184,9 @@ class ReturnAbility(NamedTuple):
 
 
 def choose_target(rules: ReturnRules, here: Place, home: ReturnPlace, rally: Sequence[ReturnPlace]) -> ReturnTarget:
-    """The place that a return from ``here`` goes to: the nearest rally point, or home.
+    """Return the destination of a return from ``here``: the nearest rally point, or home.
 
-    A limit counts for the nearest rally point alone: beyond it the return goes home, however far home is.
+    The distance limit applies to the nearest rally point only: beyond it the return goes home, at any distance.
     here: east, north, up, m AMSL.
 
     >>> home, near, far = (ReturnPlace(*at) for at in ((300.0, 0.0, 400.0), (1000.0, 0.0, 500.0), (0.0, 5000.0, 500.0)))
@@ -196,7 +197,9 @@ def choose_target(rules: ReturnRules, here: Place, home: ReturnPlace, rally: Seq
     """
     height = here[2] if math.isnan(rules.height) else home.up + rules.height
     to_home = _distance(here, home)
-    go_home = ReturnTarget((home.east, home.north, height), "home", "", to_home, _FAR_BELOW * rules.holds_height)
+    go_home = ReturnTarget(
+        (home.east, home.north, height), "home", "", to_home, _LEVEL_SLOPE_BASE_M * rules.holds_height
+    )
     if not rally:
         return go_home
     nearest = min(range(len(rally)), key=lambda k: _distance(here, rally[k]))
@@ -210,16 +213,17 @@ def choose_target(rules: ReturnRules, here: Place, home: ReturnPlace, rally: Seq
         return go_home._replace(reason=f"nearer than {name}, which is {_km(away)} away{why}")
     count = f"of {len(rally)} rally points" if len(rally) > 1 else "rally point"
     point = rally[nearest]
-    base = point.base if rules.slope_to_stated_height else _FAR_BELOW * rules.holds_height
+    base = point.base if rules.slope_to_stated_height else _LEVEL_SLOPE_BASE_M * rules.holds_height
     return ReturnTarget(
         (point.east, point.north, point.up + rules.rally_height), name, f"the nearest {count}", away, base
     )
 
 
 def described_return(target: ReturnTarget, rules: ReturnRules, up: float, onward: str = "") -> str:
-    """What a return does, a note for people.
+    """Describe a return in a note for people.
 
-    up: height (m AMSL) at which it begins.  onward: what it goes on to from its circle, "" where it stays.
+    up: altitude at which it begins, m AMSL.
+    onward: what it continues to from its loiter, "" if it stays.
 
     >>> described_return(ReturnTarget((0.0, 0.0, 435.0), "home", "", 3210.0), ReturnRules(), 1090.0)
     'NAV_RETURN_TO_LAUNCH: to home, 3.2 km away, sinking 655 m on a straight slope to 435 m AMSL; circles for 60 s; ...'
@@ -261,15 +265,15 @@ def lay_return(
     ability: ReturnAbility,
     onward: Place | None = None,
 ) -> list[RoutePoint]:
-    """Waypoints of a return: its turn, its straight way, and the circle at its end.
+    """Return the waypoints of a return: its turn, its straight leg, and the loiter at its end.
 
-    before: the route so far; the return begins at its last point, on the course of its last leg.
-    stop: the return's.
-    onward: where it goes on to from its circle, as soon as it has its height there; None where it stays.
+    before: the route up to the return, which begins at its last point, on the course of its last leg.
+    stop: the itinerary stop of the return.
+    onward: where it continues to from its loiter as soon as it has its altitude there; None if it stays.
 
-    The turn goes the short way.  Heights of a descent are on the straight slope from where the turn begins to the
-    target, by the place along that line, no steeper than the aircraft can; a climb or a small fall begins at once.
-    What is missing at the circle is climbed or sunk there, and then the circle is flown for
+    The turn takes the shorter direction. Altitudes of a descent lie on the straight slope from the start of the turn to
+    the target, by the position along that line, no steeper than the aircraft can fly; a climb or a small descent begins
+    at once. The remaining height difference is flown in the loiter, which then lasts
     `flight.mission.itinerary.UNLIMITED` s.
     """
     here = before[-1].position
@@ -277,9 +281,9 @@ def lay_return(
     radius = math.copysign(max(abs(rules.radius), ability.circle), rules.radius)
     circle = Node(stop, *target.position, radius)
     dive = min(ability.dive, rules.sink / ability.airspeed)
-    plan = _Plan(circle, target.slope_base, rules.least_slope, ability, dive, here, onward)
-    if _distance(here, target.position) <= abs(radius) + _NO_TURN:
-        # So near that it is on the circle as soon as it is across it.
+    plan = _ReturnBuilder(circle, target.slope_base, rules.least_slope, ability, dive, here, onward)
+    if _distance(here, target.position) <= abs(radius) + _MIN_TANGENT_M:
+        # Start near the target: it is on the circle as soon as it has crossed to it.
         plan.circle_from(*_rim_ahead(here, course, circle))
         return plan.points
     course = plan.turn_gently(course, rules)
@@ -287,11 +291,8 @@ def lay_return(
     return plan.points
 
 
-class _Plan:
-    """The waypoints so far.
-
-    at: the last place.  slope_from: where the slope begins.
-    """
+class _ReturnBuilder:
+    """Builder of the waypoints of a return."""
 
     def __init__(
         self,
@@ -317,7 +318,7 @@ class _Plan:
         return self._circle.up - self._at[2]
 
     def turn_gently(self, course: float, rules: ReturnRules) -> float:
-        """Fly the arc at the first bank limit, for as long as that counts; returns the course at its end."""
+        """Fly the arc at the first bank limit while that limit applies, and return the course at its end."""
         climb = min(rules.climb_first, max(0.0, self._rise)) if math.isinf(rules.climb_first) else rules.climb_first
         if climb <= 0.0:
             return course
@@ -327,7 +328,7 @@ class _Plan:
         if arc is None:
             return course
         node, part, onward = arc
-        # A height that is never reached is never climbed.
+        # A height gain that is never reached never lifts the limit.
         length = climb / self._ability.climb if self._rise >= climb else math.inf
         sweep = min(part, length / wide)
         self._add_arc(node, course, sweep)
@@ -337,25 +338,25 @@ class _Plan:
         return onward if sweep == part else end
 
     def turn(self, course: float) -> None:
-        """Fly the turn to the target, the straight way, and the circle there."""
+        """Fly the turn to the target, the straight leg, and the loiter there."""
         bearing = _course(self._at, (self._circle.east, self._circle.north, 0.0))
         arc = self._arc(course, self._ability.turn_radius(course, bearing, self._at[2]))
         point = Node(self._stop, *self._at)
         if arc is None:
-            # No way leads from the turn to the circle: the corner stays sharp.
+            # No tangent leads from the turn to the loiter: the corner stays sharp.
             onward = tangent_course(point, self._circle)
         else:
             node, part, onward = arc
-            if abs(node.turn) * math.tan(0.5 * min(part, CORNER)) > _NO_TURN:
+            if abs(node.turn) * math.tan(0.5 * min(part, CORNER)) > _MIN_TANGENT_M:
                 self._add_arc(node, course, part)
                 self._add(*on_rim(node, onward), 0.0)
             else:
                 onward = tangent_course(point, self._circle)
-        self._straight(onward)
+        self._add_slope_break(onward)
         self.circle_from(*on_rim(self._circle, onward), onward)
 
-    def _straight(self, onward: float) -> None:
-        """A waypoint where a climb or a step ends on the straight way, or where a height held first begins to fall."""
+    def _add_slope_break(self, onward: float) -> None:
+        """Add a waypoint on the straight leg where a climb or step ends, or a held altitude begins to fall."""
         join = on_rim(self._circle, onward)
         run = math.hypot(join[0] - self._at[0], join[1] - self._at[1])
         if self._rise > 0.0:
@@ -365,21 +366,21 @@ class _Plan:
         else:
             fall = self._slope_from[2] - self._circle.up
             begins = self._slope_base / max(1e-6, fall + self._slope_base)
-            first, last = self._share(*self._at[:2]), self._share(*join)
+            first, last = self._slope_fraction(*self._at[:2]), self._slope_fraction(*join)
             needed = run * (begins - first) / max(1e-6, last - first)
-        if _NO_TURN < needed < run - _NO_TURN:
+        if _MIN_TANGENT_M < needed < run - _MIN_TANGENT_M:
             east, north = (a + needed / run * (b - a) for a, b in zip(self._at[:2], join, strict=True))
             self._add(east, north, 0.0)
 
     def circle_from(self, east: float, north: float, course: float) -> None:
-        """Fly to a place on the circle, and around it until its height is reached and its time is over."""
-        if math.hypot(east - self._at[0], north - self._at[1]) > _NO_TURN:
+        """Fly to a point on the circle, and around it until its altitude is reached and its time is over."""
+        if math.hypot(east - self._at[0], north - self._at[1]) > _MIN_TANGENT_M:
             self._add(east, north, 0.0)
         radius = abs(self._circle.turn)
         missing = self._rise
         spiral = abs(missing) / (self._ability.climb if missing > 0.0 else self._dive) / radius
         if self._onward is not None:
-            self._go_on(course, spiral if abs(missing) > _JOINS else 0.0, self._onward)
+            self._continue_to(course, spiral if abs(missing) > _LANDING_JOIN_TOLERANCE_M else 0.0, self._onward)
             return
         sweep = spiral + max(2.0 * math.pi, UNLIMITED * self._ability.airspeed / radius)
         self._add_circle(course, sweep)
@@ -388,28 +389,31 @@ class _Plan:
         self._add_arc(self._circle, course, sweep, on_circle=True)
         self._add(*on_rim(self._circle, course + math.copysign(sweep, self._circle.turn)), 0.0, on_circle=True)
 
-    def _go_on(self, course: float, spiral: float, onward: Place) -> None:
-        """Fly around the circle until its height is reached, and turn the short way to a place from there."""
+    def _continue_to(self, course: float, spiral: float, onward: Place) -> None:
+        """Fly around the circle until its altitude is reached, and turn from there to a place.
+
+        The turn takes the shorter direction.
+        """
         if spiral > 0.0:
             self._add_circle(course, spiral)
             course += math.copysign(spiral, self._circle.turn)
         self._circle = Node(self._stop, onward[0], onward[1], self._at[2])
         radius = self._ability.turn_radius(course, _course(self._at, onward), self._at[2])
         arc = self._arc(course, radius)
-        if arc is not None and radius * math.tan(0.5 * min(arc[1], CORNER)) > _NO_TURN:
+        if arc is not None and radius * math.tan(0.5 * min(arc[1], CORNER)) > _MIN_TANGENT_M:
             node, part, end = arc
             self._add_arc(node, course, part, on_circle=True)
             self._add(*on_rim(node, end), 0.0, on_circle=True)
 
     def _arc(self, course: float, radius: float) -> tuple[Node, float, float] | None:
-        """The arc from here to the tangent of the target's circle: its circle, its angle, and the course it ends on.
+        """Return the arc from here to a tangent of the target's loiter: its circle, angle and final course.
 
-        The short way; None where no tangent leads on.
+        Choose the shorter direction; return None if no tangent leads on.
         """
         off = float(wrap(_course(self._at, (self._circle.east, self._circle.north, 0.0)) - course))
         side = math.copysign(1.0, off)
         found = [one for one in (self._arc_to(course, side * radius), self._arc_to(course, -side * radius)) if one]
-        return next((one for one in found if one[1] < _TOO_FAR), None)
+        return next((one for one in found if one[1] < _MAX_TURN_ANGLE_RAD), None)
 
     def _arc_to(self, course: float, turn: float) -> tuple[Node, float, float] | None:
         east, north, up = self._at
@@ -424,34 +428,34 @@ class _Plan:
             self._add(east, north, abs(node.turn), on_circle=on_circle)
 
     def _add(self, east: float, north: float, arc: float, *, on_circle: bool = False) -> None:
-        """Add a waypoint at the height that the return has there."""
+        """Add a waypoint at the return's altitude there."""
         run = math.hypot(east - self._at[0], north - self._at[1])
         up, end = self._at[2], self._circle.up
         if end >= up:
             up = min(end, up + self._ability.climb * run)
         else:
-            wanted = end if on_circle else self._on_slope(east, north)
+            wanted = end if on_circle else self._slope_altitude(east, north)
             up = max(min(up, wanted), up - self._dive * run)
         self._at = (east, north, up)
         self.points.append(RoutePoint(self._stop, self._at, arc))
 
-    def _on_slope(self, east: float, north: float) -> float:
-        """Height of the straight slope to the target beside a place, or that of its end where it is a step."""
+    def _slope_altitude(self, east: float, north: float) -> float:
+        """Return the altitude of the slope to the target at a point, or the target's altitude for a step."""
         start, end = self._slope_from[2], self._circle.up
         if self._is_step:
             return end
-        left = 1.0 - min(1.0, max(0.0, self._share(east, north)))
+        left = 1.0 - min(1.0, max(0.0, self._slope_fraction(east, north)))
         return min(start, end + left * (start - end + self._slope_base))
 
-    def _share(self, east: float, north: float) -> float:
-        """Share of the slope's line that lies behind a place."""
+    def _slope_fraction(self, east: float, north: float) -> float:
+        """Return the fraction of the slope's line that lies behind a point."""
         from_e, from_n, _ = self._slope_from
         along_e, along_n = self._circle.east - from_e, self._circle.north - from_n
         return ((east - from_e) * along_e + (north - from_n) * along_n) / max(1e-6, along_e**2 + along_n**2)
 
 
 def _rim_ahead(here: Place, course: float, circle: Node) -> tuple[float, float, float]:
-    """Where a straight way from inside a circle meets it, and the course around it there."""
+    """Return where a straight path from inside a circle meets it, and the course around it there."""
     off_e, off_n = here[0] - circle.east, here[1] - circle.north
     along = off_e * math.sin(course) + off_n * math.cos(course)
     ahead = -along + math.sqrt(max(0.0, along * along + circle.turn * circle.turn - off_e * off_e - off_n * off_n))

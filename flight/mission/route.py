@@ -1,4 +1,4 @@
-"""A mission as the aircraft flies it: world-frame waypoints with speeds, jumps unrolled."""
+"""A mission's route as the aircraft flies it: waypoints on the map with airspeeds, jumps unrolled."""
 
 import math
 from collections.abc import Callable
@@ -52,26 +52,26 @@ class Route:
     waypoints: (w, 3) east, north, up, m.
     airspeed: (w - 1,) m/s on each leg.
     acceptance: (w,) m, 0 where the mission states none (advisory: the verdict has its own rule).
-    fly_over: (w,) bool, True where the path goes through the waypoint and turns behind it, and not by it on an arc.
-    items: (w,) the mission item's seq, -1 for a point that is no item.
+    fly_over: (w,) bool, True if the path goes through the waypoint and turns behind it, False if it passes by on an
+        arc.
+    items: (w,) seq of the mission item, -1 for a point without one.
     started: a sentence for people: where and how the flight starts.
-    notes: what cannot be flown as written, with item numbers.
-    arcs: (w,) m, the radius that the path turns with there, 0 for the bank limit's; a loiter is the corners of a
-        polygon around its circle, all of one item, each with the circle's radius.
-    endless: seq of the jump that would have the last round flown for ever, -1 for none.
-    takeoff_ground, landing_ground: m, the ground that the mission takes off from and the place that it lands at, which
-        the flight begins and ends above; NaN where there is none or it is not known.
-    return_from: index of the waypoint at which a return to launch begins, -1 for none; what follows stands for the way
-        that an autopilot finds by itself, up to `return_until`.
-    return_to: the circle that the return ends in, or goes on from to a landing sequence; None for no return.
-    straight_to: index of the waypoint at which a landing sequence begins that a return goes on to, -1 for none: whoever
-        flies heads for it from where it is, along no line.
-    stops: (w,) number of the stop that the waypoint belongs to, never less than the one before: a jump back leads to
-        another stop of the same item.  Where it is not given, waypoints of one item in a row are one.
-    unjoined: stops that whoever flies goes to, and that the waypoints lack, for no tangent joins them to a circle.
+    notes: parts that cannot be flown as written, with item numbers.
+    arcs: (w,) turn radius, m, 0 for the radius at the bank limit; a loiter is the corners of a polygon around its
+        circle, all of one item, each with the circle's radius.
+    endless: seq of a jump that repeats the last round without end, -1 for none.
+    takeoff_ground, landing_ground: altitude of the ground at take-off and at the landing place, m, above which the
+        flight begins and ends; NaN if there is none or it is unknown.
+    return_from: index of the waypoint at which a return to launch begins, -1 for none; the waypoints from there to
+        `return_until` stand for the path that the autopilot chooses itself.
+    return_to: loiter that the return ends in, or leaves for a landing sequence; None for no return.
+    straight_to: index of the waypoint at which a return joins a landing sequence, -1 for none; the autopilot heads
+        there from where it is, along no line.
+    stops: (w,) number of the stop that the waypoint belongs to, never decreasing: a jump back leads to another stop of
+        the same item. If it is not given, successive waypoints of one item are one stop.
+    unjoined: stops that the autopilot flies to, and that the waypoints lack, since no tangent joins them to a circle.
     open_items: items that change the flight path, and that are not flown as the autopilot would.
-    above_ground: (w,) m, the height above ground that is held along the leg to the waypoint; NaN where the leg is
-        straight.
+    above_ground: (w,) height above ground that is held along the leg to the waypoint, m; NaN for a straight leg.
     """
 
     waypoints: Floats
@@ -94,7 +94,7 @@ class Route:
     above_ground: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        """Lock the arrays."""
+        """Fill in default arrays, and lock all arrays."""
         if not len(self.arcs):
             object.__setattr__(self, "arcs", np.zeros(len(self.waypoints)))
         if len(self.stops) != len(self.waypoints):
@@ -109,17 +109,20 @@ class Route:
 
     @property
     def legs(self) -> int:
-        """How many legs there are."""
+        """Number of legs."""
         return len(self.waypoints) - 1
 
     @property
     def leg_numbers(self) -> NDArray[np.int64]:
-        """Number of each leg as people count them, (w - 1,): all legs around a loiter have that of the leg to it."""
+        """Number of each leg as people count them, (w - 1,).
+
+        All legs around a loiter have the number of the leg to it.
+        """
         return np.maximum(self.stops[1:] - 1, 0)
 
     @property
     def return_until(self) -> int:
-        """Index of the waypoint at which a return has come to the mission's landing sequence; one beyond the last."""
+        """Index of the waypoint at which a return joins the landing sequence, or one beyond the last."""
         if self.return_from < 0:
             return len(self.waypoints)
         own = self.items[self.return_from + 1 :] == self.items[self.return_from + 1]
@@ -127,7 +130,7 @@ class Route:
 
 
 def goes_no_further(route: Route, mission: Mission) -> bool:
-    """Whether a route ends at a plain waypoint of its mission: not with a loiter, a landing or a return.
+    """Return True if a route ends at a plain waypoint: not with a loiter, a landing or a return.
 
     >>> route = Route(np.eye(3)[:2], np.ones(1), np.zeros(2), np.zeros(2, dtype=bool), np.array([1, 2]), "")
     >>> goes_no_further(route, Mission(None, ()))
@@ -138,7 +141,7 @@ def goes_no_further(route: Route, mission: Mission) -> bool:
 
 
 def part_of_route(route: Route, first: int, last: int) -> Route:
-    """A route from one of its waypoints to another, both included.
+    """Return the part of a route from one of its waypoints to another, both included.
 
     >>> way = np.array([[0.0, 1000.0 * k, 300.0] for k in range(4)])
     >>> whole = Route(way, np.full(3, 25.0), np.zeros(4), np.zeros(4, bool), np.arange(4), "")
@@ -168,18 +171,18 @@ def part_of_route(route: Route, first: int, last: int) -> Route:
 
 
 # ----------------------------------------------------------------------
-# The waypoints that a path goes through, because the fly-by arc would pass them too far away.
+# Waypoints that a path flies over, because the fly-by arc would pass too far away.
 
 
 class RouteRules(NamedTuple):
     """Rules by which an autopilot flies the route of a mission.
 
-    returns: its returns to launch.
-    loiters: its loiters.
-    reads_as_px4: True if it reads nothing but the value of a change of speed, and reads gates, as PX4 does.
+    returns: rules of its returns to launch.
+    loiters: rules of its loiters.
+    reads_as_px4: True if it reads only the value of a speed change, and reads gates, as PX4 does.
     turn_distance: distance before a waypoint at which it turns to the next leg, m, by the turn (rad, positive) and the
         waypoint's altitude (m AMSL); None for guidance that follows the fly-by path.
-    acceptance_limit: largest acceptance radius that it reads of an item, m.
+    acceptance_limit: largest acceptance radius that it accepts from an item, m.
     """
 
     returns: ReturnRules = USUAL_RULES
@@ -203,14 +206,18 @@ def fly_over_waypoints(
     limits: Limits | None,
     turn_distance: Callable[[float, float], float] | None = None,
 ) -> NDArray[np.bool_]:
-    """Return which waypoints the path goes through, since the fly-by arc at the bank limit would miss them, (w,).
+    """Return which waypoints (w,) are flown over, since the fly-by arc at the bank limit misses them.
 
-    points: (w, 3) m.  airspeed: (w - 1,) m/s.  acceptance: (w,) m, 0 where the mission states none.
-    limits: None where they are not known, and so no arc.  turn_distance: as of `RouteRules`.
-    An arc that turns by ``turn`` passes its waypoint at R(1/cos(turn/2) - 1).  At 25 m/s and 30 degrees of bank R is
-    110 m: it passes a corner of 90 degrees at 46 m, one of 120 degrees at 110 m, and one of 174 degrees at 2 km.  The
-    arc misses the waypoint where that is more than the acceptance radius which the mission states, or else more than
-    the autopilot's own distance before the waypoint; it flies on to there before it turns.
+    points: (w, 3) m.
+    airspeed: (w - 1,) m/s.
+    acceptance: (w,) m, 0 where the mission states none.
+    limits: limits of the aircraft; None if unknown, and then there are no arcs.
+    turn_distance: see `RouteRules`.
+
+    An arc that turns by ``turn`` passes its waypoint at R(1/cos(turn/2) - 1). At 25 m/s and 30 degrees of bank R is 110
+    m: the arc passes a corner of 90 degrees at 46 m, one of 120 degrees at 110 m, and one of 174 degrees at 2 km. It
+    misses the waypoint if that distance exceeds the acceptance radius that the mission states, or, if it states none,
+    the autopilot's own turn distance; the autopilot then flies on to that distance before it turns.
 
     >>> from types import SimpleNamespace
     >>> from aircraft.path_limits import PerformanceTable
@@ -235,7 +242,7 @@ def fly_over_waypoints(
         turn = float(turns[i - 1])
         table = tables[float(max(airspeed[i - 1], airspeed[i]))]
         radius = float(turn_radius_between(table, courses[i - 1], courses[i], points[i, 2]))
-        # Where the wind leaves no way along a leg there is no arc to miss with.
+        # A leg that cannot be flown in this wind has no arc.
         if turn == 0.0 or not math.isfinite(radius):
             continue
         if acceptance[i] > 0.0:
@@ -248,22 +255,22 @@ def fly_over_waypoints(
 
 
 # ----------------------------------------------------------------------
-# Straight lead-in and lead-out legs that give a route the courses its scenario asks for at its ends.
+# Straight lead-in and lead-out legs that give a route the start and end courses of its scenario.
 
-# Length of these legs beyond what the turn itself uses, m: the aircraft is level and on course again by then.
+# Length of these legs beyond the turn's tangent, m: the aircraft is level and on course again by then.
 END_LEG_LENGTH = 100.0
-# An end within this of the scenario's is the scenario's, m.
-_SAME = 1.0
-# A course that differs by less than this needs no turn, rad.
-_STRAIGHT = math.radians(0.5)
+# Distance within which an end of the route is the scenario's end, m.
+_SAME_END_M = 1.0
+# Course difference below which no turn is needed, rad.
+_MIN_COURSE_CHANGE_RAD = math.radians(0.5)
 
 
 def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     """Start a route on the scenario's start course, and end it on its destination course.
 
     A level lead-in leg before the first waypoint, or lead-out leg after the last, is as long as the turn's tangent and
-    `END_LEG_LENGTH`: so the turn onto the first leg, or off the last, is flown and judged as any other.  A route whose
-    scenario asks for no course, or that ends elsewhere, stays as it is.
+    `END_LEG_LENGTH`, so that the turn onto the first leg, or off the last, is flown and judged as any other. A route
+    that ends elsewhere, or whose scenario states no course, stays as it is.
 
     >>> from types import SimpleNamespace
     >>> from world.scenario import load_scenario
@@ -279,9 +286,9 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     """
     points, courses = route.waypoints, leg_courses(route.waypoints)
     lead_in = lead_out = None
-    if scenario.start_course is not None and math.dist(points[0], scenario.start) < _SAME:
+    if scenario.start_course is not None and math.dist(points[0], scenario.start) < _SAME_END_M:
         lead_in = _lead_point(points[0], scenario.start_course, float(courses[0]), limits, -1.0)
-    if scenario.destination_course is not None and math.dist(points[-1], scenario.destination) < _SAME:
+    if scenario.destination_course is not None and math.dist(points[-1], scenario.destination) < _SAME_END_M:
         lead_out = _lead_point(points[-1], scenario.destination_course, float(courses[-1]), limits, 1.0)
     head = 0 if lead_in is None else 1
     tail = 0 if lead_out is None else 1
@@ -291,7 +298,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     if lead_in is not None:
         length = math.dist(lead_in[:2], points[0][:2])
         started += f"; on the scenario's start course, from a lead-in leg of {length:.0f} m"
-    # Radii at the ends of the mission say nothing of turns that it does not have.
+    # Acceptance radii at the ends of the mission do not apply to turns that it does not have.
     acceptance = np.array(route.acceptance)
     acceptance[:head], acceptance[len(acceptance) - tail :] = 0.0, 0.0
     chain = [point for point in (lead_in, *points, lead_out) if point is not None]
@@ -312,27 +319,30 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
 
 
 def _lead_point(point: np.ndarray, course: float, leg: float, limits: Limits, side: float) -> np.ndarray | None:
-    """Other end of the lead-in (side -1) or lead-out leg (side 1) at an end of the route; None where no turn is due.
+    """Return the far end of the lead-in (side -1) or lead-out leg (side 1); None if no turn is needed.
 
-    point: (3,) m.  course: that the scenario asks for; leg: of the route's first or last leg, rad.
+    point: (3,) m, end of the route.
+    course: the scenario's course there, rad.
+    leg: course of the route's first or last leg, rad.
     """
     turn = abs(float(wrap(course - leg)))
-    if turn < _STRAIGHT:
+    if turn < _MIN_COURSE_CHANGE_RAD:
         return None
     radius = limits.turn_radius(*((course, leg) if side < 0.0 else (leg, course)), float(point[2]))
-    # A reversal has no tangent; twice the radius shows it as the sharp corner that it is.
+    # A reversal has no tangent; twice the radius shows it as a sharp corner.
     tangent_length = radius * min(math.tan(min(turn, math.radians(170.0)) / 2.0), 2.0)
     step = side * ((tangent_length if math.isfinite(tangent_length) else 0.0) + END_LEG_LENGTH)
     return point + step * np.array([math.sin(course), math.cos(course), 0.0])
 
 
 # ----------------------------------------------------------------------
-# From a mission's places to the route that is flown, with circles and spirals that its aircraft can fly.
+# From a mission's places to the route that is flown, with loiters and spirals that its aircraft can fly.
 
-# Radius of a loiter that states none (m, PX4's default), if the aircraft can turn as tightly, this much tighter.
+# Radius of a loiter that states none, if the aircraft can turn more tightly by the margin below, m: PX4's default.
 DEFAULT_RADIUS = 80.0
+# Ratio of such a loiter's radius to the tightest turn.
 OVER_TIGHTEST = 1.1
-# A spiral climbs and sinks with this share of the aircraft's limits in straight flight.
+# Fraction of the aircraft's slope limits in straight flight at which a spiral climbs and descends.
 SPIRAL_SHARE = 0.6
 
 
@@ -345,18 +355,19 @@ def make_route(
     limits: Limits | None = None,
     rules: RouteRules = USUAL_ROUTE_RULES,
 ) -> Route:
-    """Route of a mission on the map about ``origin``: `place_stops`, then `lay_route`.
+    """Return the route of a mission on the map about ``origin``: `place_stops`, then `lay_route`.
 
-    terrain: None where none is known; heights above terrain are then an error.
-    default_airspeed: m/s until the mission sets one (a `.plan` file's cruiseSpeed, a station's estimate, sets none).
-    fly_over: True to fly over all waypoints; `fly_over_waypoints` names those that are flown over in any case.
-    limits: the aircraft's, for these arcs, the radius of a loiter that states none (None takes 80 m), and the slope of
-        a spiral (5 %).
-    rules: how the autopilot flies a route.
+    terrain: None if unknown; heights above terrain are then an error.
+    default_airspeed: airspeed until the mission sets one, m/s (the cruiseSpeed of a `.plan` file, a ground station's
+        estimate, sets none).
+    fly_over: True to fly over all waypoints; otherwise only over those of `fly_over_waypoints`.
+    limits: limits of the aircraft for those arcs, for the radius of a loiter that states none (80 m if None), and for
+        the slope of a spiral (5 % if None).
+    rules: rules by which the autopilot flies a route.
 
-    Without TAKEOFF the route starts at the first position item; with one, over home at that item's height.  Every leg
-    has a horizontal length of at least `flight.mission.placing.SAME_PLACE`.  Raises MissionError, naming the item, for
-    what cannot be placed, and for a mission of fewer than two positions.
+    Without TAKEOFF the route starts at the first position item; with one, over home at that item's altitude. Every leg
+    has a horizontal length of at least `flight.mission.placing.SAME_PLACE`. Raise MissionError, naming the item, for a
+    place that cannot be laid out, and for a mission of fewer than two positions.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
@@ -379,9 +390,9 @@ def lay_route(
     limits: Limits | None = None,
     rules: RouteRules = USUAL_ROUTE_RULES,
 ) -> Route:
-    """Route through the places of a mission; arguments as of `make_route`.
+    """Return the route through the places of a mission; arguments as for `make_route`.
 
-    Raises MissionError for fewer than two places, and for a loiter too wide or too long to lay out.
+    Raise MissionError for fewer than two places, and for a loiter too wide or too long to lay out.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5 + k, 8.0, 700.0) for k in (0, 1)]
@@ -394,7 +405,7 @@ def lay_route(
     places = _with_gates(placed, notes) if reads_as_px4 else list(placed.stops)
     kept = [_with_airspeed(place, default_airspeed, reads_as_px4) for place in places]
     returning = kept.pop() if placed.itinerary.returns else None
-    straight = None if returning is None else _straight_to_land(placed, kept, returns, notes)
+    straight = None if returning is None else _direct_landing(placed, kept, returns, notes)
     if straight is not None:
         kept += [_with_airspeed(place, default_airspeed, reads_as_px4) for place in straight.stops]
     lay = partial(_lay_circles, mission.source, limits, loiters, notes)
@@ -429,7 +440,7 @@ def lay_route(
         landing_ground=placed.landing_ground if landing is None else landing.ground,
         above_ground=np.array([_held_above_ground(stop) for stop in stops]),
         unjoined=unjoined if loiters.at_middle else (),  # An autopilot that flies on tangents leaves these out.
-        open_items=_open_of(placed.itinerary, landing, reads_as_px4),
+        open_items=_open_items(placed.itinerary, landing, reads_as_px4),
         **back,
     )
 
@@ -447,13 +458,16 @@ def _refuse_fewer_than_two(source: str, places: int) -> None:
 
 
 def _notes_of(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[str, ...]:
-    """Notes of an itinerary, and of the landing sequence that its return goes on to, whose items are reached so."""
+    """Return the notes of an itinerary and of the landing sequence that its return continues to.
+
+    A note that items are never reached is left out if the landing sequence reaches them.
+    """
     notes = itinerary.notes_by_value if reads_as_px4 else itinerary.notes
     return notes if landing is None else (*(note for note in notes if NEVER_REACHED not in note), *landing.notes)
 
 
-def _open_of(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[OpenItem, ...]:
-    """Return what leaves the verdict open, of an itinerary and of the landing sequence that its return goes on to."""
+def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[OpenItem, ...]:
+    """Return the items that leave the verdict open, of an itinerary and of its return's landing sequence."""
     own = itinerary.open_by_value if reads_as_px4 else itinerary.open_items
     return own if landing is None else own + landing.open_items
 
@@ -464,10 +478,13 @@ def _lay_circles(
     return lay_circles(source, stops, notes, _own_radius(limits), _spiral_slopes(limits), loiters)
 
 
-def _straight_to_land(
+def _direct_landing(
     placed: PlacedMission, kept: list[PlacedStop], rules: ReturnRules, notes: Notes
 ) -> PlacedLanding | None:
-    """The landing sequence that a return flies to at once; None where it does not.  kept: the stops before it."""
+    """Return the landing sequence that a return flies to at once, or None.
+
+    kept: the stops before the return.
+    """
     if rules.lands != "straight" or not kept:
         return None
     east, north, up = kept[-1].position.tolist()
@@ -476,12 +493,15 @@ def _straight_to_land(
         return None
     away, seq = math.dist((east, north), landing.start.place[:2]), placed.itinerary.stops[-1].item
     text = f"at once to the landing sequence at item {landing.start.item}, {away / 1000.0:.1f} km away"
-    notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name}: {text}{_of_several(placed)}", seq)
+    notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name}: {text}{_nearest_of_text(placed)}", seq)
     return landing
 
 
 def _nearest(placed: PlacedMission, here: tuple[float, float, float], notes: Notes) -> PlacedLanding | None:
-    """The landing sequence that a return goes to from a place, m; None where it is not flown there, which is noted."""
+    """Return the landing sequence that a return goes to from a place, m.
+
+    Return None, with a note, if the return is not flown there.
+    """
     start = nearest_landing(here, placed.landing_starts)
     landing = next((one for one in placed.landings if one.start == start), None)
     if start is not None and landing is None:
@@ -491,13 +511,16 @@ def _nearest(placed: PlacedMission, here: tuple[float, float, float], notes: Not
     return landing
 
 
-def _of_several(placed: PlacedMission) -> str:
+def _nearest_of_text(placed: PlacedMission) -> str:
     count = len(placed.landing_starts)
     return f" (the nearest of {count}, height counted)" if count > 1 else ""
 
 
 def _note_circles(itinerary: Itinerary, kept: list[PlacedStop], loiters: LoiterRules, notes: Notes) -> None:
-    """Note what is not flown of the circles of whoever flies; kept: the stops, without a return."""
+    """Note the parts of the autopilot's loiters that are not flown.
+
+    kept: the stops, without a return.
+    """
     last = kept[-1].stop
     if loiters.unflown and (itinerary.returns or any(place.stop.loiter is not None for place in kept)):
         notes.add(loiters.unflown)
@@ -515,11 +538,10 @@ def _lay_return(
     limits: Limits | None,
     notes: Notes,
 ) -> tuple[dict[str, Any], PlacedLanding | None]:
-    """Add a return's waypoints to those so far; gives the fields of the `Route` that are a return's.
+    """Add a return's waypoints to the points; return the return's fields of `Route`.
 
-    Also the landing sequence that it goes on to, None where it stays in its circle.
-
-    Raises MissionError for a height beyond those that are flown.
+    Also return the landing sequence that the return continues to, or None if it stays in its loiter. Raise MissionError
+    for an altitude outside the flown range.
     """
     source, here = placed.mission.source, points[-1].position
     home, *rally = placed.return_places
@@ -541,7 +563,7 @@ def _lay_return(
         airspeed=stop.airspeed,
     )
     landing = _nearest(placed, target.position, notes) if rules.lands == "circle" else None
-    onward = "" if landing is None else f"the landing sequence at item {landing.start.item}{_of_several(placed)}"
+    onward = "" if landing is None else f"the landing sequence at item {landing.start.item}{_nearest_of_text(placed)}"
     notes.add(described_return(target, rules, here[2], onward), stop.item)
     if rules.landing_counts and any(item.command in LANDINGS for item in placed.mission.items):
         notes.add(f"the mission's landing counts as a place to return to: not flown to; to {target.name}", stop.item)
@@ -555,10 +577,10 @@ def _lay_return(
 
 
 def _with_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
-    """The places of a mission with the gates between them at which the airspeed changes, as PX4 passes them.
+    """Return a mission's places, and the gates between them where PX4 changes the airspeed.
 
-    Each stands where its plane, at right angles to the way from the gate to the place after it, cuts the leg: an
-    aircraft on its leg passes it there.
+    Each gate is placed where its plane cuts the leg, since an aircraft on its leg passes it there. The plane is
+    perpendicular to the line from the gate to the next place.
     """
     out = list(placed.stops[:1])
     for place in placed.stops[1:]:
@@ -585,25 +607,25 @@ def _with_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
 
 
 def _gate_share(a: Floats, b: Floats, gate: tuple[Any, Any]) -> float:
-    """How far along the leg from a to b, as a share of it, the plane of a gate (east, north, m) cuts it."""
+    """Return the fraction of the leg from a to b at which the plane of a gate (east, north, m) cuts it."""
     out = b[:2] - np.array([float(gate[0]), float(gate[1])])
     along = float((b[:2] - a[:2]) @ out)
-    # From b backwards: b itself is as far beyond the plane as the gate is away from it.
+    # Measured backwards from b, whose distance from the plane is its distance from the gate.
     return 1.0 - float(out @ out) / along if along > 0.0 else 0.0
 
 
 def _with_airspeed(place: PlacedStop, default: float, by_value: bool) -> PlacedStop:
-    """A place with the airspeed that whoever flies reads of the mission; the default (m/s) where that sets none."""
+    """Return a place with the airspeed that the autopilot reads from the mission, or the default, m/s."""
     stated = place.stop.airspeed_by_value if by_value else place.stop.airspeed
     return PlacedStop(replace(place.stop, airspeed=default if math.isnan(stated) else stated), place.position)
 
 
-# Share of the airspeed by which a ground station's estimate differs where it is likely of another aircraft.
+# Relative difference beyond which a ground station's speed estimate is likely that of another aircraft.
 FAR_SPEED = 0.2
 
 
 def _note_cruise_speed(mission: Mission, airspeed: float, first: ItineraryStop, notes: Notes) -> None:
-    """Note a cruiseSpeed other than the default airspeed (m/s), if that is flown to the first stop."""
+    """Note a cruiseSpeed other than the default airspeed (m/s), if the default is flown to the first stop."""
     if mission.cruise_speed is not None and mission.cruise_speed != airspeed and first.airspeed == airspeed:
         text = (
             f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and no command:"
@@ -615,7 +637,10 @@ def _note_cruise_speed(mission: Mission, airspeed: float, first: ItineraryStop, 
 
 
 def _own_radius(limits: Limits | None) -> OwnRadius:
-    """Radius of a loiter that states none: a tenth over the bank limit's in this wind, in whole tens of metres."""
+    """Return a function for the radius of a loiter that states none.
+
+    It is a tenth wider than the tightest turn in this wind, in whole tens of meters.
+    """
 
     def radius(airspeed: float, up: float) -> float:
         if limits is None:
@@ -629,7 +654,10 @@ def _own_radius(limits: Limits | None) -> OwnRadius:
 
 
 def _spiral_slopes(limits: Limits | None) -> SpiralSlopes:
-    """Slopes of a spiral: a share of the aircraft's limits on the worst course around it."""
+    """Return a function for the slopes of a spiral.
+
+    They are a fraction of the aircraft's limits on the spiral's worst course.
+    """
 
     def slopes(airspeed: float, up: float) -> tuple[float, float]:
         if limits is None:
@@ -638,7 +666,7 @@ def _spiral_slopes(limits: Limits | None) -> SpiralSlopes:
         for k, stated in enumerate((limits.max_climb, limits.max_dive)):
             limit = min(limits.slopes(course, up, airspeed)[k] for course in np.arange(8) * (math.pi / 4.0))
             slope = min(limit, math.inf if stated is None else stated)
-            # An aircraft that cannot climb at all gets a plain spiral, and the slope rule says so.
+            # An aircraft that cannot climb gets a plain spiral, and the slope rule reports it.
             found.append(SPIRAL_SHARE * math.tan(slope) if 0.0 < slope < 1.5 else PLAIN_SLOPE)
         return found[0], found[1]
 

@@ -1,6 +1,6 @@
-"""Another layout of a survey: longer turn-arounds, every second line first, lines on another course.
+"""Change the layout of a survey: longer turn-arounds, interleaved lines, or lines on another course.
 
-What is not of the survey stays as it is in the mission, and each line keeps its items, the camera's among them.
+Items that do not belong to the survey stay as they are, and each line keeps its items, including the camera's.
 """
 
 import math
@@ -18,22 +18,24 @@ from world.frames import GeoOrigin, to_geo
 
 Floats = NDArray[np.float64]
 
-# A line of a survey on another course is at least this long, m.
-_SHORTEST = 50.0
-# A line bends where it strays further than this from the straight one between its ends, m.
-_STRAIGHT = 5.0
-# A lead is as long as the turn-arounds to within this, m.
-_SAME_LEAD = 1.0
+# Smallest length of a survey line on another course, m.
+_MIN_LINE_LENGTH_M = 50.0
+# Largest distance of a line that is not bent from the straight line between its ends, m.
+_BEND_TOLERANCE_M = 5.0
+# Tolerance for a lead as long as the turn-arounds, m.
+_LEAD_LENGTH_TOLERANCE_M = 1.0
 
 
 class SurveyLayout(NamedTuple):
-    """How to fly a survey.
+    """Settings for flying a survey.
 
-    turn_around: m from each line's end to where its turn begins, and from there to the next line's begin; 0 for none.
-    every: 2 for every second line first and then the others, from the same side on; 3 for every third, and so on.
-    course: of the lines, rad; None for the one they have.
-    backwards: whether to begin with the line on the other side.
-    lead_in: m straight on before the first line, where that is more: one comes to it from anywhere.
+    turn_around: distance from each line's end to where its turn begins, and from the turn's end to the next line's
+        start, m; 0 for none.
+    every: interleave stride; 2 flies every second line first and then the others from the same side on, 3 every third.
+    course: course of the lines, rad; None to keep it.
+    backwards: True to begin with the line on the other side.
+    lead_in: straight distance before the first line, m, where that is more, since the first line is entered from any
+        direction.
     """
 
     turn_around: float
@@ -44,19 +46,19 @@ class SurveyLayout(NamedTuple):
 
 
 class _Line(NamedTuple):
-    """A line to fly: its corners (k, 2) m in its direction, and its items, those of its ends and of what is between."""
+    """A line to fly: corners (k, 2) m in flying order, and the items from its first waypoint to its last."""
 
     corners: Floats
     items: tuple[MissionItem, ...]
 
 
-class _Items(NamedTuple):
-    """Where a survey's items stand in a mission's list, as indices.
+class _SurveyItems(NamedTuple):
+    """Indices of a survey's items in the mission's list of items.
 
-    lines: of each, the first item and the one behind its last; without a waypoint of its own at its begin, the first
-    behind what is there instead.
-    behind: the first item that is flown behind the survey's last run.
-    before: the first behind what is flown before its first run.
+    lines: index of each line's first item, and of the item after its last one; for a line that starts without a
+        waypoint of its own, the first is the item after the one that stands there instead.
+    behind: the first item that is flown after the survey's last run.
+    before: the first item after those that are flown before the survey's first run.
     """
 
     lines: tuple[tuple[int, int], ...]
@@ -65,25 +67,25 @@ class _Items(NamedTuple):
 
 
 def turn_around_of(route: Route, survey: Survey) -> float:
-    """Least distance (m) that a survey's lines go straight on beyond their photos, at either end of a turn-around."""
-    return min(_beyond(route, survey))
+    """Return the shortest straight extension of a survey's lines beyond their photos at a turn-around, m."""
+    return min(_lead_lengths(route, survey))
 
 
-def _beyond(route: Route, survey: Survey) -> list[float]:
-    """How far (m) the lines go straight on at each end of each turn-around."""
+def _lead_lengths(route: Route, survey: Survey) -> list[float]:
+    """Return how far the lines extend straight beyond their photos at each end of each turn-around, m."""
     points, pairs = route.waypoints[:, :2], zip(survey.lines[:-1], survey.lines[1:], strict=True)
     ends = [pair for one, other in pairs for pair in ((one.last, one.ends), (other.begins, other.first))]
     return [math.dist(points[one], points[other]) for one, other in ends]
 
 
 def kept_layout(mission: Mission, route: Route, survey: Survey) -> str:
-    """Why a survey's layout cannot be changed, in words; "" where it can."""
+    """Return the reason why a survey's layout cannot be changed, in words, or "" if it can."""
     if any(item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG) for item in mission.items):
         return "the mission jumps"
     at = {item.seq: k for k, item in enumerate(mission.items)}
     if any(int(route.items[i]) not in at for line in survey.lines for i in range(line.first, line.last + 1)):
         return "a line begins or ends where no item is"
-    items = _items_of(mission, route, survey)
+    items = _survey_items(mission, route, survey)
     for first, end in items.lines:
         for item in mission.items[first:end]:
             if is_navigation(item.command) and item.command != Command.NAV_WAYPOINT:
@@ -98,39 +100,42 @@ def kept_layout(mission: Mission, route: Route, survey: Survey) -> str:
 def with_layout(
     mission: Mission, route: Route, survey: Survey, layout: SurveyLayout, origin: GeoOrigin
 ) -> Mission | None:
-    """The mission with a survey laid out otherwise; None where that cannot be done.
+    """Return the mission with a new layout of a survey, or None if that is impossible.
 
-    route: of the mission, on the map about ``origin``.  Where `kept_layout` says why, nothing can be changed; lines on
-    another course need straight ones, and one height for all.
+    route: the mission's route, on the map about ``origin``. A survey for which `kept_layout` gives a reason cannot be
+        changed; a course change also needs straight lines and one altitude for all of them.
     """
     if kept_layout(mission, route, survey):
         return None
-    items, lines = _items_of(mission, route, survey), list[_Line]()
+    items, lines = _survey_items(mission, route, survey), list[_Line]()
     for photo_line, (first, end) in zip(survey.lines, items.lines, strict=True):
         corners, own = route.waypoints[photo_line.first : photo_line.last + 1, :2], mission.items[first:end]
         steps = [item for item in own if is_navigation(item.command)]
-        if _place_of(mission, route)[steps[0].seq] != photo_line.first:
+        if _waypoint_of_item(mission, route)[steps[0].seq] != photo_line.first:
             own = (_waypoint(steps[0], corners[0], origin), *own)
         lines.append(_Line(corners, own))
     if layout.course is not None:
-        turned = _turned(lines, survey, layout.course, origin)
+        turned = _with_course(lines, survey, layout.course, origin)
         if turned is None:
             return None
         lines = turned
-    longest = max(_beyond(route, survey)) + _SAME_LEAD
+    longest = max(_lead_lengths(route, survey)) + _LEAD_LENGTH_TOLERANCE_M
     (first, _), (_, end) = items.lines[0], items.lines[-1]
     made = [*mission.items[: items.before]]
     made += _without_leads(mission, route, mission.items[items.before : first], survey.lines[0].first, longest)
-    for number, line in enumerate(_ordered(lines, layout)):
+    for number, line in enumerate(_in_flying_order(lines, layout)):
         made += _with_ends(line, layout.turn_around, layout.lead_in if number == 0 else 0.0, origin)
     made += _without_leads(mission, route, mission.items[end : items.behind], survey.lines[-1].last, longest)
-    # Two items of one number cannot be told apart: all are numbered anew.
+    # Renumber all items: two items with one number would be ambiguous.
     numbered = [replace(item, seq=k) for k, item in enumerate([*made, *mission.items[items.behind :]], 1)]
     return renumbered(replace(mission, items=tuple(numbered)))
 
 
-def _items_of(mission: Mission, route: Route, survey: Survey) -> _Items:
-    """Where the items of a survey's lines stand, each with those that switch what is switched at its ends."""
+def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItems:
+    """Return the indices of a survey's items.
+
+    Each line includes the commands that switch something at its ends.
+    """
     at, count = {item.seq: k for k, item in enumerate(mission.items)}, len(mission.items)
     seqs = [int(seq) for seq in route.items]
 
@@ -139,7 +144,7 @@ def _items_of(mission: Mission, route: Route, survey: Survey) -> _Items:
 
     lines = []
     for line in survey.lines:
-        # What is merged with its first waypoint stands at the same place: a take-off, say, and a waypoint.
+        # An item merged with the line's first waypoint stands at the same place, such as a take-off before a waypoint.
         first = max(
             k for k in range(index(line.first), index(line.first + 1)) if is_navigation(mission.items[k].command)
         )
@@ -151,11 +156,11 @@ def _items_of(mission: Mission, route: Route, survey: Survey) -> _Items:
         lines.append((first, end))
     into, out = survey.lines[0], survey.lines[-1]
     before = min(index(into.begins), lines[0][0])
-    return _Items(tuple(lines), before, max(lines[-1][1], index(out.ends + 1)))
+    return _SurveyItems(tuple(lines), before, max(lines[-1][1], index(out.ends + 1)))
 
 
-def _place_of(mission: Mission, route: Route) -> dict[int, int]:
-    """The waypoint at which each step of the flight stands, by its number; that before for one without its own."""
+def _waypoint_of_item(mission: Mission, route: Route) -> dict[int, int]:
+    """Return the waypoint of each navigation item by its number, or the one before it if it has none."""
     own, here, out = {int(seq): i for i, seq in enumerate(route.items)}, 0, dict[int, int]()
     for item in mission.items:
         if is_navigation(item.command):
@@ -167,11 +172,14 @@ def _place_of(mission: Mission, route: Route) -> dict[int, int]:
 def _without_leads(
     mission: Mission, route: Route, items: Sequence[MissionItem], end: int, longest: float
 ) -> list[MissionItem]:
-    """Items beyond an end of a survey, without the waypoints that lead straight on from it: they are laid out anew.
+    """Return the items beyond an end of a survey without its lead waypoints.
 
-    end: the waypoint.  What is further away than the turn-arounds are long is on the way to the survey, and stays.
+    end: the waypoint at that end.
+
+    The new layout replaces those leads. Waypoints further away than the turn-arounds are long belong to the transit to
+    the survey and stay.
     """
-    points, places = route.waypoints[:, :2], _place_of(mission, route)
+    points, places = route.waypoints[:, :2], _waypoint_of_item(mission, route)
 
     def leads(item: MissionItem) -> bool:
         near = item.seq in places and math.dist(points[places[item.seq]], points[end]) <= longest
@@ -180,10 +188,10 @@ def _without_leads(
     return [item for item in items if not leads(item)]
 
 
-def _ordered(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
-    """Lines in the order of flight, each the other way round than the one before; the first as the first is.
+def _in_flying_order(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
+    """Return the lines in flying order, in alternating directions; the first line keeps its direction.
 
-    Those of a survey that keeps its order stay as they are.
+    The lines of a survey that keeps its order stay as they are.
     """
     if layout.every == 1 and layout.course is None and not layout.backwards:
         return list(lines)
@@ -204,7 +212,10 @@ def _ordered(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
 
 
 def _reversed(line: _Line) -> _Line:
-    """A line the other way round: its waypoints change places, what stands behind each stays where it is."""
+    """Return a line in the opposite direction.
+
+    Its waypoints swap places; the commands between them stay in place.
+    """
     steps = [item for item in line.items if is_navigation(item.command)]
     backwards = iter(reversed(steps))
     return _Line(
@@ -213,7 +224,7 @@ def _reversed(line: _Line) -> _Line:
 
 
 def _with_ends(line: _Line, turn_around: float, lead_in: float, origin: GeoOrigin) -> list[MissionItem]:
-    """A line's items between the waypoints at which its turn-arounds end and begin, and that of a longer lead."""
+    """Return a line's items with the waypoints of its turn-arounds and of a longer lead-in."""
     steps = [item for item in line.items if is_navigation(item.command)]
     into, out = line.corners[0] - line.corners[1], line.corners[-1] - line.corners[-2]
     into, out = (way / max(float(np.hypot(*way)), 1e-9) for way in (into, out))
@@ -224,16 +235,16 @@ def _with_ends(line: _Line, turn_around: float, lead_in: float, origin: GeoOrigi
 
 
 def _waypoint(like: MissionItem, place: Floats, origin: GeoOrigin) -> MissionItem:
-    """A plain waypoint at the height of another item."""
+    """Return a plain waypoint at the altitude of another item."""
     lat, lon = (on_grid(float(value)) for value in to_geo(origin, float(place[0]), float(place[1])))
     nothing = (0.0, 0.0, 0.0, like.params[3] if math.isnan(like.params[3]) else 0.0)
     return replace(like, command=int(Command.NAV_WAYPOINT), params=nothing, lat_deg=lat, lon_deg=lon)
 
 
-def _turned(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOrigin) -> list[_Line] | None:
-    """Lines on another course over the same area, which is the hull of the lines that there are."""
+def _with_course(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOrigin) -> list[_Line] | None:
+    """Return lines on another course over the hull of the present ones, or None if that is impossible."""
     ends = [item for line in lines for item in line.items if is_navigation(item.command)]
-    if len({(item.frame, item.alt) for item in ends}) != 1 or any(_bends(line.corners) for line in lines):
+    if len({(item.frame, item.alt) for item in ends}) != 1 or any(_is_bent(line.corners) for line in lines):
         return None
     hull = convex_hull(np.concatenate([line.corners for line in lines]))
     if hull is None:
@@ -246,23 +257,25 @@ def _turned(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOr
     pattern, out = lines[0], list[Floats]()
     for k in range(count):
         at = float(aside.min()) + margin + k * survey.spacing
-        crossed = _crossed(aside, along, at)
-        if crossed is None or crossed[1] - crossed[0] < _SHORTEST:
+        crossed = _crossing(aside, along, at)
+        if crossed is None or crossed[1] - crossed[0] < _MIN_LINE_LENGTH_M:
             continue
         out.append(np.array([at * right + metres * unit for metres in crossed]))
     if not out:
         return None
-    # It begins where it did: at the nearest end of the nearest line.
+    # The survey begins where it did before: at the nearest end of the nearest line.
     start = pattern.corners[0]
     if math.dist(out[-1].mean(axis=0), start) < math.dist(out[0].mean(axis=0), start):
         out.reverse()
     if math.dist(out[0][1], start) < math.dist(out[0][0], start):
         out = [places[::-1] for places in out]
-    return [_Line(places, _moved(pattern.items, places, origin)) for places in out]
+    return [_Line(places, _moved_items(pattern.items, places, origin)) for places in out]
 
 
 def convex_hull(points: Floats) -> Floats | None:
-    """Corners of the convex hull of (n, 2) points, counter-clockwise (Andrew 1979); None where all lie on a line.
+    """Return the corners of the convex hull of (n, 2) points, or None if all lie on a line.
+
+    The corners are in counter-clockwise order (Andrew 1979).
 
     >>> convex_hull(np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 0.5], [2.0, 2.0], [1.0, 0.0]])).tolist()
     [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]]
@@ -282,15 +295,15 @@ def convex_hull(points: Floats) -> Floats | None:
     return np.array(hull) if len(hull) > 2 else None
 
 
-def _bends(corners: Floats) -> bool:
-    """Whether a line strays from the straight one between its ends by more than its legs' rounding."""
+def _is_bent(corners: Floats) -> bool:
+    """Return True if a line deviates from the straight line between its ends by more than rounding."""
     start, step = corners[0], corners[-1] - corners[0]
     off = (corners - start) @ np.array([step[1], -step[0]]) / max(float(np.hypot(*step)), 1e-9)
-    return bool(np.abs(off).max() > _STRAIGHT)
+    return bool(np.abs(off).max() > _BEND_TOLERANCE_M)
 
 
-def _crossed(aside: Floats, along: Floats, at: float) -> tuple[float, float] | None:
-    """Where a line across a convex outline enters and leaves it, m along it; None where it does not."""
+def _crossing(aside: Floats, along: Floats, at: float) -> tuple[float, float] | None:
+    """Return where a line enters and leaves a convex outline, m along it, or None if it does not cross it."""
     found = []
     for k in range(len(aside)):
         one, other = aside[k - 1] - at, aside[k] - at
@@ -299,8 +312,8 @@ def _crossed(aside: Floats, along: Floats, at: float) -> tuple[float, float] | N
     return (min(found), max(found)) if len(found) >= 2 else None
 
 
-def _moved(items: Sequence[MissionItem], ends: Floats, origin: GeoOrigin) -> tuple[MissionItem, ...]:
-    """A line's items for another line: of its waypoints the first and the last, moved to its ends."""
+def _moved_items(items: Sequence[MissionItem], ends: Floats, origin: GeoOrigin) -> tuple[MissionItem, ...]:
+    """Return a line's items moved to another line: its first and last waypoint at the new ends, no others."""
     steps = [k for k, item in enumerate(items) if is_navigation(item.command)]
     out = []
     for k, item in enumerate(items):

@@ -1,1 +1,1 @@
-"""Mission files read and written: WPL 110, QGroundControl's .plan, fences and rally points."""
+"""Read and write mission files: WPL 110, QGroundControl's .plan, fences and rally points."""

@@ -1,4 +1,4 @@
-"""Mission files by suffix and content."""
+"""Read and write mission files, by suffix and content."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,8 +17,10 @@ from flight.mission_files.wpl import (
 from world.errors import MissionError
 from world.files import read_small_file, utf8_text
 
+# Forms of a mission file.
 FileKind = Literal["waypoints", "plan", "fence", "rally"]
 
+# Form that each suffix names.
 KINDS: dict[str, FileKind] = {
     ".waypoints": "waypoints",
     ".plan": "plan",
@@ -27,17 +29,19 @@ KINDS: dict[str, FileKind] = {
     ".rally": "rally",
 }
 
+# Function that writes each form.
 _WRITERS: dict[FileKind, Callable[[Mission], str]] = {
     "waypoints": waypoints_text,
     "plan": plan_file_text,
     "fence": fence_text,
     "rally": rally_text,
 }
-_UTF16 = (b"\xff\xfe", b"\xfe\xff")
+# Byte order marks of UTF-16.
+_UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 
 def mission_kind(path: Path) -> FileKind:
-    """Form that a file's suffix names.  Raises MissionError for any other suffix.
+    """Return the form that a file's suffix names. Raise MissionError for any other suffix.
 
     >>> mission_kind(Path("survey.plan")), mission_kind(Path("survey.txt"))
     ('plan', 'waypoints')
@@ -58,8 +62,8 @@ def mission_kind(path: Path) -> FileKind:
 def read_mission(path: Path) -> Mission:
     r"""Read a mission file: WPL 110 text (.waypoints, .txt, .fence, .rally) or a `.plan`.
 
-    The suffix must be known; where text and suffix disagree, the text decides.  Raises MissionError with one line:
-    file, line or field, value, what is allowed.
+    The suffix must be known; if text and suffix disagree, the text decides. Raise MissionError with one line: file,
+    line or field, value, allowed values.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -77,7 +81,7 @@ def read_mission(path: Path) -> Mission:
 
 
 def parse_mission(text: str, source: str) -> Mission:
-    """Read the text of a mission in either form; a `.plan` is the one that starts with a brace or bracket.
+    """Read the text of a mission in either form; a `.plan` starts with a brace or bracket.
 
     >>> parse_mission('{"fileType": "Plan"}', "a mission")
     Traceback (most recent call last):
@@ -92,9 +96,9 @@ def parse_mission(text: str, source: str) -> Mission:
 
 
 def read_fence(path: Path) -> tuple[MissionItem, ...]:
-    r"""Read the fence of a file: of a mission in either form, or a list of points as older tools write it.
+    r"""Read the fence of a file: of a mission in either form, or of a list of points from older tools.
 
-    Whatever else the file holds is left.  Raises MissionError as `read_mission` does, and where it holds no fence.
+    Other contents of the file are ignored. Raise MissionError as `read_mission` does, and for a file without a fence.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -112,9 +116,9 @@ def read_fence(path: Path) -> tuple[MissionItem, ...]:
 
 
 def mission_text(mission: Mission, kind: FileKind) -> str:
-    r"""Mission as the text of a file; the same mission always gives the same bytes.
+    r"""Return a mission as the text of a file; the same mission always gives the same bytes.
 
-    kind: "waypoints" (QGC WPL 110), "plan" (QGroundControl's JSON), or its "fence" or "rally" points alone, as WPL.
+    kind: "waypoints" (QGC WPL 110), "plan" (QGroundControl's JSON), or only its "fence" or "rally" points, as WPL.
 
     >>> mission = parse_mission("QGC WPL 110\n1 0 3 16 0 0 0 0 36.51 -84.2 100 1\n", "short.waypoints")
     >>> mission_text(mission, "waypoints").splitlines()[2].split()
@@ -127,7 +131,7 @@ def _read_text(path: Path) -> str:
     data = read_small_file(path, MAX_BYTES, "mission", MissionError)
     if not data.strip():
         raise MissionError(f"{path}: empty: a mission is expected", file=path)
-    if data.startswith(_UTF16):
+    if data.startswith(_UTF16_MARKS):
         raise MissionError(f"{path}: text in UTF-16: a mission file is UTF-8 or ASCII", file=path)
     if b"\0" in data:
         line = data.count(b"\n", 0, data.index(b"\0")) + 1

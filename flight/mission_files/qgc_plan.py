@@ -1,4 +1,4 @@
-"""The `.plan` JSON form of a mission (QGroundControl's "Plan File Format"): read, and written for QGC and MAVSDK.
+"""Read and write missions as `.plan` JSON (QGroundControl's "Plan File Format"), for QGC and MAVSDK.
 
 ComplexItems, such as surveys, are read as the simple items that they stand for.
 """
@@ -37,37 +37,42 @@ from world.scenario_file import first_fault
 # ----------------------------------------------------------------------
 # QGroundControl's ComplexItems as the simple items that they stand for.
 #
-# Surveys and corridor scans carry their items with them (TransectStyleComplexItem.Items); a fixed-wing landing pattern
-# is three items.  Anything else is a recipe that only its ground station can follow.
+# Surveys and corridor scans contain their items (TransectStyleComplexItem.Items); a fixed-wing landing pattern is three
+# items. Any other kind can be expanded only by its ground station.
 
-_TRANSECTS = ("survey", "CorridorScan")
-_LANDING = "fwLandingPattern"
-# QGC's altitude mode of a height given above terrain, which it sends as one above mean sea level.
-_CALCULATED = 3
-_COORDINATE = "latitude, longitude and altitude are expected"
+# Kinds of ComplexItem that contain their items.
+_TRANSECT_KINDS = ("survey", "CorridorScan")
+# Kind of ComplexItem of a fixed-wing landing.
+_LANDING_KIND = "fwLandingPattern"
+# QGC's altitude mode of a height above terrain, which it sends as an altitude AMSL.
+_ALTITUDE_ABOVE_TERRAIN_MODE = 3
+# Text for a missing coordinate.
+_COORDINATE_TEXT = "latitude, longitude and altitude are expected"
 
 
 def expand_items(items: list[Any], source: str, warnings: list[str], plans: list[SurveyPlan]) -> list[Any]:
-    """Items of a `.plan`, the complex ones replaced by what they stand for, with a warning for each.
+    """Return the items of a `.plan` with each ComplexItem replaced by its simple items.
 
-    plans: what it keeps of its surveys beside their items is added to them.
-    Raises MissionError for a kind that cannot be replaced, by name.  What an item holds is checked later.
+    Add a warning for each replaced item.
+
+    plans: list to which the settings of its surveys are added. Raise MissionError, naming the kind, for one that cannot
+        be expanded. The contents of an item are checked later.
     """
     out: list[Any] = []
     for k, item in enumerate(items):
         kind = item.get("type", "SimpleItem") if isinstance(item, dict) else "SimpleItem"
         if kind == "SimpleItem":
-            out.append(_as_written_now(item, f"{source}: mission.items.{k}", warnings))
+            out.append(_to_present_form(item, f"{source}: mission.items.{k}", warnings))
             continue
         place = f"mission.items.{k}"
         name = str(item.get("complexItemType", ""))[:40] if kind == "ComplexItem" else ""
-        if name in _TRANSECTS:
+        if name in _TRANSECT_KINDS:
             made = _transects(item, source, place, name)
             plans.append(_survey_plan(item["TransectStyleComplexItem"], made, f"{source}: {place}", warnings))
-        elif name == _LANDING:
+        elif name == _LANDING_KIND:
             made = _landing(item, source, place, _last_number(out) + 1)
         else:
-            known = f"only SimpleItem, {', '.join(_TRANSECTS)} and {_LANDING} are read"
+            known = f"only SimpleItem, {', '.join(_TRANSECT_KINDS)} and {_LANDING_KIND} are read"
             allowed = f"{known}; have the ground station turn it into items first"
             shown = f"{json.dumps(kind)[:40]} {name!r}"
             raise MissionError.at(source, f"{place}.type", name or kind, allowed, shown=shown)
@@ -76,12 +81,12 @@ def expand_items(items: list[Any], source: str, warnings: list[str], plans: list
     return out
 
 
-def _as_written_now(item: Any, place: str, warnings: list[str]) -> Any:
-    """A simple item as QGroundControl writes it now, of one that an older version wrote, or that lacks its height.
+def _to_present_form(item: Any, place: str, warnings: list[str]) -> Any:
+    """Convert a simple item of an older version, or without altitude, to QGroundControl's present form.
 
-    Until 2018 a place stood in ``coordinate``, beside four parameters (`MissionItem::_convertJsonV2ToV3`).  A height
-    that QGroundControl counts from the terrain is null in the parameters until it knows the terrain; it is ``Altitude``
-    above the ground at that place, which an item in a terrain frame is, too.
+    Until 2018 a position was in ``coordinate``, next to four parameters (`MissionItem::_convertJsonV2ToV3`). An
+    altitude that QGroundControl computes from the terrain is null in the parameters until it knows the terrain; it is
+    ``Altitude`` above the ground at that position, as in an item in a terrain frame.
     """
     if not isinstance(item, dict) or not isinstance(params := item.get("params"), list):
         return item
@@ -90,7 +95,7 @@ def _as_written_now(item: Any, place: str, warnings: list[str]) -> Any:
         return {**item, "params": [*params, *place_of_old]}
     height = item.get("Altitude")
     known = isinstance(height, int | float) and not isinstance(height, bool)
-    if len(params) == 7 and params[6] is None and item.get("AltitudeMode") == _CALCULATED and known:
+    if len(params) == 7 and params[6] is None and item.get("AltitudeMode") == _ALTITUDE_ABOVE_TERRAIN_MODE and known:
         warnings.append(f"{place}: its height is not calculated yet: taken as {height:g} m above the terrain there")
         return {**item, "frame": int(Frame.GLOBAL_TERRAIN_ALT), "params": [*params[:6], height]}
     return item
@@ -107,9 +112,9 @@ def _transects(item: dict[str, Any], source: str, place: str, name: str) -> list
 
 
 class _CameraCalc(BaseModel):
-    """QGC's camera of a survey (`CameraCalc.cc`): one that it knows by name, by its lens and sensor, or by nothing."""
+    """QGC's camera of a survey (`CameraCalc.cc`): known by name, by its lens and sensor, or not at all."""
 
-    # QGC writes whole numbers as such.
+    # QGC writes whole numbers as integers.
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True)
     SensorWidth: Annotated[float, Field(gt=0.0, le=1000.0)]
     SensorHeight: Annotated[float, Field(gt=0.0, le=1000.0)]
@@ -122,7 +127,7 @@ class _CameraCalc(BaseModel):
     MinTriggerInterval: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
 
     def camera(self) -> Camera:
-        """What it sees of level ground.  QGC takes the pixels of its longer side for square."""
+        """Return the camera's footprint on level ground. QGC assumes square pixels, from the longer side."""
         wide, high = self.SensorWidth / self.FocalLength, self.SensorHeight / self.FocalLength
         if self.ImageWidth is not None and self.ImageHeight is not None:
             high = wide * self.ImageHeight / self.ImageWidth
@@ -132,12 +137,12 @@ class _CameraCalc(BaseModel):
 
 
 def _survey_plan(held: dict[str, Any], items: list[Any], place: str, warnings: list[str]) -> SurveyPlan:
-    """What a survey keeps beside its items: how far its lines go on, and its camera where that is known."""
+    """Return the settings that a survey stores in addition to its items: line extension and camera."""
     beyond = held.get("TurnAroundDistance")
     if isinstance(beyond, bool) or not isinstance(beyond, int | float) or not 0.0 <= beyond <= 1e5:
         beyond = 0.0
     calc, camera = held.get("CameraCalc"), None
-    # One that QGC calls manual has distances alone.
+    # A camera that QGC calls manual has only distances.
     if isinstance(calc, dict) and calc.get("FocalLength") is not None:
         try:
             camera = _CameraCalc.model_validate(calc).camera()
@@ -150,7 +155,7 @@ def _survey_plan(held: dict[str, Any], items: list[Any], place: str, warnings: l
 
 
 def _trigger_distance(items: list[Any]) -> float:
-    """The longest way between photos that some items state, m; 0 where none does."""
+    """Return the longest distance between photos that items state, m, or 0 if none does."""
     found = [0.0]
     for item in items:
         params = item.get("params") if isinstance(item, dict) else None
@@ -162,13 +167,13 @@ def _trigger_distance(items: list[Any]) -> float:
 
 
 def _last_number(items: list[Any]) -> int:
-    """Number of the last item so far."""
+    """Return the number of the last item read."""
     number = items[-1].get("doJumpId") if items and isinstance(items[-1], dict) else None
     return number if isinstance(number, int) else len(items)
 
 
 def _landing(item: dict[str, Any], source: str, place: str, number: int) -> list[Any]:
-    """DO_LAND_START, the way in (a spiral down, or a waypoint), and LAND, as QGC sends them."""
+    """Return DO_LAND_START, the approach (a descending loiter or a waypoint) and LAND, as QGC sends them."""
 
     def read(key: str) -> list[Any] | None:
         return _coordinate(item, key, source, place)
@@ -177,7 +182,7 @@ def _landing(item: dict[str, Any], source: str, place: str, number: int) -> list
     land = read("landCoordinate")
     if approach is None or land is None:
         key = "landCoordinate" if land is None else "landingApproachCoordinate"
-        raise MissionError.at(source, f"{place}.{key}", None, _COORDINATE, shown="missing")
+        raise MissionError.at(source, f"{place}.{key}", None, _COORDINATE_TEXT, shown="missing")
     relative = item.get("altitudesAreRelative", True)
     frame = Frame.GLOBAL_RELATIVE_ALT if relative else Frame.GLOBAL
     radius = item.get("loiterRadius", 0.0)
@@ -212,13 +217,16 @@ def _coordinate(item: dict[str, Any], key: str, source: str, place: str) -> list
     if value is None:
         return None
     if not isinstance(value, list) or len(value) != 3 or None in value:
-        raise MissionError.at(source, f"{place}.{key}", value, _COORDINATE, shown=json.dumps(value)[:40])
+        raise MissionError.at(source, f"{place}.{key}", value, _COORDINATE_TEXT, shown=json.dumps(value)[:40])
     return value
 
 
-_HOVER_SPEED = 5  # QGC's own default; a fixed wing has none
-_CRUISE_SPEED = 15.0  # QGC's own default
-_FASTEST = 1000.0  # m/s
+# QGC's default hover speed, m/s; a fixed wing has none.
+_HOVER_SPEED_MPS = 5
+# QGC's default cruise speed, m/s.
+_CRUISE_SPEED_MPS = 15.0
+# Largest speed that is read, m/s.
+_MAX_SPEED_MPS = 1000.0
 
 
 class _Table(BaseModel):
@@ -226,13 +234,16 @@ class _Table(BaseModel):
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True, strict=True)
 
 
+# A finite number in the range of a float32.
 _Number = Annotated[float, Field(ge=-3.5e38, le=3.5e38)]
+# A number, or null where unset.
 _Unset = _Number | None
+# Latitude and longitude.
 _Pair = Annotated[list[_Number], Field(min_length=2, max_length=2)]
 
 
 class _Item(_Table):
-    # A ComplexItem has none of a SimpleItem's keys; `_check_kind` speaks first.
+    # A ComplexItem has none of a SimpleItem's keys; `_check_kind` reports it first.
     autoContinue: bool = True
     command: Annotated[int, Field(ge=0, le=65535)]
     doJumpId: Annotated[int, Field(ge=0, le=65535)] | None = None
@@ -242,7 +253,7 @@ class _Item(_Table):
 
 class _Mission(_Table):
     version: Annotated[int, Field(ge=2, le=2)]
-    cruiseSpeed: Annotated[float, Field(ge=0.0, le=_FASTEST)] | None = None
+    cruiseSpeed: Annotated[float, Field(ge=0.0, le=_MAX_SPEED_MPS)] | None = None
     firmwareType: int | None = None
     vehicleType: int | None = None
     plannedHomePosition: Annotated[list[_Unset], Field(min_length=3, max_length=3)] | None = None
@@ -281,7 +292,7 @@ class _File(_Table):
     rallyPoints: _Rally = _Rally()
 
 
-# What a plan can be for that is no fixed wing, by MAV_TYPE (MAVLink's common.xml).
+# Vehicles other than fixed wings, by MAV_TYPE (MAVLink's common.xml).
 _OTHER_VEHICLES = (
     ((2, 3, 4, 13, 14, 15, 29, 35, 43), "a multicopter or helicopter"),
     ((7, 8), "a balloon or airship"),
@@ -290,27 +301,27 @@ _OTHER_VEHICLES = (
     ((19, 20, 21, 22, 23, 24, 25), "a VTOL aircraft"),
 )
 # MAV_TYPE_GENERIC and MAV_TYPE_FIXED_WING.
-_FIXED_WINGS = (0, 1)
-# Autopilots by MAV_AUTOPILOT (MAVLink's minimal.xml), as scenarios name them: ArduPilot and PX4.
+_FIXED_WING_TYPES = (0, 1)
+# Autopilots by MAV_AUTOPILOT (MAVLink's minimal.xml), with their names in scenarios: ArduPilot and PX4.
 _FIRMWARES = {3: "ardupilot", 12: "px4"}
 # MAV_AUTOPILOT_GENERIC and MAV_AUTOPILOT_INVALID, which name no autopilot.
-_NO_FIRMWARE = (0, 8)
+_UNNAMED_FIRMWARES = (0, 8)
 
 
 def _check_vehicle(kind: int | None, source: str) -> None:
-    """Raise MissionError for a plan that was made for another kind of vehicle than an aeroplane."""
+    """Raise MissionError for a plan that was made for a vehicle other than an airplane."""
     for kinds, name in _OTHER_VEHICLES:
         if kind in kinds:
             allowed = f"{name}: planfly flies fixed-wing aircraft (1)"
             raise MissionError.at(source, "mission.vehicleType", kind, allowed)
-    if kind is not None and kind not in _FIXED_WINGS:
+    if kind is not None and kind not in _FIXED_WING_TYPES:
         allowed = "another vehicle (MAV_TYPE): planfly flies fixed-wing aircraft (1)"
         raise MissionError.at(source, "mission.vehicleType", kind, allowed)
 
 
 def _autopilot(firmware: int | None, source: str) -> str:
-    """Return the autopilot that a firmwareType names, "" for none.  Raises MissionError for one that is not flown."""
-    if firmware is None or firmware in _NO_FIRMWARE:
+    """Return the autopilot that a firmwareType names, "" for none. Raise MissionError for an unknown one."""
+    if firmware is None or firmware in _UNNAMED_FIRMWARES:
         return ""
     if firmware not in _FIRMWARES:
         allowed = "another autopilot (MAV_AUTOPILOT): 3 (ArduPilot), 12 (PX4) or 0 (not stated) is expected"
@@ -321,8 +332,8 @@ def _autopilot(firmware: int | None, source: str) -> str:
 def parse_plan_file(text: str, source: str) -> Mission:
     """Read the text of a `.plan` file; ``source`` names it in messages.
 
-    Items are counted as QGroundControl counts them, from 1 by their order; a jump goes to the item whose doJumpId it
-    names.  null is NaN.  Raises MissionError with file, field, value and what is allowed.
+    Items are numbered as in QGroundControl, from 1 by their order; a jump leads to the item whose doJumpId it names.
+    null is NaN. Raise MissionError with file, field, value and allowed values.
     """
     try:
         data = json.loads(text.removeprefix("\ufeff"), parse_constant=_refuse_constant)
@@ -367,7 +378,10 @@ def parse_plan_file(text: str, source: str) -> Mission:
 
 
 def _check_kind(data: Any, source: str) -> tuple[list[str], list[SurveyPlan]]:
-    """Refuse what is no plan before its missing keys are named, and expand its items; gives warnings and surveys."""
+    """Refuse data that is not a plan before its missing keys are named, and expand its items.
+
+    Return warnings and survey settings.
+    """
     if not isinstance(data, dict):
         message = f'{source}: a JSON object with fileType "Plan" is expected, got {type(data).__name__}'
         raise MissionError(message, file=source, field="fileType")
@@ -448,12 +462,12 @@ def _read_rally(rally: _Rally, source: str) -> tuple[MissionItem, ...]:
 
 
 def plan_file_text(mission: Mission) -> str:
-    """Mission as a `.plan` file; the same mission always gives the same bytes.
+    """Return a mission as the text of a `.plan` file; the same mission always gives the same bytes.
 
-    cruiseSpeed is the mission's, or its first DO_CHANGE_SPEED, or QGC's default.  It is written in whole m/s, as
-    hoverSpeed is: they are integers in Mission Planner's `MissionFile.Mission`, whose reader refuses "25.0"; QGC takes
-    both for numbers, and sends neither to an aircraft.  firmwareType is the mission's autopilot's, 0 for planfly's own
-    guidance, which no ground station knows.
+    cruiseSpeed is the mission's speed, or its first DO_CHANGE_SPEED, or QGC's default. It is written in whole m/s, as
+    hoverSpeed is: they are integers in Mission Planner's `MissionFile.Mission`, whose reader refuses "25.0"; QGC reads
+        both as numbers, and sends neither to an aircraft. firmwareType is that of the mission's autopilot, 0 for
+        planfly's own guidance, which no ground station knows.
     """
     mission = renumbered(mission)
     home = mission.home or Home(0.0, 0.0, 0.0)
@@ -467,7 +481,7 @@ def plan_file_text(mission: Mission) -> str:
             "firmwareType": next((one for one, name in _FIRMWARES.items() if name == mission.autopilot), 0),
             # 0: mixed.
             "globalPlanAltitudeMode": modes[0] if len(modes) == 1 else 0,
-            "hoverSpeed": _HOVER_SPEED,
+            "hoverSpeed": _HOVER_SPEED_MPS,
             "items": [_item_json(item) for item in mission.items],
             "plannedHomePosition": [home.lat_deg, home.lon_deg, home.alt],
             "vehicleType": 1,
@@ -483,7 +497,7 @@ def plan_file_text(mission: Mission) -> str:
 
 
 def _altitude_mode(frame: int) -> int:
-    """QGC's altitude mode of a frame: 1 relative to home, 2 above mean sea level, 4 above terrain."""
+    """Return QGC's altitude mode of a frame: 1 relative to home, 2 above mean sea level, 4 above terrain."""
     return 1 if frame in OVER_HOME else 2 if frame in AMSL else 4
 
 
@@ -495,9 +509,9 @@ def _cruise_speed(mission: Mission) -> float:
     if mission.cruise_speed is not None:
         return mission.cruise_speed
     for item in mission.items:
-        if item.command == Command.DO_CHANGE_SPEED and 0.0 < item.params[1] <= _FASTEST:
+        if item.command == Command.DO_CHANGE_SPEED and 0.0 < item.params[1] <= _MAX_SPEED_MPS:
             return item.params[1]
-    return _CRUISE_SPEED
+    return _CRUISE_SPEED_MPS
 
 
 def _item_json(item: MissionItem) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""ArduPilot's text formats: QGC WPL 110 missions (`.waypoints`), and the fence files of its older tools."""
+"""Read and write ArduPilot's text formats: QGC WPL 110 missions, and fence files of its older tools."""
 
 import math
 import re
@@ -28,17 +28,19 @@ from world.errors import MissionError
 from world.files import TextLine
 
 # ----------------------------------------------------------------------
-# The QGC WPL 110 text form of a mission (`.waypoints`): read as people write it, written for the strictest reader.
+# The QGC WPL 110 text form of a mission (`.waypoints`): read leniently, written for the strictest reader.
 #
-# A header line, then twelve columns a line: seq, current, frame, command, p1..p4, latitude, longitude, altitude,
-# autocontinue (MAVLink file formats, "Plain-Text File Format").  Line 0 is home whatever command it has, and is not
-# flown.  A file whose first line has another number has no home: Mission Planner puts an empty one before it, and so
-# does planfly; QGroundControl and MAVProxy take even that line for home.
+# A header line, then twelve columns per line: seq, current, frame, command, p1..p4, latitude, longitude, altitude,
+# autocontinue (MAVLink file formats, "Plain-Text File Format"). Line 0 is home whatever its command, and is not flown.
+# A file whose first line has another number has no home: Mission Planner inserts an empty one, and so does planfly;
+# QGroundControl and MAVProxy take even that line for home.
 
+# First line of the file.
 HEADER = "QGC WPL 110"
-# Lines of a file, comments and empty ones included: ten an item.
+# Largest number of lines in a file, comments and empty lines included: ten per item.
 MAX_LINES = 10 * MAX_ITEMS
 
+# Columns of a line.
 _COLUMNS = (
     "seq",
     "current",
@@ -53,11 +55,20 @@ _COLUMNS = (
     "altitude",
     "autocontinue",
 )
-_WHOLE = re.compile(r"[+-]?[0-9]{1,10}")
+# A whole number.
+_WHOLE_NUMBER = re.compile(r"[+-]?[0-9]{1,10}")
+# A decimal number.
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-# What files of their own hold, beside missions.
-_APART = FENCES | {Command.NAV_RALLY_POINT}
-_ALLOWED = {"seq": (0, 65535), "current": (0, 1), "frame": (0, 255), "command": (0, 65535), "autocontinue": (0, 1)}
+# Commands that also have files of their own.
+_COMMANDS_WITH_OWN_FILES = FENCES | {Command.NAV_RALLY_POINT}
+# Range of each column of whole numbers.
+_ALLOWED_RANGES = {
+    "seq": (0, 65535),
+    "current": (0, 1),
+    "frame": (0, 255),
+    "command": (0, 65535),
+    "autocontinue": (0, 1),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,11 +83,10 @@ class _Row:
 def parse_waypoints(text: str, source: str) -> Mission:
     """Read the text of a WPL 110 file; ``source`` names it in messages.
 
-    Taken as found: CRLF, spaces for TABs, '#' comments and empty lines, gaps in seq, no current item, more than seven
-    decimals (rounded to the 1e-7 degrees that MISSION_ITEM_INT carries).  Items are counted by their lines, as Mission
-    Planner, QGroundControl and MAVProxy count them, and so are the targets of jumps: seq says nothing, beside whether
-    the first line is home's.
-    Raises MissionError with file, line, field, value and what is allowed.
+    Accepted: CRLF, spaces for TABs, '#' comments and empty lines, gaps in seq, no current item, more than seven
+    decimals (rounded to the 1e-7 degrees that MISSION_ITEM_INT carries). Items are numbered by their lines, as in
+    Mission Planner, QGroundControl and MAVProxy, and so are the targets of jumps: seq only shows whether the first line
+    is home. Raise MissionError with file, line, field, value and allowed values.
     """
     breaks = max(text.count("\n"), text.count("\r"))
     if breaks > MAX_LINES:
@@ -103,12 +113,12 @@ def parse_waypoints(text: str, source: str) -> Mission:
     if not rows:
         raise MissionError(f"{source}: no items after the header", file=source)
     warnings = _warnings(rows, *_split_home(rows))
-    home, body = _split_home(_counted(rows))
+    home, body = _split_home(_renumbered_rows(rows))
     fences = numbered([row.item for row in body if row.item.command in FENCES])
     fence_shapes(fences, source)
     return Mission(
         home=home,
-        items=tuple(row.item for row in body if row.item.command not in _APART),
+        items=tuple(row.item for row in body if row.item.command not in _COMMANDS_WITH_OWN_FILES),
         fences=fences,
         rally=numbered([row.item for row in body if row.item.command == Command.NAV_RALLY_POINT]),
         warnings=tuple(warnings),
@@ -123,7 +133,7 @@ def _row(where: TextLine, line: str) -> _Row:
             f"{where}: {len(fields)} columns: {len(_COLUMNS)} are expected ({', '.join(_COLUMNS)})", file=where.file
         )
     values = dict(zip(_COLUMNS, fields, strict=True))
-    integers = {name: _integer(where, name, values[name]) for name in _ALLOWED}
+    integers = {name: _integer(where, name, values[name]) for name in _ALLOWED_RANGES}
     p1, p2, p3, p4, lat, lon, alt = (_number(where, name, values[name]) for name in _COLUMNS[4:11])
     # A home line of Mission Planner may carry command 0.
     command = integers["command"] or (Command.NAV_WAYPOINT if integers["seq"] == 0 else 0)
@@ -152,8 +162,8 @@ def _refused(where: TextLine, field: str, value: str | int, shown: str, allowed:
 
 
 def _integer(where: TextLine, name: str, text: str) -> int:
-    low, high = _ALLOWED[name]
-    if not _WHOLE.fullmatch(text) or not low <= int(text) <= high:
+    low, high = _ALLOWED_RANGES[name]
+    if not _WHOLE_NUMBER.fullmatch(text) or not low <= int(text) <= high:
         raise _refused(where, name, text, _shown(text), f"a whole number {low}..{high} is expected")
     return int(text)
 
@@ -166,15 +176,18 @@ def _number(where: TextLine, name: str, text: str) -> float:
     return float(text) + 0.0
 
 
-def _counted(rows: list[_Row]) -> list[_Row]:
-    """The rows with their items numbered by where they stand; without a home line the first is number 1."""
-    first = 0 if _begins_with_home(rows) or rows[0].item.command in _APART else 1
+def _renumbered_rows(rows: list[_Row]) -> list[_Row]:
+    """Return the rows with items numbered by their lines; without a home line the first is number 1."""
+    first = 0 if _begins_with_home(rows) or rows[0].item.command in _COMMANDS_WITH_OWN_FILES else 1
     return [replace(row, item=replace(row.item, seq=seq)) for seq, row in enumerate(rows, first)]
 
 
 def _begins_with_home(rows: list[_Row]) -> bool:
-    """Whether the first line is home's: fences and rally points have files without one, as MAVProxy writes them."""
-    return rows[0].item.seq == 0 and rows[0].item.command not in _APART
+    """Return True if the first line is home.
+
+    Files of fences and rally points may have no home line, as MAVProxy writes them.
+    """
+    return rows[0].item.seq == 0 and rows[0].item.command not in _COMMANDS_WITH_OWN_FILES
 
 
 def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
@@ -188,8 +201,8 @@ def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
 
 def _warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> list[str]:
     found: list[str] = []
-    if all(row.item.command in _APART for row in body):
-        # A fence or rally file: no home line, as MAVProxy has it, or one, as Mission Planner does.
+    if all(row.item.command in _COMMANDS_WITH_OWN_FILES for row in body):
+        # A fence or rally file may have a home line, as Mission Planner writes it, or none, as MAVProxy does.
         return found
     if not any(row.current for row in rows):
         found.append("no current item: flown from the first")
@@ -224,20 +237,23 @@ def _warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> list[str
 
 
 def waypoints_text(mission: Mission) -> str:
-    """Mission's items as a WPL 110 file: TABs, LF, coordinates with at least eight decimals.
+    """Return a mission's items as a WPL 110 file: TABs, LF, coordinates with at least eight decimals.
 
-    A NaN is written as 0, which is what this form has for "unset".  Fences and rally points have files of their own.
+    A NaN is written as 0, which is this form's value for "unset". Fences and rally points have files of their own.
     """
     return _text(mission.home, renumbered(mission).items)
 
 
 def fence_text(mission: Mission) -> str:
-    """Fences of a mission as a WPL file of their own: numbered from 0, and no home line (MAVProxy's `fence load`)."""
+    """Return the fences of a mission as a WPL file: numbered from 0, without a home line.
+
+    MAVProxy's `fence load` reads this form.
+    """
     return _lines(mission.fences)
 
 
 def rally_text(mission: Mission) -> str:
-    """Rally points of a mission as a WPL file of their own: numbered from 0, and no home line."""
+    """Return the rally points of a mission as a WPL file: numbered from 0, without a home line."""
     return _lines(mission.rally)
 
 
@@ -260,7 +276,10 @@ def _line(item: MissionItem, *, current: bool) -> str:
 
 
 def _decimal(value: float, places: int) -> str:
-    """Text of a number that reads back to the same double, without an exponent, with at least so many decimals."""
+    """Return a number as text that reads back to the same double, without an exponent.
+
+    places: smallest number of decimals.
+    """
     if math.isnan(value):
         value = 0.0
     whole, _, part = format(Decimal(repr(value + 0.0)), "f").partition(".")
@@ -273,18 +292,18 @@ def _shown(text: str) -> str:
 
 
 # ----------------------------------------------------------------------
-# The fence files of ArduPilot's older tools: a latitude and a longitude a line.
+# The fence files of ArduPilot's older tools: a latitude and a longitude per line.
 #
-# MAVProxy's ``fence save`` and Mission Planner wrote them so before fences became mission items (pymavlink's
-# `MAVFenceLoader`): first the point to return to, then the corners of one inclusion polygon, the first of them again
-# last.
+# MAVProxy's ``fence save`` and Mission Planner wrote them before fences became mission items (pymavlink's
+# `MAVFenceLoader`): first the return point, then the corners of one inclusion polygon, ending with the first of them
+# again.
 
-# Corners of such a fence at most: ArduPilot numbered them in a byte.
+# Largest number of points in such a fence: ArduPilot numbered them in a byte.
 MAX_POINTS = 255
 
 
 def is_point_list(text: str) -> bool:
-    r"""Whether a fence's text begins with a number, as no other form of a fence does.
+    r"""Return True if a fence's text begins with a number, as no other form of a fence does.
 
     >>> is_point_list("# saved\n36.5 -84.2\n"), is_point_list("QGC WPL 110\n")
     (True, False)
@@ -297,10 +316,10 @@ def is_point_list(text: str) -> bool:
 
 
 def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
-    r"""Items of the polygon in such a file; ``source`` names it in messages.
+    r"""Return the items of the polygon in such a file; ``source`` names it in messages.
 
-    The return point is no zone and is left out; a file without one, whose first point is its last, is taken as found.
-    Raises MissionError with file, line, value and what is allowed.
+    The return point is not part of the zone and is left out; a file without one, whose first point is its last, is
+    accepted. Raise MissionError with file, line, value and allowed values.
 
     >>> square = ["36.505 -84.195", "36.5 -84.2", "36.5 -84.19", "36.51 -84.19", "36.51 -84.2", "36.5 -84.2"]
     >>> [(item.command, item.params[0], item.lat_deg) for item in parse_fence_points("\n".join(square), "fence.txt")]
@@ -322,7 +341,7 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
 
 
 def _fence_lines(text: str) -> list[tuple[int, str]]:
-    """Lines that say something, with their numbers."""
+    """Return the lines that are neither empty nor comments, with their numbers."""
     lines = enumerate(text.removeprefix("\ufeff").splitlines(), 1)
     return [(number, line.strip()) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
 

@@ -1,1 +1,1 @@
-"""A flight from a trimmed start to its end: the loop, its tick, its wind and its track."""
+"""Simulation of a flight from a trimmed start to its end: loop, tick, wind and track."""

@@ -1,7 +1,7 @@
-"""An aircraft in the air, whoever steers it: its start, its ground and wind, and how long it may fly.
+"""A simulated aircraft for any autopilot: its start, its ground and wind, and its time limit.
 
-`flight.simulation.simulate.Flight` steers it by an autopilot's law, a `flight.autopilots.program.ProgramFlight` by a
-program of its own.
+`flight.simulation.simulate.Flight` steers it by an autopilot's control law, a `flight.autopilots.program.ProgramFlight`
+by a program of its own.
 """
 
 import math
@@ -34,21 +34,22 @@ from world.wind import W20
 Floats = NDArray[np.float64]
 
 
-# A flight may take this much longer than its length over its slowest ground speed, s on top.
+# Time limit of a flight, as a multiple of its length at its lowest ground speed.
 PATIENCE = 1.5
+# Time added to that limit, s.
 PATIENCE_SECONDS = 60.0
 
 
 class Airborne(ABC):
     """One flight in progress, advanced by `block`.
 
-    dt: of a tick, s.
-    setup: with the program that flies it, once that has said which it is.
-    path: that it is to follow.
-    map: from JSBSim's positions, around area and route.
-    memory: guidance's, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
-    fdm: the aircraft that flies.
-    max_ticks: after so many its time is up.
+    dt: duration of a tick, s.
+    setup: the flight's setup, with the program that flies it once that is known.
+    path: reference path.
+    map: local map from JSBSim's positions, around area and route.
+    memory: memory of the guidance, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
+    fdm: the simulated aircraft.
+    max_ticks: time limit, ticks.
     """
 
     def __init__(
@@ -61,10 +62,11 @@ class Airborne(ABC):
         start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
         gear: Gear | None = None,
     ) -> None:
-        """Load it: local_map is the setup's where another flight of it has fitted one already.
+        """Load the flight.
 
-        start_offset: east, north and up from the route's first waypoint to where the flight begins, m.
-        gear: what it meets the ground with; None for a flight that does not.
+        local_map: local map of the setup, if another flight of it has fitted one already.
+        start_offset: east, north and up from the route's first waypoint to the start of the flight, m.
+        gear: gear for ground contact; None for a flight without any.
         """
         self._start_offset = start_offset
         self._ground = Ground(setup.scenario.terrain)
@@ -76,9 +78,9 @@ class Airborne(ABC):
         self.fdm = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=braking, variation=variation, gear=gear)
 
     def _lay_out(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
-        """Make the workspace for a route, and say how long it may take."""
+        """Make the workspace for a route, and set the flight's time limit."""
         self.setup, self.map = setup, local_map
-        # An autopilot that turns by a law of its own does not follow the arcs behind waypoints that are flown over.
+        # An autopilot with its own turn law does not follow the arcs after waypoints that are flown over.
         follows = setup.autopilot.follows_path and setup.autopilot.keeps_to_arcs
         follows = follows or not setup.route.fly_over.any()
         self.path = (
@@ -97,13 +99,13 @@ class Airborne(ABC):
         self._work.settings.slowest = 0.94 * aircraft.stall_speed
         self._work.settings.middle = self.map.middle
         self._work.settings.battery = setup.battery
-        length = self.path.length + _wider_circles(setup, waypoints)
+        length = self.path.length + _extra_loiter_length(setup, waypoints)
         patience = PATIENCE * length / _slowest_leg(setup, self._airspeeds) + PATIENCE_SECONDS
-        # A loiter for a time lasts as long as its item says, whatever circle is drawn for it.
+        # A loiter for a time lasts as long as its item states, whatever circle is laid out for it.
         timed = waypoints[(waypoints["stays"] > 0.0) & (waypoints["stays"] < math.inf)]
         patience += sum(dict(zip(timed["item"].tolist(), timed["stays"].tolist(), strict=True)).values())
         if setup.route.return_to is not None:
-            # An autopilot that returns by a law of its own may circle longer than its path does.
+            # An autopilot that returns by its own control law may loiter longer than the path does.
             wider = true_by_equivalent(setup.route.return_to.up) ** 2
             patience += longest_circling(wider * setup.route.return_to.radius)
         if waypoints["ends"][-1]:
@@ -111,21 +113,21 @@ class Airborne(ABC):
         self.max_ticks = int(patience / self.dt)
 
     def _law(self, setup: FlightSetup) -> Autopilot:
-        """What keeps its record in the workspace."""
+        """Return the autopilot that keeps its record in the workspace."""
         return setup.autopilot
 
     @property
     def position(self) -> Floats:
-        """Where the aircraft was a tick ago: (3,) east, north and up, m."""
+        """Position of the aircraft one tick ago: (3,) east, north and up, m."""
         true = self._work.true
         return np.array([true.east, true.north, true.up])
 
     @abstractmethod
     def _fly(self, count: int) -> int:
-        """Fly up to a number of ticks into the workspace's rows; return the last one's status, 0 to fly on."""
+        """Fly up to a number of ticks into the workspace's rows; return the last tick's status, 0 to fly on."""
 
     def _disturb(self, setup: FlightSetup) -> None:
-        """Set the wind, and start turbulence and navigation's error."""
+        """Set the wind, and start turbulence and navigation error."""
         wind, work = setup.scenario.wind, self._work
         to = wind.to_course
         w20 = W20[wind.turbulence]
@@ -140,19 +142,19 @@ class Airborne(ABC):
             start_navigation(self._navigation_random.standard_normal(6), work.navigation)
 
     def _start(self, setup: FlightSetup) -> Start:
-        """Where the route begins.  Raises StartError for a place that is not above the terrain."""
+        """Return the start of the route. Raise StartError for a place that is not above the terrain."""
         airspeed = float(self._airspeeds[0])
         return find_start(setup, self.map, self._ground, self.fdm.aircraft, airspeed, self._start_offset)
 
     def _trim(self, source: str, start: Start) -> Trim:
-        """Begin trimmed, in the start's wind.  Raises StartError."""
+        """Start trimmed, in the start's wind. Raise StartError."""
         trimmed = start_trimmed(self.fdm, source, start)
         self._work.commands = tuple(trimmed.commands())
         self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
         return trimmed
 
     def block(self, count: int) -> tuple[Rows, str]:
-        """Fly up to ``count`` ticks: their rows, and how the flight ended ("" while it goes on)."""
+        """Fly up to ``count`` ticks; return their rows, and how the flight ended ("" if it goes on)."""
         parts: list[Rows] = []
         ended = ""
         while count > 0 and not ended:
@@ -162,7 +164,7 @@ class Airborne(ABC):
         return (parts[0] if len(parts) == 1 else join_rows(parts)), ended
 
     def _fill_workspace(self, count: int) -> tuple[Rows, str]:
-        """Fly up to ``count`` ticks, as many as the workspace has rows at most: as `block`."""
+        """Fly up to ``count`` ticks, at most one workspace of rows; return values as for `block`."""
         space = self._workspace
         space.turbulence[:count] = self._random.standard_normal((count, 3))
         if self._navigation_random is not None:
@@ -174,11 +176,11 @@ class Airborne(ABC):
         if status:
             return rows, ENDS[status]
         if left <= count:
-            return rows, self._unfinished()
+            return rows, self._timeout_text()
         return rows, ""
 
-    def _unfinished(self) -> str:
-        """What a flight that takes too long was doing: circling at a loiter, or anything else."""
+    def _timeout_text(self) -> str:
+        """Describe a flight that exceeded its time limit: loitering at an item, or anything else."""
         route, ahead = self.setup.route, min(int(self.memory.leg) + 1, self.setup.route.legs)
         seconds = f"not finished after {self.max_ticks * self.dt:.0f} s"
         if route.arcs[ahead] > 0.0 and route.return_from < 0:
@@ -186,24 +188,25 @@ class Airborne(ABC):
         return f"time limit: {seconds}"
 
 
-def _wider_circles(setup: FlightSetup, waypoints: Records) -> float:
-    """Length (m) of circles too tight for the bank beyond what is drawn of them.
+def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
+    """Return the extra length (m) of loiters too tight for the bank limit, beyond their laid-out length.
 
-    An autopilot that flies at a circle's middle goes around it as wide as the bank makes it, and once more until what
-    follows lies ahead.  Circles that the wind leaves no way around add nothing: no time is long enough for them.
+    An autopilot that steers to a loiter's center flies around it as wide as the bank limit requires, and once more
+    until the next waypoint lies ahead. Loiters that cannot be flown in this wind add nothing: no time limit is long
+    enough.
 
-    waypoints: of the route, (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    waypoints: waypoints of the route, (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     """
     if not setup.autopilot.loiter_rules.at_middle:
         return 0.0
     longer = dict[int, float]()
     circles = waypoints[waypoints["circle"] != 0.0]
-    # A circle's waypoints are alike in all that counts here.
+    # Waypoints of one loiter that agree in these fields are processed once.
     alike = np.unique(circles[["item", "circle", "airspeed", "up"]], return_index=True)[1]
     for waypoint in circles[alike]:
         drawn, speed, up = abs(float(waypoint["circle"])), float(waypoint["airspeed"]), float(waypoint["up"])
         held = max(setup.limits.turn_radius(course, course + math.pi, up, speed) for course in (0.0, math.pi))
-        # Autopilots keep an equivalent airspeed: what they fly is faster, as the air is thinner.
+        # Autopilots keep an equivalent airspeed: the true airspeed is higher in thinner air.
         held *= true_by_equivalent(up) ** 2
         if drawn < held < math.inf and not waypoint["returns"]:
             more = 2.0 * math.pi * (float(waypoint["turns"]) * (held - drawn) + held)
@@ -212,7 +215,7 @@ def _wider_circles(setup: FlightSetup, waypoints: Records) -> float:
 
 
 def _slowest_leg(setup: FlightSetup, airspeeds: Floats) -> float:
-    """Least ground speed on any leg in the mean wind at its heights, m/s, at least 3."""
+    """Return the lowest ground speed on any leg in the mean wind at its altitudes, m/s, at least 3."""
     limits: Limits = setup.limits
     points, courses = setup.route.waypoints, leg_courses(setup.route.waypoints)
     tables = {airspeed: limits.performance(airspeed) for airspeed in set(airspeeds.tolist())}

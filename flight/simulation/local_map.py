@@ -1,6 +1,6 @@
-"""The map and the ground around one flight, as the compiled loop needs them.
+"""Local map and ground around one flight, in the form that the compiled loop needs.
 
-JSBSim gives latitudes and longitudes; everything else knows positions on the map.
+JSBSim provides latitudes and longitudes; all other code uses positions on the map.
 """
 
 import math
@@ -16,19 +16,19 @@ from world.terrain import Heights, Terrain
 
 Floats = NDArray[np.float64]
 
-# The local map extends this far (m) beyond the area and the route.
+# Margin of the local map around the area and the route, m.
 MAP_BUFFER = 5000.0
-# Worst error of the local map that a flight accepts, m and rad.
+# Largest errors of the local map that a flight accepts, m and rad.
 WORST = (0.01, 1e-6)
 
 
 @dataclass(frozen=True, slots=True)
 class LocalMap:
-    """From geodetic radians to the map, fitted around one flight: a copy of the projection that compiled code takes.
+    """Map projection of geodetic radians for compiled code, fitted around one flight.
 
     position: (latitude, longitude) to (east, north).
     angle: (latitude, longitude) to the map course of true north (rad), and 0.
-    middle: longitude of its middle, rad; longitudes are taken within half a turn of it.
+    middle: longitude of its center, rad; longitudes are taken within half a turn of it.
     """
 
     position: PolyMap
@@ -37,16 +37,17 @@ class LocalMap:
 
     @staticmethod
     def around(setup: FlightSetup) -> "LocalMap":
-        """Fit the area and the route with `MAP_BUFFER` around them; 0.1 mm and 1e-9 rad on areas up to 600 km wide.
+        """Fit the area and the route with a margin of `MAP_BUFFER`.
 
-        Raises FlightError where the map cannot be fitted: an area about a pole.
+        The error is 0.1 mm and 1e-9 rad on areas up to 600 km wide. Raise FlightError if the map cannot be fitted: an
+        area about a pole.
         """
         origin: GeoOrigin = setup.scenario.origin
         points = np.concatenate([setup.route.waypoints[:, :2], setup.scenario.bounds.T])
         low, high = points.min(axis=0) - MAP_BUFFER, points.max(axis=0) + MAP_BUFFER
         outline = np.array([[e, n] for e in (low[0], 0.5 * (low[0] + high[0]), high[0]) for n in (low[1], high[1])])
         lat, lon = (np.radians(values) for values in to_geo(origin, outline[:, 0], outline[:, 1]))
-        # Longitudes about the origin's, so that an area may lie across the 180th meridian.
+        # Longitudes relative to the origin's, so that an area may include the 180th meridian.
         here = math.radians(origin.lon_deg)
         lon = here + (lon - here + math.pi) % (2.0 * math.pi) - math.pi
         bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])
@@ -73,7 +74,7 @@ class LocalMap:
         return local
 
     def convergence(self, lat_deg: float, lon_deg: float) -> float:
-        """Map course of true north at a position, rad."""
+        """Return the map course of true north at a position, rad."""
         lon = self.middle + math.remainder(math.radians(lon_deg) - self.middle, 2.0 * math.pi)
         return float(self.angle(math.radians(lat_deg), lon)[0])
 
@@ -81,7 +82,9 @@ class LocalMap:
 class Ground:
     """Terrain for the compiled tick; unknown ground is a raster without data.
 
-    known: whether there is terrain.  heights: (rows, cols) m.  to_pixel: from the map to the raster.
+    known: True if there is terrain.
+    heights: (rows, cols) m.
+    to_pixel: map from map positions to the raster.
     """
 
     def __init__(self, terrain: Terrain | None) -> None:
@@ -89,19 +92,19 @@ class Ground:
         self.terrain = terrain
         self.heights: Heights
         if terrain is None:
-            self.heights, self.to_pixel = np.full((2, 2), np.nan, dtype=np.float32), _off_the_raster()
-            # Locked like a terrain's: a compiled function has one type for locked arrays and one for others.
+            self.heights, self.to_pixel = np.full((2, 2), np.nan, dtype=np.float32), _map_outside_raster()
+            # Locked like a terrain's array: a compiled function has one type for locked arrays and one for others.
             self.heights.setflags(write=False)
         else:
             self.heights, self.to_pixel = terrain.heights, terrain.to_pixel
 
     def height(self, east: float, north: float) -> float:
-        """Ground height at a map position, m; NaN where it is unknown."""
+        """Return the ground altitude at a map position, m; NaN if unknown."""
         return math.nan if self.terrain is None else float(self.terrain.height(east, north))
 
 
-def _off_the_raster() -> PolyMap:
-    """Make a map that takes every position to a pixel that no raster has."""
+def _map_outside_raster() -> PolyMap:
+    """Return a map that takes every position to a pixel outside every raster."""
 
     def nowhere(x: Floats, y: Floats) -> tuple[Floats, Floats]:
         return np.full_like(x, -9.0), np.full_like(y, -9.0)

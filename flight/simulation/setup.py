@@ -1,4 +1,4 @@
-"""Everything that decides a flight, fixed before it starts."""
+"""Setup of a flight: every input, fixed before it starts."""
 
 import copy
 import math
@@ -24,16 +24,16 @@ from world.scenario_tables import Navigation
 Floats = NDArray[np.float64]
 
 # ----------------------------------------------------------------------
-# Where a flight is from that was not flown by planfly: an imported log, and what that log can carry.
+# Source of a flight that planfly did not fly: an imported log, and its contents.
 
-# "amsl": above mean sea level as the vehicle has it.  "ellipsoid": above WGS 84's.  "pressure": above the level of
-# 1013.25 hPa.  "unstated": the log does not say.
+# "amsl": above mean sea level according to the vehicle. "ellipsoid": above the WGS 84 ellipsoid. "pressure": above the
+# 1013.25 hPa level. "unstated": the log does not say.
 VerticalDatum = Literal["amsl", "ellipsoid", "pressure", "unstated"]
 
-# What rules ask for beside a time and a place.
+# Data that rules need in addition to time and position.
 Quantity = Literal["attitude", "airspeed", "wind", "battery", "throttle", "heights", "velocity"]
 
-# Why a stretch ended: another mode was set, the log ends, the aircraft had landed.
+# Reason why a stretch ended: a mode change, the end of the log, or the landing.
 StretchEnd = Literal["mode", "log", "landed"]
 
 
@@ -41,10 +41,10 @@ StretchEnd = Literal["mode", "log", "landed"]
 class MissionStretch:
     """A stretch flown along the mission.
 
-    start, end: s of the log's clock.
-    mode: the vehicle's name for it, "" of a log that knows no modes.
-    ended: why it ended.
-    next_mode: the mode that was set, "" where none was.
+    start, end: s on the log's clock.
+    mode: the vehicle's name for the mode, "" for a log without modes.
+    ended: reason why it ended.
+    next_mode: the next mode, "" if there was none.
     """
 
     start: float
@@ -56,7 +56,7 @@ class MissionStretch:
 
 @dataclass(frozen=True, slots=True)
 class HeightOffset:
-    """How much higher another height of the log was than the one taken, m, at the start of what is judged."""
+    """Offset of another altitude in the log from the one used, m, at the start of the judged flight."""
 
     name: str
     offset: float
@@ -64,10 +64,11 @@ class HeightOffset:
 
 @dataclass(frozen=True, slots=True)
 class Heights:
-    """Which of a log's heights was taken.
+    """Altitude source of a log.
 
-    source: the message and field.  datum: vertical datum.
-    offsets: of the log's other heights.
+    source: message and field.
+    datum: vertical datum.
+    offsets: offsets of the log's other altitudes.
     """
 
     source: str
@@ -77,10 +78,12 @@ class Heights:
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """What of a file could not be read.
+    """Parts of a file that could not be read.
 
-    places: how many stretches of it.  size: their bytes.  cut: it ends within a message.  unreadable: messages that
-    were whole and held no numbers that could be used.
+    places: number of unreadable stretches.
+    size: their total size, bytes.
+    cut: True if the file ends within a message.
+    unreadable: number of complete messages without usable numbers.
     """
 
     places: int = 0
@@ -90,17 +93,19 @@ class Damage:
 
     @property
     def lossy(self) -> bool:
-        """Whether anything but the file's end is lost."""
+        """True if anything but the file's end is lost."""
         return self.places > 0 or self.unreadable > 0
 
 
 @dataclass(frozen=True, slots=True)
 class RowFaults:
-    """What was wrong with a log's rows, and how often.
+    """Faults in a log's rows, and their numbers.
 
-    doubled: rows that came twice.  unordered: rows out of the order of their times.
-    unusable: rows without a place or a time.
-    glitches: places that the aircraft cannot have been at.  clock_jumps: times (s) at which the clock jumped.
+    doubled: duplicate rows.
+    unordered: rows out of time order.
+    unusable: rows without a position or a time.
+    glitches: positions that the aircraft cannot have reached.
+    clock_jumps: times at which the clock jumped, s.
     """
 
     doubled: int = 0
@@ -112,7 +117,7 @@ class RowFaults:
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """A pause (s) between two rows."""
+    """A pause between two rows, s."""
 
     start: float
     end: float
@@ -120,12 +125,12 @@ class Gap:
 
 @dataclass(frozen=True, slots=True)
 class MissingItems:
-    """Items of a mission that its log does not hold, or holds in a form that no autopilot could make sense of.
+    """Items of a mission that its log lacks, or stores in a form that no autopilot could interpret.
 
-    numbers: of those items, rising, as the mission that is judged counts.
-    total: how many items the mission has, home among them where the autopilot counts it; 0 where the log does not say.
-    first, last: numbers of the items that are judged, with all between them.
-    end: the highest number that is known of.
+    numbers: numbers of those items, rising, as in the judged mission.
+    total: number of the mission's items, including home if the autopilot counts it; 0 if the log does not say.
+    first, last: numbers of the first and last judged item; all between them are judged too.
+    end: the highest known number.
     """
 
     numbers: tuple[int, ...]
@@ -136,7 +141,7 @@ class MissingItems:
 
     @property
     def beyond(self) -> bool:
-        """Whether the mission goes on beyond what is judged."""
+        """True if the mission continues beyond the judged items."""
         return self.last < self.end
 
 
@@ -144,21 +149,24 @@ class MissingItems:
 class ImportedLog:
     """An imported log as the source of a flight.
 
-    file: its name.  sha256: of its bytes.
-    format: for people.  program: what flew, "" where the log does not say.
-    utc_start: s since 1970 at time 0; NaN where it is not known.
-    holds: what the log holds beside times and places, and the plan of heights.
-    stretches: what is judged; the rest is shown.
-    heights: which was taken.
-    wind: where the wind is from: "XKF2", "" for none.
-    mission: where the mission is from: "CMD of the log, at 22.4 s", or a file.
-    missing: items of that mission that the log does not hold; None where it is judged in full.
-    plan_heights: whether the mission states heights.
-    aircraft_known: whether the aircraft was named; if not, none of its limits count.
-    begins_in_flight: whether the log begins after the flight did.
-    gaps: pauses between rows, over the whole of what was imported.
-    faults: of its rows.  damage: of the file.
-    notes: what else a person should know, in sentences.
+    file: name of the file.
+    sha256: SHA-256 of its bytes.
+    format: format name for people.
+    program: program that flew, "" if the log does not say.
+    utc_start: s since 1970 at time 0; NaN if unknown.
+    holds: data that the log contains in addition to times and positions.
+    stretches: the judged stretches; the rest is only shown.
+    heights: the altitude that is used.
+    wind: source of the wind: "XKF2", "" for none.
+    mission: source of the mission: "CMD of the log, at 22.4 s", or a file.
+    missing: items of that mission that the log lacks; None if it is judged in full.
+    plan_heights: True if the mission states altitudes.
+    aircraft_known: True if the aircraft was named; otherwise none of its limits apply.
+    begins_in_flight: True if the log begins after the flight did.
+    gaps: pauses between rows, over all imported data.
+    faults: faults of its rows.
+    damage: unreadable parts of the file.
+    notes: further facts that a person should know, in sentences.
 
     >>> ImportedLog("a.BIN", "", "ArduPilot dataflash log", "ArduPlane V4.6.0", holds=("attitude",)).holds
     ('attitude',)
@@ -184,29 +192,29 @@ class ImportedLog:
     begins_in_flight: bool = False
 
 
-# Steps of JSBSim a second, but for campaigns.
+# JSBSim steps per second, except in campaigns.
 FDM_HZ: Literal[120] = 120
 
 
 @dataclass(frozen=True, slots=True)
 class FlightSetup:
-    """What is flown, by what, in which world; the log carries all of it.
+    """Inputs of a flight: mission, aircraft, autopilot and world; the log carries all of them.
 
-    scenario: the world, and what it asks of the flight.
-    mission: its items, as read or exported.
-    mission_text: the same as a .waypoints file, as flown.
-    route: the waypoints that the mission comes to.
-    limits: of scenario and aircraft together, made where the aircraft is loaded.
-    aircraft: its name in the catalog, or its folder.
+    scenario: the world, and the requirements on the flight.
+    mission: mission items, as read or exported.
+    mission_text: the same mission as a .waypoints file, as flown.
+    route: waypoints of the mission as flown.
+    limits: limits of scenario and aircraft together, made where the aircraft is loaded.
+    aircraft: name in the catalog, or folder.
     battery: energy carried, Wh.
-    seed: of the flight; the turbulence's stream comes from it unless the scenario's wind has its own.
-    plan: None for a mission that a person brought.
-    autopilot: what steers, with its settings.
-    nav: how well it knows where it is, a key of `flight.guidance.navigation_error.ERRORS`.
-    guidance_hz: how often it steers, and how many rows the track has a second.
-    fdm_hz: steps of JSBSim a second.
-    source: the imported log that the flight is from; None for a flight of planfly's own.
-    path: that is to be followed, of route and limits.
+    seed: seed of the flight; the turbulence's stream comes from it unless the scenario's wind has its own.
+    plan: None for a mission from outside.
+    autopilot: the autopilot with its settings.
+    nav: accuracy of the navigation, a key of `flight.guidance.navigation_error.ERRORS`.
+    guidance_hz: guidance ticks per second, and track rows per second.
+    fdm_hz: steps of JSBSim per second.
+    source: the imported log that the flight comes from; None for a flight by planfly.
+    path: reference path from route and limits.
     """
 
     scenario: Scenario
@@ -226,7 +234,7 @@ class FlightSetup:
     path: FlyByPath = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Draw the path here, where it cannot differ from route and limits."""
+        """Build the path here, so that it always matches route and limits."""
         object.__setattr__(self, "path", fly_by_path(self.route, self.limits, self.scenario.terrain))
 
     @property
@@ -236,7 +244,7 @@ class FlightSetup:
 
     @property
     def corridor(self) -> float:
-        """Half width of the corridor about the legs that the flight has to stay in, m."""
+        """Half width of the corridor about the legs that the flight must stay in, m."""
         return corridor_half_width(self.scenario.limits.corridor_m, self.autopilot.acceptance_radius)
 
     @property
@@ -251,7 +259,7 @@ class FlightSetup:
 
     @property
     def ground_ways(self) -> GroundWays:
-        """What of the flight is flown from the ground and to it: nothing by an autopilot that does neither."""
+        """Take-off and landing that are flown; none for an autopilot that flies neither."""
         asked = self.scenario.launch is not None or self.scenario.landing is not None
         if self.source is not None or not asked:
             return GroundWays()
@@ -267,17 +275,17 @@ class FlightSetup:
 
     @property
     def slowest_launched(self) -> float:
-        """Slowest level flight at the route's start, m/s: a launch that states no speed goes by it."""
+        """Lowest speed of level flight at the route's start, m/s: the launch speed if none is stated."""
         return self.envelope.level_speeds(float(self.route.waypoints[0, 2]))[0]
 
     @property
     def shown_waypoints(self) -> Floats:
-        """The route's waypoints (w, 3) m as pictures and tables show them: flown ends on the ground."""
+        """The route's waypoints (w, 3) m for pictures and tables, with flown ends on the ground."""
         return shown_waypoints(self.route, self.ground_ways)
 
     @property
     def started(self) -> str:
-        """How the flight starts, in words, and why a launch or a landing of its scenario is not flown."""
+        """Description of the flight's start, and why a launch or a landing of its scenario is not flown."""
         ways, started = self.ground_ways, self.route.started
         if ways.take_off is not None:
             started = ways.take_off.described()
@@ -285,17 +293,17 @@ class FlightSetup:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What of the mission is not flown as written, in sentences."""
+        """Parts of the mission that are not flown as written, in sentences."""
         return flown_notes(self.route, self.ground_ways)
 
     def in_scenario(self, scenario: Scenario) -> "FlightSetup":
-        """Set the same flight in another scenario; route, limits and path stay as they are."""
+        """Return the same flight in another scenario, with unchanged route, limits and path."""
         moved = copy.copy(self)
         object.__setattr__(moved, "scenario", scenario)
         return moved
 
     def turned_to_other_side(self) -> "FlightSetup":
-        """Set the same flight with its reversals turned to the side of the longer turn; all else stays as it is."""
+        """Return the same flight with its reversals turned to the side of the longer turn."""
         turned = copy.copy(self)
         path = fly_by_path(self.route, self.limits, self.scenario.terrain, swing="long")
         object.__setattr__(turned, "path", path)
@@ -303,9 +311,10 @@ class FlightSetup:
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
-    """Limits of a path: the scenario's, with the aircraft's where the scenario leaves them to it.
+    """Return the limits of a path: the scenario's, and the aircraft's where the scenario states none.
 
-    airspeed: m/s.  max_bank: rad; the envelope's is used where it is less.
+    airspeed: m/s.
+    max_bank: rad; the smaller of it and the envelope's limit applies.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope

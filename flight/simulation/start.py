@@ -1,4 +1,4 @@
-"""How a flight starts: trimmed in the air where its route begins, or let go by a rail, a hand or on a runway."""
+"""Start of a flight: trimmed in the air on its route, or released from a rail, a hand or a runway."""
 
 import math
 from dataclasses import dataclass
@@ -16,12 +16,14 @@ from world.frames import to_geo
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where and how a route begins.
+    """Position, course, airspeed and wind at the start of a route.
 
-    lat_deg, lon_deg: geodetic.  amsl, ground: m.
-    course: true, of the first leg, rad.  slope: of the first leg, rad.
+    lat_deg, lon_deg: geodetic.
+    amsl, ground: altitude of the aircraft and of the ground, m.
+    course: true course of the first leg, rad.
+    slope: slope of the first leg, rad.
     airspeed: m/s, true.
-    wind: (3,) m/s, north, east, down, the way the air moves.
+    wind: (3,) m/s, north, east, down, direction of air motion.
     """
 
     lat_deg: float
@@ -42,11 +44,12 @@ def find_start(
     airspeed: float,
     offset: tuple[float, float, float],
 ) -> Start:
-    """Where the route begins.
+    """Return the start of the route.
 
-    airspeed: of the first leg, m/s.  offset: east, north and up from the first waypoint to the start, m.
+    airspeed: airspeed of the first leg, m/s.
+    offset: east, north and up from the first waypoint to the start, m.
 
-    Raises StartError for a place that is not above the terrain.
+    Raise StartError for a place that is not above the terrain.
     """
     points = setup.route.waypoints
     east, north, up = (float(value + off) for value, off in zip(points[0], offset, strict=True))
@@ -56,10 +59,10 @@ def find_start(
         raise StartError(setup.mission.source, reason, field="start", value=up)
     lat, lon = (float(value) for value in to_geo(setup.scenario.origin, east, north))
     step = points[1] - points[0]
-    # A map course is the true course and this.
+    # Map course minus true course.
     turn = local_map.convergence(lat, lon)
-    # A speed or a first slope that the aircraft cannot hold is the verdict's business, not the start's: it starts
-    # at the nearest speed it can, and level.
+    # A speed or a first slope that the aircraft cannot hold is for the verdict to report: the flight starts at the
+    # nearest speed that it can hold, and level.
     east_wind, north_wind = setup.scenario.wind.at(up)
     cos, sin = math.cos(turn), math.sin(turn)
     return Start(
@@ -75,9 +78,9 @@ def find_start(
 
 
 def start_trimmed(fdm: Fdm, source: str, start: Start) -> Trim:
-    """Begin trimmed on the start's slope if the aircraft can hold it, else level.
+    """Start trimmed on the start's slope if the aircraft can hold it, else level.
 
-    Raises StartError, which names the mission's file, ``source``.
+    Raise StartError, which names the mission's file, ``source``.
     """
     begin = (start.lat_deg, start.lon_deg, start.amsl, start.course, start.airspeed)
     try:
@@ -88,22 +91,24 @@ def start_trimmed(fdm: Fdm, source: str, start: Start) -> Trim:
         except FlightError as error:
             known = {"field": error.field, "value": error.value, "allowed": error.allowed}
             raise StartError(source, str(error), **known) from error
-    # All that blows is set as a gust.
+    # Mean wind is set as part of the gust.
     fdm.set_wind(0.0, 0.0, 0.0)
     fdm.set_gust(*start.wind)
     return trimmed
 
 
 # ----------------------------------------------------------------------
-# From the ground.
+# Start from the ground.
 
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """How an aircraft is let go.
+    """State of the aircraft at its release.
 
-    place: lat_deg, lon_deg, m AMSL.  attitude: roll, pitch, yaw (true), rad.
-    velocity, wind: (3,) m/s, north, east, down, over the ground and as the air moves.  ground: m AMSL.
+    place: lat_deg, lon_deg, m AMSL.
+    attitude: roll, pitch, yaw (true), rad.
+    velocity, wind: (3,) m/s, north, east, down, over the ground and of the air.
+    ground: m AMSL.
     """
 
     place: tuple[float, float, float]
@@ -114,14 +119,14 @@ class Release:
 
 
 def gear_of(ways: GroundWays) -> Gear:
-    """What an aircraft whose model has nothing meets the ground with: wheels where it rolls to its take-off."""
+    """Return the gear for an aircraft whose model has no contacts: wheels if it takes off from a runway."""
     return "wheels" if ways.take_off is not None and ways.take_off.launch.method == "runway" else "belly"
 
 
 def find_release(
     setup: FlightSetup, local_map: LocalMap, ground: Ground, aircraft: Aircraft, take_off: TakeOff
 ) -> Release:
-    """Where and how a take-off begins."""
+    """Return the state of the aircraft at the start of a take-off."""
     launch = take_off.launch
     place, velocity = take_off.release()
     if launch.method == "runway":
@@ -134,25 +139,28 @@ def find_release(
     return Release(
         place=(lat, lon, float(place[2])),
         attitude=(0.0, launch.incline, take_off.course - turn),
-        velocity=(*_turned(float(velocity[0]), float(velocity[1]), turn), -float(velocity[2])),
-        wind=(*_turned(east, north, turn), 0.0),
+        velocity=(*_to_true_north(float(velocity[0]), float(velocity[1]), turn), -float(velocity[2])),
+        wind=(*_to_true_north(east, north, turn), 0.0),
         ground=float(take_off.home[2]) if math.isnan(under) else under,
     )
 
 
-def _turned(east: float, north: float, turn: float) -> tuple[float, float]:
-    """North and east about true north, of components on the map whose true north is at ``turn`` (rad)."""
+def _to_true_north(east: float, north: float, turn: float) -> tuple[float, float]:
+    """Return the true north and east components of a map vector.
+
+    turn: map course of true north, rad.
+    """
     cos, sin = math.cos(turn), math.sin(turn)
     return north * cos + east * sin, east * cos - north * sin
 
 
 def release(fdm: Fdm, start: Release, commands: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    """Let the aircraft go with these commands, which are returned."""
+    """Release the aircraft with these commands, and return them."""
     fdm.release(
         start.place, start.attitude, start.velocity,
         wind=start.wind, terrain_amsl=start.ground, commands=commands,
     )  # fmt: skip
-    # All that blows is set as a gust.
+    # Mean wind is set as part of the gust.
     fdm.set_wind(0.0, 0.0, 0.0)
     fdm.set_gust(*start.wind)
     return commands

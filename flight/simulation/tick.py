@@ -1,8 +1,8 @@
-"""The compiled loop's record of a flight, and what each tick does whoever steers.
+"""Record of a flight for the compiled loop, and the parts of a tick that all autopilots share.
 
-A tick takes the state to SI and to the map, looks up the ground and makes the navigation's error (`begin_tick`); an
-autopilot's law then fills the commands; the tick ends with the next wind, a row of the track and what to set in JSBSim
-(`end_tick`).  Every autopilot has a compiled tick of its own, made of these two and its law.
+A tick converts the state to SI units and to the map, looks up the ground and adds the navigation error (`begin_tick`);
+then an autopilot's control law fills in the commands; the tick ends with the next wind, a row of the track and the
+outputs to JSBSim (`end_tick`). Every autopilot has a compiled tick of its own, made of these two and its law.
 """
 
 import math
@@ -32,26 +32,26 @@ Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
-# All that the compiled tick works on: one record, and one table of the path.
+# Data of the compiled tick: one record, and one table of the path.
 #
-# Each array that is passed to compiled code costs as much as a hundred sums.
+# Each array that is passed to compiled code costs as much as a hundred additions.
 
 
-# What is read of JSBSim each tick: the state but for time and wind, which are known without asking.
+# Fields of the state that are read from JSBSim each tick; time and wind are known without reading them.
 READ_FIELDS = field_names(STATE)[: field_names(STATE).index("time")]
-# Ticks that are flown at a time, at most.
+# Largest number of ticks that are flown in one call.
 BLOCK_TICKS = 60
-# Mean wind and gust, true north, east and down; ground below; battery.
+# Mean wind and gust, true north, east and down; ground altitude below; battery energy.
 AIR = record_dtype(
-    "wind_north",  # m/s, the way the air moves
+    "wind_north",  # m/s, direction of air motion
     "wind_east",
     "gust_north",
     "gust_east",
     "gust_down",
-    "ground",  # m, the last that was known
+    "ground",  # m AMSL, the last known value
     "energy",  # Wh used
 )
-# What a tick finds where the aircraft is.
+# Map and ground data at the aircraft's position.
 PLACE = record_dtype(
     "north_cos",  # of the map course of true north
     "north_sin",
@@ -60,37 +60,37 @@ PLACE = record_dtype(
 )
 MEAN_WIND = record_dtype(
     "speed",  # m/s at the reference height
-    "cos",  # of the map course that it blows to
+    "cos",  # of the map course that the wind blows to
     "sin",
     "gradient",  # 1/s
     "reference_amsl",  # m
     "w20",  # m/s, turbulence's wind at 20 ft
 )
 TIMING = record_dtype(
-    ("tick", np.int64),  # ticks flown
-    ("row", np.int64),  # row of the block that is filled next
+    ("tick", np.int64),  # number of ticks flown
+    ("row", np.int64),  # index of the next row of the block
     "dt",  # s
 )
 SETTINGS = record_dtype(
-    "slowest",  # m/s, slower is a departure
-    "battery",  # Wh; a flight that has used as much ends
+    "slowest",  # m/s, loss of control below this airspeed
+    "battery",  # Wh; a flight that has used this energy ends
     "navigation_sigma",  # m
     "navigation_time",  # s
-    "middle",  # rad, longitude of the local map's middle
-    ("pieces", np.int64),  # rows of the path's table that have one
+    "middle",  # rad, longitude of the local map's center
+    ("pieces", np.int64),  # number of path table rows that hold a piece
     ("nodes", np.int64),
     ("waypoints", np.int64),
-    ("on_last_leg", np.bool_),  # of a flight that another program steers, by its own account
+    ("on_last_leg", np.bool_),  # for a flight that another program steers, as it reports
 )
-# The i-th piece, node and waypoint of a path beside each other.
+# The i-th piece, node and waypoint of a path in one row.
 PATH_ROW = record_dtype(("piece", PIECE), ("node", NODE), ("waypoint", WAYPOINT))
-# What is set in JSBSim after a tick.
+# Values to set in JSBSim after a tick.
 OUTPUT = record_dtype(*field_names(COMMANDS), "gust_north", "gust_east", "gust_down", "ground")
-# Unit normals of a tick.
+# Unit normal random numbers of a tick.
 NOISE = record_dtype(("turbulence", np.float64, (3,)), ("navigation", np.float64, (3,)))
 WORKSPACE = record_dtype(
     ("state", STATE),
-    ("state_factors", STATE),  # take what JSBSim gives to SI
+    ("state_factors", STATE),  # factors from JSBSim's units to SI
     ("true", MOTION),
     ("estimated", MOTION),
     ("commands", COMMANDS),
@@ -103,37 +103,37 @@ WORKSPACE = record_dtype(
     ("gains", GAINS),
     ("timing", TIMING),
     ("settings", SETTINGS),
-    ("position_map", POLYMAP),  # latitude and longitude to east and north
-    ("north_map", POLYMAP),  # latitude and longitude to the map course of true north
-    ("pixel_map", POLYMAP),  # east and north to column and row of the terrain
+    ("position_map", POLYMAP),  # from latitude and longitude to east and north
+    ("north_map", POLYMAP),  # from latitude and longitude to the map course of true north
+    ("pixel_map", POLYMAP),  # from east and north to column and row of the terrain
     ("output", OUTPUT),  # in JSBSim's units
-    ("scale_above", OUTPUT),  # take an SI value above zero to JSBSim's
-    ("scale_below", OUTPUT),  # and one that is not
+    ("scale_above", OUTPUT),  # factors from SI to JSBSim's units for values above zero
+    ("scale_below", OUTPUT),  # factors from SI to JSBSim's units for other values
     ("noise", NOISE, (BLOCK_TICKS,)),
     ("rows", TRACK_ROW, (BLOCK_TICKS,)),
 )
-# As many float64 as it takes the place of.
+# Size of the workspace in float64 numbers.
 WORKSPACE_NUMBERS = WORKSPACE.itemsize // 8
 
 
 class Workspace:
-    """One flight's record and path, in one block of memory, and plain views of what passes to and from JSBSim.
+    """Record and path of one flight in one block of memory, with views of the data exchanged with JSBSim.
 
-    Numba looks at the type of each argument of a call, at a record's for twice as long as at an array's of numbers: so
-    all of it comes to compiled code as one block.
+    Numba checks the type of each argument of a call, and takes twice as long for a record as for an array of numbers.
+    Therefore all data is passed to compiled code as one block.
 
-    block: (n,) numbers: the workspace's, those that the autopilot's law keeps, and the path's.
+    block: (n,) numbers of the workspace, of the control law's own record, and of the path.
     array: (1,) of `WORKSPACE`, for compiled code.
     record: its one record, for Python.
-    own: the record that the law keeps, None for none.
-    path: of `PATH_ROW`, as many as there are pieces, nodes or waypoints.
+    own: the control law's own record, or None.
+    path: rows of `PATH_ROW`, as many as the largest of the numbers of pieces, nodes and waypoints.
     readings: (n,) the state's `READ_FIELDS`.
     output: (n,) the fields of `OUTPUT`.
     commands: (4,) the fields of `flight.dynamics.state.COMMANDS`.
     on_last_leg: (1,) of the workspace's settings.
     ticks_flown, rows_filled: (1,) of the workspace's timing.
-    turbulence, navigation: (BLOCK_TICKS, 3) the noise of each.
-    rows: (BLOCK_TICKS,) of the track.
+    turbulence, navigation: (BLOCK_TICKS, 3) random numbers of each.
+    rows: (BLOCK_TICKS,) rows of the track.
     """
 
     def __init__(
@@ -155,7 +155,7 @@ class Workspace:
         self.output = self._numbers("output", len(field_names(OUTPUT)))
         self.commands = self._numbers("commands", len(field_names(COMMANDS)))
         self._true, self._estimated = (self._numbers(name, len(field_names(MOTION))) for name in ("true", "estimated"))
-        # Made once: numpy takes microseconds for each field of a record that Python asks for.
+        # Created once: numpy needs microseconds for each access to a record's field from Python.
         self.ticks_flown: NDArray[np.int64] = self.array["timing"]["tick"]
         self.rows_filled: NDArray[np.int64] = self.array["timing"]["row"]
         self.on_last_leg: NDArray[np.bool_] = self.array["settings"]["on_last_leg"]
@@ -164,32 +164,54 @@ class Workspace:
         self.rows: Records = self.array["rows"][0]
 
     def navigation_error(self) -> list[float]:
-        """The estimated motion less the true one: the fields of `flight.guidance.navigation_error.MOTION`."""
+        """Return the estimated minus the true motion, in `flight.guidance.navigation_error.MOTION` order."""
         error: list[float] = (self._estimated - self._true).tolist()
         return error
 
     def _numbers(self, field: str, count: int) -> Floats:
-        """The first numbers of a field, as an array that shares its memory."""
+        """Return the first numbers of a field, as an array that shares its memory."""
         fields: Any = WORKSPACE.fields
         return np.frombuffer(self.array, np.float64, count, fields[field][1])
 
 
+# Bank beyond which control is lost, rad.
 STEEPEST_BANK = math.radians(75.0)
-# What a tick returns, and how the flight ended by then.
-COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED, EMPTY = 1, 2, 3, 4, 5, 6, 7
-NO_MOTOR, TIPPED = 8, 9
-# A flight that passes the end of its route further than this from it, m, has missed it.
+# Return values of a tick: how the flight has ended.
+# The end of the route was reached.
+COMPLETED = 1
+# The state is not a number.
+NOT_A_NUMBER = 2
+# The aircraft touched the ground.
+GROUND = 3
+# The bank exceeded `STEEPEST_BANK`.
+BANKED = 4
+# The airspeed fell below the stall.
+STALLED = 5
+# The end of the route was passed at more than `FAR` from it.
+MISSED = 6
+# Battery or tank are empty.
+EMPTY = 7
+# The motor never started.
+NO_MOTOR = 8
+# The aircraft touched the ground with something other than belly or wheels.
+TIPPED = 9
+# Distance from the end of the route beyond which a flight that passes it has missed it, m.
 FAR = 100.0
-# A return to launch has come to its circle within this distance of the middle, m, or `WIDER` of its radii, and to its
-# height, m.  A circle of 60 m cannot be flown at 26 m/s and 30 degrees of bank: ArduPlane gets up to 260 m from its
-# middle.
-NEAR, WIDER, AT_HEIGHT = 300.0, 1.3, 20.0
-# However its circles are flown, it is over after so many times the time that it is to circle, and that once around
-# takes, at this ground speed, m/s.
-MAX_CIRCLES, _SLOW = 5.0, 10.0
-# A mission that ends in a circle about its last waypoint is flown until the course has turned by this, rad: a quarter
-# of a turn onto the circle, and once around.
+# Distance from the center at which a return to launch has arrived at its loiter, m. A loiter of 60 m cannot be flown at
+# 26 m/s and 30 degrees of bank: ArduPlane flies up to 260 m from its center.
+NEAR = 300.0
+# The same distance as a multiple of the loiter radius; the larger one applies.
+WIDER = 1.3
+# Altitude tolerance of this arrival, m.
+AT_HEIGHT = 20.0
+# Abort the RTL loiter after this multiple of its nominal duration, which is at least one full circle.
+MAX_CIRCLES = 5.0
+# Lowest ground speed assumed for that circle, m/s.
+_CIRCLING_SPEED_MPS = 10.0
+# A mission that ends in a loiter about its last waypoint ends when the course has turned by this angle, rad: a quarter
+# turn onto the loiter, and one full circle.
 AROUND_END = 2.5 * math.pi
+# Texts for the ends of a flight.
 ENDS = {
     COMPLETED: "completed",
     NOT_A_NUMBER: "loss of control: the state is not a number",
@@ -201,14 +223,15 @@ ENDS = {
     NO_MOTOR: "not launched: the motor never started",
     TIPPED: "ground contact: not on its belly or wheels",
 }
-_STATE, _OUTPUT = field_names(STATE), field_names(OUTPUT)
+_STATE_FIELDS, _OUTPUT_FIELDS = field_names(STATE), field_names(OUTPUT)
 
 
 @inner
 def begin_tick(work: Record, heights: Heights) -> bool:  # pragma: no cover - compiled
-    """Take the state as JSBSim gave it, in its units, and estimate the motion; False where the state is no number.
+    """Convert the state from JSBSim's units and estimate the motion; return False if it is not a number.
 
-    work: a record of `WORKSPACE`.  heights: of the terrain.
+    work: a record of `WORKSPACE`.
+    heights: altitudes of the terrain.
     """
     settings, timing = work.settings, work.timing
     if not _sense(work, heights):
@@ -222,16 +245,16 @@ def begin_tick(work: Record, heights: Heights) -> bool:  # pragma: no cover - co
 
 @inner
 def _sense(work: Record, heights: Heights) -> bool:  # pragma: no cover - compiled
-    """Take the state to SI and to the map, and look up the ground; False where the state is no number.
+    """Convert the state to SI and to the map, and look up the ground; return False if it is not a number.
 
-    Fills the state, the true motion and the place, of a record of `flight.simulation.tick.WORKSPACE`.
+    Fill the state, the true motion and the place of a record of `flight.simulation.tick.WORKSPACE`.
     """
     state, true, air, settings, place = work.state, work.true, work.air, work.settings, work.place
     if not _to_si(state, work.state_factors):
         return False
     state.wind_north, state.wind_east = air.wind_north + air.gust_north, air.wind_east + air.gust_east
     state.wind_down = air.gust_down
-    # About the local map's middle, so that a flight may cross the 180th meridian.
+    # Relative to the local map's center, so that a flight may cross the 180th meridian.
     state.longitude = settings.middle + wrap(state.longitude - settings.middle)
     # Map course of true north.
     north, _ = polymap(work.north_map, state.latitude, state.longitude)
@@ -251,9 +274,9 @@ def _sense(work: Record, heights: Heights) -> bool:  # pragma: no cover - compil
 
 @inner
 def end_tick(work: Record) -> int:  # pragma: no cover - compiled
-    """Make the next wind, fill a row of the track, count the tick, and state what to set in JSBSim, in its units.
+    """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units.
 
-    Returns a key of `ENDS`, or 0 to fly on.
+    Return a key of `ENDS`, or 0 to fly on.
     """
     fill_tick(work)
     return status_in_air(work)
@@ -261,37 +284,38 @@ def end_tick(work: Record) -> int:  # pragma: no cover - compiled
 
 @inner
 def status_in_air(work: Record) -> int:  # pragma: no cover - compiled
-    """How a flight in the air ends by now: a key of `ENDS`, or 0 to fly on."""
+    """Return how a flight in the air has ended: a key of `ENDS`, or 0 to fly on."""
     settings, air = work.settings, work.air
     return _status(work.state, work.memory, work.place.clearance, settings.slowest, air.energy >= settings.battery)
 
 
 @inner
 def fill_tick(work: Record) -> None:  # pragma: no cover - compiled
-    """Make the next wind, fill a row of the track, count the tick, and state what to set in JSBSim, in its units."""
+    """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units."""
     state, true, air, timing, place = work.state, work.true, work.air, work.timing, work.place
     cos, sin = place.north_cos, place.north_sin
     row = work.rows[timing.row]
     turbulence = work.noise[timing.row].turbulence
-    _blow(state, work.wind, work.gusts, turbulence, place.clearance, true.up, cos, sin, air, timing.dt)
+    _update_wind(state, work.wind, work.gusts, turbulence, place.clearance, true.up, cos, sin, air, timing.dt)
     air.ground = place.ground if not math.isnan(place.ground) else air.ground
     air.energy += state.power * timing.dt / 3600.0
-    _fill(row, state, true, work.commands, work.memory, timing.tick * timing.dt, air.energy, place.clearance)
+    _fill_row(row, state, true, work.commands, work.memory, timing.tick * timing.dt, air.energy, place.clearance)
     _fill_wind(row, state, cos, sin)
     timing.tick += 1
     timing.row += 1
-    _output(work.output, work.commands, air, work.scale_above, work.scale_below)
+    _set_output(work.output, work.commands, air, work.scale_above, work.scale_below)
 
 
 @inner
 def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:  # pragma: no cover - compiled
-    """Note how long a return to launch has circled at its end; it ends the flight as an end of the path does.
+    """Track the progress of a return to launch around its loiter, and end the flight after it.
 
-    For an autopilot that returns by a law of its own, and need not follow the path: it ends where the path does once it
-    has come to its circle and was all around it at its height, and after `longest_circling` at the latest.
+    For an autopilot that returns by its own control law and need not follow the path: the flight ends at the path's end
+    once the aircraft has arrived at the loiter and flown a full circle at its altitude, and after `longest_circling` at
+    the latest.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
-    b: any waypoint of the way back, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    b: any waypoint of the return, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
     memory.returning = True
@@ -311,15 +335,15 @@ def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:  #
 
 @inner
 def end_around(motion: Record, memory: Record, dt: float) -> None:  # pragma: no cover - compiled
-    """Note how far the course has turned since a mission's last waypoint was reached; past `AROUND_END` it ends.
+    """Track the course change since the last waypoint was reached, and end the flight at `AROUND_END`.
 
-    By the course, and not by the bearing from the waypoint: where the circle is narrower than the aircraft can turn,
-    it flies loops beside the waypoint, and its bearing may go around in one of them or not until the third.
+    The course is used, not the bearing from the waypoint: if the loiter is narrower than the aircraft can turn, it
+    flies loops next to the waypoint, and the bearing may take one loop or three to go around.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
-    # However wide it circles, it has not missed the mission's end.
+    # However wide the loiter is flown, the mission's end is not missed.
     memory.returning = True
     course = math.atan2(motion.velocity_east, motion.velocity_north)
     if memory.circled > 0.0:
@@ -331,16 +355,16 @@ def end_around(motion: Record, memory: Record, dt: float) -> None:  # pragma: no
 
 @compiled
 def longest_circling(radius: float) -> float:  # pragma: no cover - compiled
-    """After how long in its circle (m) a return is over, however that was flown, s."""
-    longest: float = MAX_CIRCLES * max(UNLIMITED, 2.0 * math.pi * abs(radius) / _SLOW)
+    """Return the time after which a return in its loiter of a radius (m) is over in any case, s."""
+    longest: float = MAX_CIRCLES * max(UNLIMITED, 2.0 * math.pi * abs(radius) / _CIRCLING_SPEED_MPS)
     return longest
 
 
 @inner
 def _to_si(state: Record, factors: Record) -> bool:  # pragma: no cover - compiled
-    """Take the state to SI; False where it has a NaN or an infinity."""
+    """Convert the state to SI; return False if it contains a NaN or an infinity."""
     total = 0.0
-    for name in literal_unroll(_STATE):
+    for name in literal_unroll(_STATE_FIELDS):
         value = state[name] * factors[name]
         state[name] = value
         total += value * 0.0
@@ -364,32 +388,32 @@ def _status(
 
 
 @inner
-def _output(
+def _set_output(
     output: Record, commands: Record, air: Record, above: Record, below: Record
 ) -> None:  # pragma: no cover - compiled
-    """What to set in JSBSim, in its units."""
+    """Set the outputs in JSBSim's units."""
     output.elevator, output.aileron = commands.elevator, commands.aileron
     output.rudder, output.throttle = commands.rudder, commands.throttle
-    # All that blows is set as a gust: three properties a tick, not six.
+    # Mean wind is set as part of the gust: three properties a tick instead of six.
     output.gust_north, output.gust_east = air.wind_north + air.gust_north, air.wind_east + air.gust_east
     output.gust_down, output.ground = air.gust_down, air.ground
-    for name in literal_unroll(_OUTPUT):
+    for name in literal_unroll(_OUTPUT_FIELDS):
         output[name] *= above[name] if output[name] > 0.0 else below[name]
 
 
 @inner
-def _blow(
+def _update_wind(
     state: Record, wind: Record, gusts: Record, noise: Floats, clearance: float, up: float, turn_cos: float,
     turn_sin: float, air: Record, dt: float,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Mean wind at this height and the next gust, true north, east and down, into ``air``."""
+    """Set mean wind and the next gust at this altitude, true north, east and down, in ``air``."""
     speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, up)
-    # The angle less the map course of true north.
+    # The wind's map course minus the map course of true north.
     cos = wind.cos * turn_cos + wind.sin * turn_sin
     sin = wind.sin * turn_cos - wind.cos * turn_sin
     air.wind_north, air.wind_east = speed * cos, speed * sin
     if wind.w20 > 0.0:
-        # Over unknown ground the scales of 300 m and above hold.
+        # Over unknown ground use the scales that apply above 300 m.
         height = clearance if not math.isnan(clearance) else 1000.0
         along, across, down = step_gusts(gusts, noise, wind.w20, height, state.airspeed, dt)
         air.gust_north = along * cos - across * sin
@@ -398,13 +422,13 @@ def _blow(
 
 
 @inner
-def _fill(
+def _fill_row(
     row: Record, state: Record, true: Record, commands: Record, memory: Record, time: float,
     energy: float, clearance: float,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """One row of the track, a record of `flight.simulation.track.TRACK_ROW`, but for the wind."""
+    """Fill one row of the track except the wind, a record of `flight.simulation.track.TRACK_ROW`."""
     row.time = time
-    # Element by element: assigning a whole array checks shapes.
+    # Element by element: assigning a whole array would check shapes.
     position, velocity, attitude, rates = row.position, row.velocity, row.attitude, row.rates
     position[0], position[1], position[2] = true.east, true.north, true.up
     velocity[0], velocity[1], velocity[2] = true.velocity_east, true.velocity_north, true.velocity_up
@@ -429,7 +453,10 @@ def _fill(
 
 @inner
 def _fill_wind(row: Record, state: Record, cos: float, sin: float) -> None:  # pragma: no cover - compiled
-    """The row's wind in map axes.  cos, sin: of the map course of true north."""
+    """Set the row's wind in map axes.
+
+    cos, sin: of the map course of true north.
+    """
     wind = row.wind
     wind[0] = state.wind_east * cos + state.wind_north * sin
     wind[1] = state.wind_north * cos - state.wind_east * sin

@@ -1,4 +1,4 @@
-"""The flown track: one row a guidance tick."""
+"""Track of a flight: one row per guidance tick."""
 
 import csv
 import io
@@ -24,16 +24,27 @@ Ints = NDArray[np.int32]
 Rows = NDArray[np.record]
 
 
-ROLL, PITCH, YAW = range(3)  # columns of `Track.attitude`
-# Columns of `Track.controls` and `Track.commands`.
-ELEVATOR, AILERON, RUDDER, THROTTLE = range(4)
+# Column of `Track.attitude`: roll, rad.
+ROLL = 0
+# Column of `Track.attitude`: pitch, rad.
+PITCH = 1
+# Column of `Track.attitude`: yaw, rad.
+YAW = 2
+# Column of `Track.controls` and `Track.commands`: elevator, rad.
+ELEVATOR = 0
+# Column of `Track.controls` and `Track.commands`: aileron, rad.
+AILERON = 1
+# Column of `Track.controls` and `Track.commands`: rudder, rad.
+RUDDER = 2
+# Column of `Track.controls` and `Track.commands`: throttle, 0..1.
+THROTTLE = 3
 
-# A row's time is from 0 on and before this, s: as much as a log can hold.
+# Upper bound of a row's time, s, the longest that a log can hold; times start at 0.
 LATEST = 1e7
 
-# Binary digits after the point that a flown row keeps of each column: finer than any instrument, and a third of the log
-# less than with all that a float32 holds.  Positions are the finest: courses and slopes are taken between rows that are
-# 0.4 m apart, and 0.06 mm turns those by 0.01 degrees.  Time and leg are as they are.
+# Binary digits after the point that a flown row keeps in each column: finer than any instrument, and a third less log
+# than with the full float32. Positions are the finest: courses and slopes are taken between rows 0.4 m apart, and 0.06
+# mm turns those by 0.01 degrees. Time and leg are not rounded.
 DIGITS = {
     "position": 14,  # 0.06 mm
     "velocity": 10,  # 1 mm/s
@@ -46,7 +57,7 @@ DIGITS = {
     "wind": 10,
     "load_factor": 10,
     "current": 10,
-    "energy": 14,  # 0.06 mWh, a twentieth of what a tick takes
+    "energy": 14,  # 0.06 mWh, a twentieth of the energy used in a tick
     "cross_track": 10,
     "height_error": 10,
     "speed_command": 10,
@@ -56,9 +67,10 @@ DIGITS = {
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Track:
-    """What was flown, as it is logged: float64 time and position, float32 for the rest, so that a log loses nothing.
+    """Flown track as it is logged.
 
-    All arrays have t rows.  World axes east, north, up; SI and radians.
+    Time and position are float64, all else is float32, so that a log loses nothing. All arrays have t rows. World axes
+    east, north, up; SI and radians.
 
     >>> rows = np.zeros(3, TRACK_ROW)
     >>> rows["time"] = 0.0, 0.5, 1.0
@@ -74,8 +86,8 @@ class Track:
     airspeed: Singles  # (t,) m/s, true
     flow: Singles  # (t, 2) alpha, beta
     controls: Singles  # (t, 4) elevator, aileron, rudder (rad), throttle (0..1), after the actuators
-    commands: Singles  # (t, 4) elevator, aileron, rudder, throttle, as guidance asked
-    wind: Singles  # (t, 3) m/s, the way the air moves, gusts included
+    commands: Singles  # (t, 4) elevator, aileron, rudder, throttle commands of the guidance
+    wind: Singles  # (t, 3) m/s, direction of air motion, including gusts
     load_factor: Singles  # (t,) g
     current: Singles  # (t,) A from the battery
     energy: Singles  # (t,) Wh used since the start
@@ -83,11 +95,11 @@ class Track:
     cross_track: Singles  # (t,) m right of the fly-by path, of the estimated state
     height_error: Singles  # (t,) m above the fly-by path
     speed_command: Singles  # (t,) m/s
-    clearance: Singles  # (t,) m above ground as the flight measured it; the verdict computes its own
+    clearance: Singles  # (t,) m above ground as measured in flight; the verdict computes its own
 
     def __post_init__(self) -> None:
-        """Give each array its type, and lock it."""
-        for item, kind in zip(fields(self), _KINDS, strict=True):
+        """Convert each array to its type, and lock it."""
+        for item, kind in zip(fields(self), _FIELD_TYPES, strict=True):
             given = getattr(self, item.name)
             array = np.ascontiguousarray(given, dtype=kind)
             if array.flags.writeable:
@@ -97,26 +109,32 @@ class Track:
             object.__setattr__(self, item.name, array)
 
     def __len__(self) -> int:
-        """How many rows there are."""
+        """Return the number of rows."""
         return int(self.time.size)
 
     def rows(self, start: int, stop: int) -> "Track":
-        """Rows start..stop as a track of their own."""
+        """Return rows start..stop as a track of their own."""
         return Track(*(getattr(self, item.name)[start:stop] for item in fields(self)))
 
     def to_pandas(self) -> Any:
-        """A `pandas.DataFrame`: a row a tick, columns with units in their names.
+        """Return a `pandas.DataFrame`: one row per tick, columns with units in their names.
 
-        Raises `planfly.MissingExtraError`, which is an ImportError, without the extra ``planfly[tables]``.
+        Raise `planfly.MissingExtraError`, which is an ImportError, without the extra ``planfly[tables]``.
         """
         return track_frame(self)
 
     def to_csv(self, path: Path | str) -> None:
-        """Write it as comma-separated text, whole or not at all; numbers read back as they were.  Raises OSError."""
+        """Write the track as comma-separated text, completely or not at all.
+
+        Numbers read back exactly. Raise OSError.
+        """
         write_track_csv(self, Path(path))
 
     def to_parquet(self, path: Path | str) -> None:
-        """Write it as Parquet.  Raises MissingExtraError without the extra ``planfly[tables]``, and OSError."""
+        """Write the track as Parquet.
+
+        Raise MissingExtraError without the extra ``planfly[tables]``, and OSError.
+        """
         write_track_parquet(self, Path(path))
 
     def __repr__(self) -> str:
@@ -124,11 +142,12 @@ class Track:
         return f"<{track_title(self)}>"
 
     def _repr_html_(self) -> str:
-        """How a notebook shows it."""
+        """Return the HTML that a notebook shows."""
         return track_html(self)
 
 
-_KINDS = [np.float64, np.float64, *([np.float32] * 11), np.int32, *([np.float32] * 4)]
+# Types of the fields of `Track`, in order.
+_FIELD_TYPES = [np.float64, np.float64, *([np.float32] * 11), np.int32, *([np.float32] * 4)]
 
 # A row as it is flown: the fields of `Track`, all of them float64.
 TRACK_ROW = record_dtype(
@@ -151,12 +170,12 @@ TRACK_ROW = record_dtype(
     "speed_command",
     "clearance",
 )
-# Columns of each field, in order; 1 means a plain (t,) array.
+# Number of columns of each field, in order; 1 for a plain (t,) array.
 COLUMNS = {name: math.prod(TRACK_ROW[name].shape) for name in field_names(TRACK_ROW)}
 
 
 def join_tracks(parts: list[Track]) -> Track:
-    """One track of parts that follow each other; an empty track for no parts.
+    """Join successive parts to one track; return an empty track for no parts.
 
     >>> rows = np.zeros(5, TRACK_ROW)
     >>> whole = join_tracks([as_track(rows[:2]), as_track(rows[2:])])
@@ -168,36 +187,40 @@ def join_tracks(parts: list[Track]) -> Track:
     return Track(*(np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS))
 
 
+# No rows, to join none.
 _NO_ROWS = np.zeros(0, TRACK_ROW)
-_STEPS = np.exp2([DIGITS.get(name, 0) for name, width in COLUMNS.items() if name != "time" for _ in range(width)])
+# Reciprocal resolution of each column but the time.
+_STEPS_PER_UNIT = np.exp2(
+    [DIGITS.get(name, 0) for name, width in COLUMNS.items() if name != "time" for _ in range(width)]
+)
 
 
 def quantised(rows: Rows) -> Rows:
-    """Copy of flown rows (t,) at the resolution of `DIGITS`, to the nearest, and without a negative zero.
+    """Return a copy of flown rows (t,) rounded to the resolution of `DIGITS`, without negative zeros.
 
-    It is done as a row is flown, so that whoever judges the flight and whoever reads its log see the same numbers.
+    Rows are rounded as they are flown, so that the verdict and every reader of the log see the same numbers.
     """
     numbers = _numbers(rows).copy()
-    _round_to_steps(numbers[:, 1:], _STEPS)
+    _round_to_steps(numbers[:, 1:], _STEPS_PER_UNIT)
     return numbers.view(TRACK_ROW)[:, 0]
 
 
 def _numbers(rows: Rows) -> Floats:
-    """The numbers of each row side by side, the time first: a view, (t, columns)."""
+    """Return the numbers of each row in columns, the time first: a view, (t, columns)."""
     return rows[:, np.newaxis].view(np.float64)
 
 
 @compiled
 def _round_to_steps(values: Floats, steps: Floats) -> None:  # pragma: no cover - compiled
-    """Round (t, n) to whole steps; (n,) of them make one."""
+    """Round values (t, n) to whole steps; ``steps`` (n,) is the number of steps per unit."""
     for row in range(values.shape[0]):
         for k in range(steps.size):
-            # + 0.0 for a negative zero.
+            # Adding 0.0 removes a negative zero.
             values[row, k] = np.rint(values[row, k] * steps[k]) / steps[k] + 0.0
 
 
 def join_rows(parts: Sequence[Rows]) -> Rows:
-    """Rows that follow each other as one array (t,); none for no parts.
+    """Join successive rows to one array (t,); return an empty array for no parts.
 
     >>> rows = np.zeros(6, TRACK_ROW)
     >>> rows["time"] = np.arange(6)
@@ -206,14 +229,14 @@ def join_rows(parts: Sequence[Rows]) -> Rows:
     >>> join_rows([rows[4:5], rows[5:]])["time"]
     array([4., 5.])
     """
-    # As numbers: numpy copies a record field by field, which takes a hundred times as long.
+    # As plain numbers: numpy copies a record field by field, which takes a hundred times as long.
     numbers = np.concatenate([_numbers(part) for part in (_NO_ROWS, *parts)])
-    # Of parts of one row each numpy makes columns that follow each other.
+    # For parts of one row each, numpy returns columns in contiguous memory.
     return np.ascontiguousarray(numbers).view(TRACK_ROW)[:, 0]
 
 
 def as_track(rows: Rows) -> Track:
-    """The track of flown rows, (t,) of `TRACK_ROW`.
+    """Return the track of flown rows, (t,) of `TRACK_ROW`.
 
     >>> rows = np.zeros(2, TRACK_ROW)
     >>> rows["time"] = 0.0, 0.5
@@ -228,7 +251,7 @@ def as_track(rows: Rows) -> Track:
 
 
 def track_rows(track: Track) -> Rows:
-    """The rows of a track, (t,) of `TRACK_ROW`.
+    """Return the rows of a track, (t,) of `TRACK_ROW`.
 
     >>> rows = np.zeros(3, TRACK_ROW)
     >>> rows["airspeed"] = 25.0
@@ -244,7 +267,7 @@ def track_rows(track: Track) -> Rows:
 # ----------------------------------------------------------------------
 # A track as a table: columns with their units in their names, for pandas, CSV and Parquet.
 
-# Field of `Track`: the names of its columns, each with its unit; a log's messages have them, too.
+# Column names of each field of `Track`, with units; a log's messages use them too.
 COLUMN_NAMES = {
     "time": ("time_s",),
     "position": ("east_m", "north_m", "up_amsl_m"),
@@ -270,12 +293,12 @@ COLUMN_NAMES = {
     "speed_command": ("speed_command_mps",),
     "clearance": ("clearance_seen_m",),
 }
-# Rows that are turned into text at a time.
-_ROWS = 10_000
+# Number of rows that are converted to text at a time.
+_ROWS_PER_WRITE = 10_000
 
 
 def track_columns(track: Track) -> dict[str, NDArray[Any]]:
-    """The columns (t,) of a track by name, in order, each of the type that the track has.
+    """Return the columns (t,) of a track by name, in order, each with the type in the track.
 
     >>> from flight.simulation.track import TRACK_ROW, as_track
     >>> columns = track_columns(as_track(np.zeros(3, TRACK_ROW)))
@@ -290,7 +313,7 @@ def track_columns(track: Track) -> dict[str, NDArray[Any]]:
 
 
 def track_frame(track: Track) -> Any:
-    """The track as a `pandas.DataFrame`.  Raises MissingExtraError without the extra ``tables``."""
+    """Return the track as a `pandas.DataFrame`. Raise MissingExtraError without the extra ``tables``."""
     need_extra("tables", "to_pandas() needs")
     import pandas as pd
 
@@ -298,22 +321,24 @@ def track_frame(track: Track) -> Any:
 
 
 def write_track_csv(track: Track, path: Path) -> None:
-    """Write a track as comma-separated text: a row of names, and numbers that read back as they were.
+    """Write a track as comma-separated text: a row of names, and numbers that read back exactly.
 
-    Raises OSError.
+    Raise OSError.
     """
     columns = track_columns(track)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    for first in range(0, len(track), _ROWS):
-        # As text each by its own type: the fewest digits that give a float32 back.
-        writer.writerows(zip(*(values[first : first + _ROWS].astype(str) for values in columns.values()), strict=True))
+    for first in range(0, len(track), _ROWS_PER_WRITE):
+        # Convert each column by its own type: the fewest digits that reproduce a float32.
+        writer.writerows(
+            zip(*(values[first : first + _ROWS_PER_WRITE].astype(str) for values in columns.values()), strict=True)
+        )
     write_whole(path, text.getvalue())
 
 
 def write_track_parquet(track: Track, path: Path) -> None:
-    """Write a track as Parquet.  Raises MissingExtraError without the extra ``tables``, and OSError."""
+    """Write a track as Parquet. Raise MissingExtraError without the extra ``tables``, and OSError."""
     need_extra("tables", "to_parquet() needs")
     import pyarrow as pa
     from pyarrow import parquet
@@ -324,7 +349,7 @@ def write_track_parquet(track: Track, path: Path) -> None:
 
 
 def track_html(track: Track) -> str:
-    """A track's columns with their first, last, least and largest values.
+    """Return an HTML table of a track's columns with their first, last, smallest and largest values.
 
     >>> from flight.simulation.track import join_tracks
     >>> track_html(join_tracks([]))
@@ -341,21 +366,23 @@ def track_html(track: Track) -> str:
 
 
 def track_title(track: Track) -> str:
-    """How many rows a track has, and of which times."""
+    """Return a title with the number of rows and the time span of a track."""
     if not len(track):
         return "Track: no rows"
     return f"Track: {len(track):,} rows, {track.time[0]:.1f} to {track.time[-1]:.1f} s"
 
 
 # ----------------------------------------------------------------------
-# The aircraft's controls: their limits, and when a flight asked for all that they give.
+# The aircraft's controls: their limits, and rows with saturated commands.
 
-# A control counts as at its limit within this share of its range.
-_EDGE = 1e-3
+# Tolerance for a command at its limit, as a fraction of its range.
+_LIMIT_TOLERANCE_FRACTION = 1e-3
 
 
 def control_limits(aircraft: str) -> list[tuple[str, float]]:
-    """Each control and its limit either way (rad; 1 for the throttle; NaN for an aircraft that is not known).
+    """Return each control and its limit in either direction.
+
+    In rad; 1 for the throttle; NaN for an unknown aircraft.
 
     >>> for name, limit in control_limits("aerosonde"):
     ...     print(f"{name} {limit:.2f}")
@@ -374,9 +401,9 @@ def control_limits(aircraft: str) -> list[tuple[str, float]]:
 
 
 def held_at_limit(track: Track, k: int, low: float, high: float) -> NDArray[np.bool_]:
-    """Rows at which control k (a column of `Track.commands`) is asked for its limit or more, (t,).
+    """Return the rows at which the command of control k (a column of `Track.commands`) is saturated, (t,).
 
-    low, high: its limits; none of the rows for NaN.
+    low, high: limits of the control; no row is saturated if they are NaN.
 
     >>> rows = np.zeros(3, TRACK_ROW)
     >>> rows["commands"][:, THROTTLE] = 0.5, 1.0, 0.9
@@ -384,5 +411,5 @@ def held_at_limit(track: Track, k: int, low: float, high: float) -> NDArray[np.b
     array([False,  True, False])
     """
     command = track.commands[:, k].astype(np.float64)
-    edge = _EDGE * (high - low)
+    edge = _LIMIT_TOLERANCE_FRACTION * (high - low)
     return np.asarray((command <= low + edge) | (command >= high - edge))

@@ -1,8 +1,8 @@
-"""Dryden turbulence on height above ground (MIL-F-8785C, low-altitude model).
+"""Dryden turbulence by height above ground (MIL-F-8785C, low-altitude model).
 
-JSBSim's own counts height from sea level, and leaves a pure east wind unrotated.  Above 300 m (1,000 ft) the
-low-altitude scales are held: there they are isotropic.  Rotational gusts are left out: an 11 kg aircraft is
-small against the scales.
+JSBSim's own model uses the height above sea level, and leaves a pure east wind unrotated. Above 300 m (1,000 ft) the
+low-altitude scales are kept: there they are isotropic. Rotational gusts are left out: an 11 kg aircraft is small
+relative to the scales.
 """
 
 import math
@@ -15,16 +15,16 @@ from world.kernels import Record, inner, record_dtype
 
 Floats = NDArray[np.float64]
 
-# State of the five first-order filters of unit variance: one along the wind, two in a row across and down.
+# State of the five first-order filters of unit variance: one along the wind, two in series across and down.
 GUST_FILTERS = record_dtype("along", "across_first", "across_second", "down_first", "down_second")
 
 
 @inner
 def dryden_scales(height: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Length scales L_u = L_v and L_w (m), and sigma_u / sigma_w, at a height above ground (m).
+    """Return length scales L_u = L_v and L_w (m), and sigma_u / sigma_w, at a height above ground (m).
 
-    MIL-F-8785C 3.7.3.4 with heights in feet: L_w = h, L_u = h / (0.177 + 0.000823 h)^1.2,
-    sigma_u / sigma_w = 1 / (0.177 + 0.000823 h)^0.4, 10 ft <= h <= 1,000 ft.
+    MIL-F-8785C 3.7.3.4 with heights in feet: L_w = h, L_u = h / (0.177 + 0.000823 h)^1.2, sigma_u / sigma_w = 1 /
+    (0.177 + 0.000823 h)^0.4, 10 ft <= h <= 1,000 ft.
     """
     h = min(1000.0, max(10.0, height / FOOT))
     base = 0.177 + 0.000823 * h
@@ -36,7 +36,7 @@ def dryden_scales(height: float) -> tuple[float, float, float]:  # pragma: no co
 def start_gusts(noise: Floats, filters: Record) -> None:
     """Draw the stationary state of the filters, a record of `GUST_FILTERS`, from (5,) unit normals."""
     filters.along, filters.across_first, across, filters.down_first, down = noise.tolist()
-    # Stationary: the second of two has a variance of 1/2, and as much in common with the first.
+    # In the stationary state the second of two filters has variance 1/2, and covariance 1/2 with the first.
     filters.across_second = 0.5 * filters.across_first + 0.5 * across
     filters.down_second = 0.5 * filters.down_first + 0.5 * down
 
@@ -47,9 +47,12 @@ def step_gusts(
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Advance by dt and return the gust along the mean wind, across it to the right, and down, m/s.
 
-    filters: a record of `GUST_FILTERS`.  noise: (3,) unit normals.  w20: wind at 20 ft, m/s; sigma_w = 0.1 w20.
+    filters: a record of `GUST_FILTERS`.
+    noise: (3,) unit normals.
+    w20: wind at 20 ft, m/s; sigma_w = 0.1 w20.
+
     Longitudinal: sigma / (1 + T s); transverse: sigma (1 + sqrt(3) T s) / (1 + T s)^2, as the sum of the outputs of two
-    equal lags in a row.
+    equal lags in series.
     """
     length_u, length_w, ratio = dryden_scales(height)
     sigma_w = 0.1 * w20
@@ -70,7 +73,7 @@ def step_gusts(
 def _transverse(
     first: float, second: float, noise: float, decay: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Both lags after a step, and the gust in standard deviations."""
+    """Return both lags after a step, and the gust in standard deviations."""
     before = first
     first = decay * before + math.sqrt(1.0 - decay * decay) * noise
     second = decay * second + (1.0 - decay) * 0.5 * (before + first)

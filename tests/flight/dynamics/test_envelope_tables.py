@@ -169,7 +169,7 @@ def test_damaged_cache_is_computed_anew(damage: Callable[[str], str], monkeypatc
     assert damage(sound) != sound
     file.write_text(damage(sound))
     # The trims themselves are tested above; here they only need to be asked for.
-    tables = {name: getattr(envelope, name) for name in flight.dynamics.envelope_tables._TABLES}
+    tables = {name: getattr(envelope, name) for name in flight.dynamics.envelope_tables._TABLE_NAMES}
     asked = []
 
     def compute(*arguments: object) -> dict[str, object]:
@@ -186,7 +186,7 @@ def test_undecodable_cache_is_computed_anew(monkeypatch: pytest.MonkeyPatch) -> 
     envelope = load_envelope(AEROSONDE)
     file = cache_file(AEROSONDE, False)
     sound = file.read_text()
-    tables = {name: getattr(envelope, name) for name in flight.dynamics.envelope_tables._TABLES}
+    tables = {name: getattr(envelope, name) for name in flight.dynamics.envelope_tables._TABLE_NAMES}
     monkeypatch.setattr(flight.dynamics.envelope_tables, "compute_tables", lambda *_: tables)
     file.write_bytes(b"\xff\xfe\x00")
     _assert_equal(envelope, load_envelope(AEROSONDE))
@@ -196,7 +196,7 @@ def test_undecodable_cache_is_computed_anew(monkeypatch: pytest.MonkeyPatch) -> 
 def test_unwritable_cache_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("")
     envelope = load_envelope(AEROSONDE)
-    tables = {name: getattr(envelope, name) for name in flight.dynamics.envelope_tables._TABLES}
+    tables = {name: getattr(envelope, name) for name in flight.dynamics.envelope_tables._TABLE_NAMES}
     # A folder below a file can be neither made nor read, whoever runs the test.
     monkeypatch.setattr(flight.dynamics.envelope_tables, "user_cache_dir", lambda name: str(tmp_path / "file" / name))
     monkeypatch.setattr(flight.dynamics.envelope_tables, "compute_tables", lambda *_: tables)
