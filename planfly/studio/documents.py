@@ -102,7 +102,7 @@ def open_dropped(name: str, data: bytes, world: World) -> Document:
     if suffix not in DROPPED:
         raise MissionError.at(shown, "suffix", suffix, f"allowed {', '.join(DROPPED)}", shown=repr(suffix))
     if suffix == ".json":
-        _refuse_plan_naming_files(shown, data)
+        _refuse_other_files(shown, data)
     with temporary_folder("planfly-studio-") as folder:
         file = folder / f"dropped{suffix}"
         file.write_bytes(data)
@@ -124,11 +124,11 @@ def _refuse_log_naming_files(name: str, file: Path) -> None:
         for _ in read_chunks(stream, found):
             pass
     if SCENARIO_FILE in found.attachments:
-        _refuse_plan_naming_files(name, b'{"scenario": ' + found.attachments[SCENARIO_FILE] + b"}")
-    _refuse_plan_naming_files(name, found.attachments.get(PLAN_FILE, b""))
+        _refuse_other_files(name, b'{"scenario": ' + found.attachments[SCENARIO_FILE] + b"}")
+    _refuse_other_files(name, found.attachments.get(PLAN_FILE, b""))
 
 
-def _refuse_plan_naming_files(name: str, data: bytes) -> None:
+def _refuse_other_files(name: str, data: bytes) -> None:
     """Refuse a plan whose scenario names files of this machine, which a page must not read."""
     try:
         scenario = json.loads(data)["scenario"]

@@ -208,13 +208,13 @@ def test_a_log_that_names_other_files_is_refused(tmp_path: Path, monkeypatch: py
     data = write_example_log(tmp_path / "l.mcap").read_bytes()
     open_dropped("l.mcap", data, World())
     seen: list[bytes] = []
-    monkeypatch.setattr(documents, "_refuse_plan_naming_files", lambda name, text: seen.append(text))
+    monkeypatch.setattr(documents, "_refuse_other_files", lambda name, text: seen.append(text))
     open_dropped("l.waypoints", data, World())
     monkeypatch.undo()
     scenario = json.loads(seen[0])
     scenario["scenario"].setdefault("flight", {})["params"] = "/etc/passwd"
     with pytest.raises(MissionError, match="names other files"):
-        documents._refuse_plan_naming_files("l.mcap", json.dumps(scenario).encode())
+        documents._refuse_other_files("l.mcap", json.dumps(scenario).encode())
 
 
 def test_only_the_commands_file_is_written_over_and_not_if_it_was_changed(tmp_path: Path) -> None:
