@@ -1,4 +1,4 @@
-"""A choice of plans for a scenario: the default plan as every command makes it, and others beside it."""
+"""Pareto front of plans for a scenario: the default plan of every command, and alternatives."""
 
 from planfly.airframe import Airframe
 from planfly.gust_circles import waypoints_in_gusts
@@ -20,11 +20,12 @@ def make_front(
     stop: StopCondition | None = None,
     onward: bool = False,
 ) -> Front:
-    """Up to `count` plans of a front, each of which is safe by all that `planfly.make_plan.make_plan` looks at.
+    """Return up to `count` plans of a front, each safe by all checks of `planfly.make_plan.make_plan`.
 
-    The default plan is that of `make_plan`, and where it is not safe there is no front. Others that are not safe once
-    they are finished are left out; where gusts make the autopilot circle, they have no more waypoints than gusts allow.
-    stop, onward: as of `make_plan`.
+    The default plan is made by `make_plan`, and if it is not safe there is no front. Alternatives that are not safe
+    once they are finished are left out; if gusts make the autopilot orbit, they have no more waypoints than gusts
+    allow.
+    stop, onward: as for `make_plan`.
     """
     default = make_plan(scenario, airframe, seed, advance=advance, stop=stop, onward=onward)
 

@@ -1,4 +1,4 @@
-"""A flight's log that an interruption leaves whole, with the rows so far, or not at all."""
+"""Flight log that survives an interruption: the file is complete up to that moment, or is removed."""
 
 import contextlib
 import os
@@ -18,17 +18,19 @@ from world.geometry import leg_runs
 from world.interruption import uninterrupted
 
 # ----------------------------------------------------------------------
-# How long a simulated flight may take, how large its log may grow, and what both come to by prediction.
+# Limits on the duration of a simulated flight and on the size of its log, with a prediction of the duration.
 
-# Longer than the aircraft that planfly has can stay up; a log of 60 rows a second grows by some 20 MB an hour.
-MAX_HOURS, MAX_MEGABYTES = 6.0, 256.0
+# Longest simulated flight, h: longer than any aircraft of planfly can stay in the air.
+MAX_HOURS = 6.0
+# Largest log, MB of 10^6 bytes; a log of 60 rows a second grows by about 20 MB an hour.
+MAX_MEGABYTES = 256.0
 
 
 @dataclass(frozen=True, slots=True)
 class FlightLimits:
-    """Where a flight ends that would go on.
+    """Limits at which a flight is ended.
 
-    hours: simulated.  megabytes: of its log, 10^6 bytes.
+    hours: simulated time.  megabytes: size of its log, 10^6 bytes.
 
     >>> FlightLimits(megabytes=20.0).log_full(20_000_001)
     'log limit: 20 MB are written; --max-log raises it'
@@ -38,18 +40,18 @@ class FlightLimits:
     megabytes: float = MAX_MEGABYTES
 
     def max_ticks(self, dt: float) -> int:
-        """Guidance ticks of dt s that are flown at most."""
+        """Return the greatest number of guidance ticks of dt s."""
         return round(3600.0 * self.hours / dt)
 
     def log_full(self, size: int) -> str:
-        """How a flight ends whose log has so many bytes, "" where it goes on."""
+        """Return the reason to end a flight whose log has this size in bytes; "" if it may go on."""
         if size <= 1e6 * self.megabytes:
             return ""
         return f"log limit: {self.megabytes:g} MB are written; --max-log raises it"
 
 
 def predicted_seconds(setup: FlightSetup) -> float:
-    """Time that a setup's path takes at its legs' airspeeds in still air, s.
+    """Return the time that the path of a setup takes at the airspeeds of its legs in still air, s.
 
     >>> from logs.recording.example_log import example_log
     >>> flown = example_log()
@@ -62,7 +64,7 @@ def predicted_seconds(setup: FlightSetup) -> float:
 
 
 def flight_text(setup: FlightSetup) -> str:
-    """What is about to be flown: its length and, by prediction, its time."""
+    """Describe the flight ahead: its length and its predicted time."""
     seconds = predicted_seconds(setup)
     time = f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
     if seconds >= 2.0 * 3600.0:
@@ -71,19 +73,19 @@ def flight_text(setup: FlightSetup) -> str:
 
 
 def flight_kind(setup: FlightSetup) -> str:
-    """What flights that take about as long a kilometre have in common: their autopilot."""
+    """Return the autopilot as the kind of a flight: flights of one kind take about as long a kilometre."""
     return f"flying by {setup.autopilot.name}"
 
 
-# How a flight ended that was still under way.
+# Ending of a flight that was still under way.
 INTERRUPTED = "interrupted"
 
 
 class CrashSafeLog:
-    """A `Recorder` as a context manager that Ctrl-C may end anywhere: what is written is written whole.
+    """Context manager around `Recorder` that leaves a valid log wherever Ctrl-C interrupts the flight.
 
-    An interrupted flight's log ends with how far it had got and holds no verdict, which `planfly check` gives; one
-    without a row is removed.  An error leaves the log unfinished, as `Recorder` does.
+    The log of an interrupted flight ends with the last row flown and holds no verdict, which `planfly check` gives; a
+    log without a row is removed.  An error leaves the log unfinished, as `Recorder` does.
 
     >>> import tempfile
     >>> from logs.recording.example_log import example_log
@@ -106,17 +108,17 @@ class CrashSafeLog:
         self.ended = INTERRUPTED
         self._path = path
         self._rows = 0
-        self._open = False
-        self._held = contextlib.ExitStack()
-        # Of a link that leads nowhere too nothing is removed.
+        self._is_open = False
+        self._locks = contextlib.ExitStack()
+        # Do not remove a symbolic link, even if it leads nowhere.
         existed = path.exists() or path.is_symlink()
         try:
-            with uninterrupted(), self._named_errors():
+            with uninterrupted(), self._errors_with_file_name():
                 path.touch()
-                # Before it is emptied: another's log stays as it is.
-                self._held.enter_context(hold(path))
+                # Take the lock before the file is emptied: a log held by another process stays as it is.
+                self._locks.enter_context(hold(path))
                 self._recorder = Recorder(path, setup, every=every, batch=batch)
-                self._open = True
+                self._is_open = True
         except BaseException as error:
             # A signal may have come while the log was opened.
             self.__exit__(type(error), error, None)
@@ -131,13 +133,13 @@ class CrashSafeLog:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close what is still open."""
-        with self._held:
-            if self._open:
-                self._open = False
-                self._leave(kind)
+        """Close the log if it is still open."""
+        with self._locks:
+            if self._is_open:
+                self._is_open = False
+                self._close_unfinished(kind)
 
-    def _leave(self, kind: type[BaseException] | None) -> None:
+    def _close_unfinished(self, kind: type[BaseException] | None) -> None:
         with uninterrupted():
             if kind is None or not issubclass(kind, KeyboardInterrupt):
                 self._recorder.abandon()
@@ -148,31 +150,31 @@ class CrashSafeLog:
                 Path(os.path.realpath(self._path)).unlink(missing_ok=True)
 
     def write(self, rows: Rows) -> None:
-        """Record rows as a flight hands them on."""
-        with uninterrupted(), self._named_errors():
+        """Record rows as they come from the flight."""
+        with uninterrupted(), self._errors_with_file_name():
             self._recorder.write_rows(rows)
             self._rows += len(rows)
 
     @property
     def size(self) -> int:
-        """Bytes of the file so far."""
+        """Present size of the file, bytes."""
         return self._recorder.size
 
     def event(self, time: float, text: str, level: str) -> None:
-        """Record what happened; arguments as of `Recorder.event`."""
+        """Record an event; arguments as for `Recorder.event`."""
         self._recorder.event(time, text, level)
 
     def finish(
         self, ended: str, verdict: Verdict, reference: ReferenceFlights | None, returns: DrawnReturns | None = None
     ) -> None:
         """Close the log of a flight that has been judged."""
-        with uninterrupted(), self._named_errors():
+        with uninterrupted(), self._errors_with_file_name():
             self._recorder.finish(ended, verdict, reference, returns)
-            self._open = False
+            self._is_open = False
 
     @contextlib.contextmanager
-    def _named_errors(self) -> Iterator[None]:
-        """The error of a full disk names the file."""
+    def _errors_with_file_name(self) -> Iterator[None]:
+        """Add the file name to the error of a full disk."""
         try:
             yield
         except OSError as error:

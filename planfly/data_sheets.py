@@ -1,4 +1,4 @@
-"""A whole aircraft's folder from a data sheet: model, metadata, gains, ArduPlane's parameters, what is not known."""
+"""Folder of an aircraft made from a data sheet: model, metadata, gains, parameters, uncertainty."""
 
 import math
 import re
@@ -41,40 +41,41 @@ from world.errors import FlightError
 from world.files import temporary_folder, write_folder
 
 # ----------------------------------------------------------------------
-# A file of ArduPlane's parameters says what its owner measured, where it differs from ArduPlane's own value.
+# A file of ArduPlane parameters contains measured values where it differs from the defaults of ArduPlane.
 
-# What is taken of it; speeds are equivalent airspeeds, and read as the sheet's.
-_TAKEN = (
+# Parameters that are used; speeds are equivalent airspeeds, and taken for the airspeeds of the sheet.
+_USED_PARAMETERS = (
     *("AIRSPEED_CRUISE", "AIRSPEED_MIN", "AIRSPEED_MAX", "TRIM_THROTTLE"),
     *("TECS_CLMB_MAX", "TECS_SINK_MIN", "ROLL_LIMIT_DEG"),
 )
-_MIN_BY_STALL = 1.2
+# Ratio of AIRSPEED_MIN to the stall speed.
+_MIN_AIRSPEED_STALL_RATIO = 1.2
 
 
 def stated_parameters(file: Path) -> dict[str, float]:
-    """Of a parameter file what says something of the aircraft: by present names, where they differ from ArduPlane's.
+    """Return the parameters of a file that describe the aircraft, by present name, where not the default.
 
     Raises ParameterError for a file that cannot be read.
     """
     entries = read_parameter_file(file)
     found = {}
     for definition in DEFINITIONS.values():
-        if definition.name not in _TAKEN:
+        if definition.name not in _USED_PARAMETERS:
             continue
-        value = _stated(entries, definition.name, definition.old)
+        value = _stated_value(entries, definition.name, definition.old)
         if value is not None and abs(value - definition.default) > 1e-6 * max(1.0, abs(definition.default)):
             found[definition.name] = value
     return found
 
 
-def _stated(entries: Mapping[str, Entry], name: str, old: tuple[str, float] | None) -> float | None:
+def _stated_value(entries: Mapping[str, Entry], name: str, old: tuple[str, float] | None) -> float | None:
     if name in entries:
         return entries[name].value
     return entries[old[0]].value * old[1] if old is not None and old[0] in entries else None
 
 
 def with_parameters(sheet: DataSheet, stated: Mapping[str, float]) -> DataSheet:
-    """A sheet with what parameters add to it; what the sheet states itself stays.
+    """Fill the gaps of a sheet from parameters; values of the sheet itself stay.
 
     >>> sheet = DataSheet(2.1, 1.6, 0.0, 0.0)
     >>> filled = with_parameters(sheet, {"AIRSPEED_CRUISE": 15.0, "AIRSPEED_MIN": 12.0, "TECS_CLMB_MAX": 3.0})
@@ -84,7 +85,7 @@ def with_parameters(sheet: DataSheet, stated: Mapping[str, float]) -> DataSheet:
     made = replace(
         sheet,
         cruise=sheet.cruise or stated.get("AIRSPEED_CRUISE", 0.0),
-        stall=sheet.stall or stated.get("AIRSPEED_MIN", 0.0) / _MIN_BY_STALL,
+        stall=sheet.stall or stated.get("AIRSPEED_MIN", 0.0) / _MIN_AIRSPEED_STALL_RATIO,
         bank=sheet.bank or math.radians(stated.get("ROLL_LIMIT_DEG", 0.0)),
         trim_throttle=sheet.trim_throttle or 0.01 * stated.get("TRIM_THROTTLE", 0.0),
         sink=sheet.sink or stated.get("TECS_SINK_MIN", 0.0),
@@ -96,18 +97,25 @@ def with_parameters(sheet: DataSheet, stated: Mapping[str, float]) -> DataSheet:
 
 
 # ----------------------------------------------------------------------
-# A sheet from what a person types: degrees, inches, volts and ampere hours.
+# Data sheet from user input: degrees, inches, volts and ampere hours.
 
-_INCH = 0.0254
+_METERS_PER_INCH = 0.0254
 _BATTERY = re.compile(r"([0-9.]+)\s*V\s*,\s*([0-9.]+)\s*(Ah|Wh|mAh)", re.IGNORECASE)
 _PROPELLER = re.compile(r"([0-9.]+)\s*[xX]\s*([0-9.]+)")
-_VOLTS, _HOURS, _INCHES = (3.0, 60.0), (0.5, 5000.0), (3.0, 40.0)
+# Accepted battery voltages, V.
+_VOLTAGE_RANGE_V = (3.0, 60.0)
+# Accepted battery capacities, Wh.
+_ENERGY_RANGE_WH = (0.5, 5000.0)
+# Accepted propeller diameters, inches.
+_DIAMETER_IN = (3.0, 40.0)
 
 
 def parse_sheet(
     numbers: Mapping[str, float | None], *, battery: str | None, prop: str | None, layout: str | None
 ) -> DataSheet:
-    """The sheet of these options; angles in degrees.  Raises FlightError, in one line, for what cannot be read.
+    """Make a sheet from options, angles in degrees.
+
+    Raises FlightError, in one line, for input that cannot be read.
 
     >>> sheet = parse_sheet({"mass": 2.1, "climb": 10.0}, battery="14.8V,5Ah", prop="12x6", layout="wing")
     >>> round(sheet.climb, 4), sheet.volts, round(sheet.energy / 3600.0), round(sheet.propeller[0], 4)
@@ -136,10 +144,12 @@ def _read_battery(text: str) -> tuple[float, float]:
     volts, amount = (_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     unit = match[3].lower() if match else ""
     hours = amount if unit == "wh" else volts * amount * (0.001 if unit == "mah" else 1.0)
-    if not (_VOLTS[0] <= volts <= _VOLTS[1] and _HOURS[0] <= hours <= _HOURS[1]):
+    if not (
+        _VOLTAGE_RANGE_V[0] <= volts <= _VOLTAGE_RANGE_V[1] and _ENERGY_RANGE_WH[0] <= hours <= _ENERGY_RANGE_WH[1]
+    ):
         allowed = (
-            f"volts and capacity are expected, such as 14.8V,5Ah: {_VOLTS[0]:g}..{_VOLTS[1]:g} V,"
-            f" {_HOURS[0]:g}..{_HOURS[1]:g} Wh"
+            f"volts and capacity are expected, such as 14.8V,5Ah: {_VOLTAGE_RANGE_V[0]:g}..{_VOLTAGE_RANGE_V[1]:g} V,"
+            f" {_ENERGY_RANGE_WH[0]:g}..{_ENERGY_RANGE_WH[1]:g} Wh"
         )
         raise FlightError.of_argument("battery", text, allowed)
     return volts, 3600.0 * hours
@@ -148,13 +158,13 @@ def _read_battery(text: str) -> tuple[float, float]:
 def _read_propeller(text: str) -> tuple[float, float]:
     match = _PROPELLER.fullmatch(text.strip())
     diameter, pitch = (_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
-    if not (_INCHES[0] <= diameter <= _INCHES[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
+    if not (_DIAMETER_IN[0] <= diameter <= _DIAMETER_IN[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
         allowed = (
-            f"inches of diameter and pitch are expected, such as 12x6: {_INCHES[0]:g}..{_INCHES[1]:g},"
+            f"inches of diameter and pitch are expected, such as 12x6: {_DIAMETER_IN[0]:g}..{_DIAMETER_IN[1]:g},"
             " and a quarter to one and a half of that"
         )
         raise FlightError.of_argument("prop", text, allowed)
-    return diameter * _INCH, pitch * _INCH
+    return diameter * _METERS_PER_INCH, pitch * _METERS_PER_INCH
 
 
 def _number(text: str) -> float:
@@ -165,9 +175,9 @@ def _number(text: str) -> float:
 
 
 # ----------------------------------------------------------------------
-# What is not known: standard deviations of the model's factors.
+# Uncertainty: standard deviations of the factors of the model.
 
-# Of what is guessed, as a share, and why.
+# Standard deviation of each guessed factor, as a fraction, with its reason.
 _SPREADS = {
     "zero-lift-drag": (0.25, "least drag from published aircraft of the class"),
     "induced-drag": (0.20, "span efficiency from published aircraft of the class"),
@@ -181,24 +191,27 @@ _SPREADS = {
     "roll-damping": (0.20, "roll damping from published aircraft of the class"),
     "aileron-power": (0.20, "ailerons from published aircraft of the class"),
 }
-# Of the steepest climb, rad: guessed, and stated.  Measured on three aircraft of known truth, a scaled model was off by
-# 4.8 degrees on average (docs/measured.md); of a normal distribution that is sqrt(2 / pi) = 0.8 of the deviation.
-GUESSED_CLIMB, STATED_CLIMB = math.radians(6.0), math.radians(3.0)
-# Of the least drag where a sink without power is stated.
+# Standard deviation of a guessed steepest climb, rad.  Measured on three aircraft of known truth, a scaled model was
+# off by 4.8 degrees on average (docs/measured.md); of a normal distribution that is sqrt(2 / pi) = 0.8 of the
+# deviation.
+GUESSED_CLIMB = math.radians(6.0)
+# Standard deviation of a stated steepest climb, rad.
+STATED_CLIMB = math.radians(3.0)
+# Standard deviation of the zero-lift drag if a sink without power is stated, as a fraction.
 STATED_DRAG = 0.15
 _PROPULSION = ("thrust", "motor-speed")
 
 
 def _uncertainty(made: SizedAircraft, aircraft: Aircraft, flown: "Performance", climb: float) -> Uncertainty:
-    """Standard deviations such that the steepest climb has the one that it is to have (rad), or a larger one.
+    """Return standard deviations that give the steepest climb at least the deviation `climb` (rad).
 
-    flown: by the aircraft as estimated.
+    flown: performance of the aircraft as estimated.
     """
     middle = np.array([flown.climb.climb, flown.idle.climb, flown.fastest.airspeed])
     spreads = {name: sd for name, (sd, _) in _SPREADS.items()}
     if made.sheet.sink:
         spreads["zero-lift-drag"] = STATED_DRAG
-    moved = {name: _moved(aircraft, middle, name, spreads[name]) for name in spreads}
+    moved = {name: _effect_of_factor(aircraft, middle, name, spreads[name]) for name in spreads}
     driven = math.hypot(*(moved[name][0] for name in _PROPULSION))
     other = math.hypot(*(change for name, (change, *_) in moved.items() if name not in _PROPULSION))
     wanted = math.sqrt(max((0.3 * climb) ** 2, climb**2 - other**2))
@@ -206,20 +219,21 @@ def _uncertainty(made: SizedAircraft, aircraft: Aircraft, flown: "Performance", 
     spreads |= {name: share * spreads[name] for name in _PROPULSION}
     descent = math.hypot(*(change for _, change, _ in moved.values()))
     faster = math.hypot(*(change * (share if name in _PROPULSION else 1.0) for name, (*_, change) in moved.items()))
-    # The aircraft is known to fly level at the cruise speed that its sheet states.
+    # The sheet states level flight at cruise speed, which limits the deviation.
     faster = min(faster, max(0.0, flown.fastest.airspeed - aircraft.airspeed) / UNDECIDED)
     quantities = tuple(
         UncertainQuantity(f"ident/{name}", "factor", 1.0, sd, _SPREADS[name][1]) for name, sd in spreads.items()
     )
-    # The factors of motor and propeller go only so far; what is said of the climb does not shrink with them.
+    # The factors of motor and propeller are limited; the deviation of the climb does not shrink with them.
     deviation = max(climb, math.hypot(other, share * driven))
     guessed = "energy" in made.guessed
     return Uncertainty("a data sheet", deviation, descent, quantities, POWER_SD, guessed, faster)
 
 
-def _moved(aircraft: Aircraft, middle: Floats, name: str, sd: float) -> tuple[float, float, float]:
-    """How far one standard deviation of a factor moves the steepest climb and descent at cruise, rad, and the top, m/s.
+def _effect_of_factor(aircraft: Aircraft, middle: Floats, name: str, sd: float) -> tuple[float, float, float]:
+    """Return the effect of one deviation of a factor on climb and descent, rad, and top speed, m/s.
 
+    Climb and descent are the steepest at cruise speed.
     middle: (3,) both path angles and the fastest level flight of the aircraft as estimated.
     """
     found = []
@@ -235,10 +249,10 @@ def _moved(aircraft: Aircraft, middle: Floats, name: str, sd: float) -> tuple[fl
 
 
 def change_of(more: Floats, less: Floats, middle: Floats) -> Floats:
-    """(n,) how far a factor moves path angles and speeds, from those with more and with less of it.
+    """Return the change (n,) of path angles and speeds by a factor, from values with more and less of it.
 
-    One is NaN where the aircraft does not trim: the change to the one that there is then counts, and the whole of it if
-    there is neither.  middle: (n,) as estimated.
+    A value is NaN if the aircraft does not trim: the change to the other value applies then, and the whole value if
+    both are NaN.  middle: (n,) as estimated.
 
     >>> more, less = np.array([0.3, math.nan, math.nan]), np.array([0.1, 0.05, math.nan])
     >>> change_of(more, less, np.array([0.2, 0.2, -0.2])).round(2).tolist()
@@ -253,14 +267,16 @@ def change_of(more: Floats, less: Floats, middle: Floats) -> Floats:
 # ----------------------------------------------------------------------
 # The folder.
 
-# Least airspeed that guidance may use, by the stall's, and the largest by level flight's fastest.
-MIN_SPEED, MAX_SPEED = 1.12, 0.95
+# Least airspeed that guidance may use, as a ratio to the stall speed.
+MIN_SPEED = 1.12
+# Largest airspeed that guidance may use, as a ratio to the fastest level flight.
+MAX_SPEED = 0.95
 _MAX_PITCH_DEG = 25.0
 
 
 @dataclass(frozen=True, slots=True)
 class Performance:
-    """Trims of the model at cruise speed and `AMSL`: level, steepest climb, idle; slowest and fastest level flight."""
+    """Trims of the model at cruise speed and `AMSL`, and its slowest and fastest level flight."""
 
     level: Trim
     climb: Trim
@@ -274,8 +290,8 @@ def make_data_sheet_folder(
 ) -> Aircraft:
     """Make the folder of an aircraft from its data sheet, completely or not at all.
 
-    parameters: a file of ArduPlane's parameters, whose values add to the sheet where it leaves them open.
-    made: a sized aircraft, for one of another class than its layout's.
+    parameters: file of ArduPlane parameters, which fill the gaps of the sheet.
+    made: sized aircraft, for a class other than the default class of the layout.
     Raises FlightError, in one line with the allowed range, for a sheet of no small aircraft, a folder that exists, and
     an aircraft that cannot be made to fly; ParameterError for a file that cannot be read; OSError.
     """
@@ -283,15 +299,15 @@ def make_data_sheet_folder(
     stated = {} if parameters is None else stated_parameters(parameters)
     if made is None:
         sheet = with_parameters(sheet, stated)
-        _refuse_missing(sheet)
+        _require_numbers(sheet)
         made = size_aircraft(check_sheet(sheet))
     with temporary_folder("planfly-sheet-") as place:
-        files = _files(made, target.name, place, stated)
+        files = _make_files(made, target.name, place, stated)
     write_folder(target, {name: text.encode() for name, text in files.items()})
     return read_aircraft(target)
 
 
-def _refuse_missing(sheet: DataSheet) -> None:
+def _require_numbers(sheet: DataSheet) -> None:
     for name in ("mass", "span", "cruise", "stall"):
         if not getattr(sheet, name):
             low, high, unit = RANGES[name][2], RANGES[name][3], RANGES[name][1]
@@ -299,8 +315,8 @@ def _refuse_missing(sheet: DataSheet) -> None:
             raise FlightError.of_argument(name, None, allowed, shown="")
 
 
-def _files(made: SizedAircraft, name: str, place: Path, stated: Mapping[str, float]) -> dict[str, str]:
-    """The folder's files, worked out on a draft of it."""
+def _make_files(made: SizedAircraft, name: str, place: Path, stated: Mapping[str, float]) -> dict[str, str]:
+    """Return the files of the folder, computed with a draft of it."""
     draft = place / name
     draft.mkdir()
     model = model_xml(name, made.numbers)
@@ -309,7 +325,7 @@ def _files(made: SizedAircraft, name: str, place: Path, stated: Mapping[str, flo
     (draft / f"{name}.toml").write_text(_metadata(made, sheet.stall, sheet.stall, sheet.top), encoding="utf-8")
     aircraft = read_aircraft(draft)
     flown = performance_of(Fdm(aircraft, tried=True), aircraft)
-    # The propeller carries a little at the stall; the sheet's counts where the model could fly slower.
+    # The propeller carries a little at the stall; the stall speed of the sheet applies if the model could fly slower.
     slow = max(sheet.stall, math.ceil(10.0 * flown.slowest.airspeed * math.sqrt(SHEET_DENSITY / SEA_LEVEL)) / 10.0)
     least = min(max(slow, MIN_SPEED * slow), sheet.cruise)
     most = max(sheet.cruise, MAX_SPEED * flown.fastest.airspeed)
@@ -332,7 +348,7 @@ def _files(made: SizedAircraft, name: str, place: Path, stated: Mapping[str, flo
 
 
 def performance_of(fdm: Simulator, aircraft: Aircraft) -> Performance:
-    """What it flies like.  Raises FlightError where one of these flights does not exist."""
+    """Trim the aircraft in all its flight conditions.  Raises FlightError if one of them does not exist."""
     cruise = aircraft.airspeed
     level = straight(fdm, cruise, AMSL)
     if level is None:
@@ -387,15 +403,15 @@ motor_lag_s = {numbers.lag[1]:.6g}
 
 
 # ----------------------------------------------------------------------
-# ArduPlane's parameters and servos.
+# ArduPlane parameters and servos.
 
 
 def arduplane_parameters(aircraft: Aircraft, flown: Performance, fdm: Fdm, stated: Mapping[str, float]) -> str:
-    """The text of ``ardupilot.parm``; what a file of parameters states of the aircraft stays as it is there."""
+    """Return the text of ``ardupilot.parm``; parameters stated in a file stay as they are there."""
     a, b = linearise(fdm, flown.level)
     cruise, bank = aircraft.airspeed, aircraft.max_bank
     p, q, elevator, aileron = 3, 4, 0, 1
-    # Feed-forward of a rate: 45 degrees by the rate that the full surface gives.
+    # Feed-forward of a rate: 45 degrees divided by the rate that full deflection gives.
     roll_rate = abs(b[p, aileron] / a[p, p]) * aircraft.max_aileron
     pitch_rate = abs(b[q, elevator] / a[q, q]) * aircraft.max_elevator
     roll, pitch = (min(3.0, max(0.05, math.radians(45.0) / rate)) for rate in (roll_rate, pitch_rate))
@@ -437,7 +453,7 @@ def arduplane_parameters(aircraft: Aircraft, flown: Performance, fdm: Fdm, state
 
 
 def servo_text(aircraft: Aircraft, flown: Performance) -> str:
-    """The text of ``ardupilot.toml``: controls before any mixer, which the model itself has."""
+    """Return the text of ``ardupilot.toml``: controls before any mixer, which is part of the model."""
     elevator, aileron, rudder = (
         math.degrees(value) for value in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)
     )
@@ -470,9 +486,9 @@ value_deg = [{rudder:.1f}, 0.0, {-rudder:.1f}]
 
 
 # ----------------------------------------------------------------------
-# What a person reads.
+# The README.
 
-_SHOWN = (
+_README_ROWS = (
     ("mass", "mass", "kg", 1.0),
     ("span", "wing span", "m", 1.0),
     ("area", "wing area", "m2", 1.0),
@@ -503,7 +519,7 @@ def _readme(
         "| | | |",
         "|---|---|---|",
     ]
-    for field, title, unit, factor in _SHOWN:
+    for field, title, unit, factor in _README_ROWS:
         if value := factor * getattr(sheet, field):
             lines.append(f"| {title} | {value:.4g} {unit} | {'guessed' if field in made.guessed else 'stated'} |")
     if stated:

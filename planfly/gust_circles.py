@@ -1,8 +1,9 @@
-"""Waypoints at which gusts make an autopilot circle: a plan has as few of them as it can, or is not safe.
+"""Limit on the number of waypoints, because gusts can make an autopilot orbit a waypoint.
 
-PX4 flies on at a waypoint only within NAV_FW_ALT_RAD of its height.  Moderate turbulence throws light aircraft further
-than that now and then, and a circle leads away from all that a plan keeps clear of.  So a plan has as many waypoints
-as leave less than `MOST_CIRCLES` circles to a flight, and says so where it needs more.
+PX4 flies on at a waypoint only within NAV_FW_ALT_RAD of its altitude; otherwise it orbits the waypoint.  Moderate
+turbulence displaces light aircraft further than that now and then, and an orbit leaves the airspace that the plan was
+checked for.  Therefore a plan may have only as many waypoints as give less than `MOST_CIRCLES` expected orbits a
+flight. A plan that needs more is refused with the reason.
 """
 
 from collections.abc import Callable
@@ -18,13 +19,13 @@ from planner.search.fewer_waypoints import drop_waypoints
 from world.geometry import turning_angles
 from world.scenario import Scenario
 
-# Circles that a flight may expect; about every second one leaves the corridor (of 186 flights, with 58 waypoints passed
-# too high or too low, 30 failed).
+# Expected orbits in a flight that are accepted; about every second one leaves the corridor (of 186 flights, with 58
+# waypoints passed too high or too low, 30 failed).
 MOST_CIRCLES = 0.03
-# What gusts make of a corner's excursion, m: of 28 m they made 36 at the most in 8 flights.
+# Growth of the excursion at a corner in gusts, m: of 28 m they made 36 at the most in 8 flights.
 GUSTS_ASIDE = 8.0
-# Values of the autopilot's parameter that are looked at for what would help, m.
-_HELPFUL = range(5, 105, 5)
+# Values of the autopilot's altitude parameter that are tried as a remedy, m.
+_TRIED_ALTITUDE_RADII_M = range(5, 105, 5)
 
 
 def settle_in_gusts(
@@ -33,12 +34,12 @@ def settle_in_gusts(
     search: Callable[[Scenario], Plan] | None = None,
     within: Limits | None = None,
 ) -> Plan:
-    """The plan if it has few enough waypoints for its turbulence; otherwise one with fewer.
+    """Return the plan if it has few enough waypoints for its turbulence; otherwise a plan with fewer.
 
-    Where none with fewer is found, the plan is returned with the reason in its certificate, and is not safe.
+    If no plan with fewer is found, the plan is returned with the reason in its certificate, and is not safe.
 
-    search: plans a scenario as the plan was planned; None not to look for another path.
-    within: limits that the plan was planned in; None for the aircraft's.
+    search: plans a scenario as the plan was planned; None to search for no other path.
+    within: limits that the plan was made in; None for the limits of the aircraft.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -54,21 +55,21 @@ def settle_in_gusts(
     if not plan.safe or expected == 0.0:
         return plan
     if expected <= MOST_CIRCLES:
-        # With as many waypoints as plans have where nobody circles, no corner is too sharp.
+        # With as many waypoints as plans have without orbits, no corner is too sharp.
         has_all = len(plan.waypoints) >= plan.scenario.planner.waypoints
-        return plan if has_all or _is_settled(plan, airframe) else _refused(plan, _what_is_wide(plan, airframe))
+        return plan if has_all or _is_accepted(plan, airframe) else _refused(plan, _corridor_problem(plan, airframe))
     fewer = drop_waypoints(plan, limits if within is None else within)
-    if _is_settled(fewer, airframe):
+    if _is_accepted(fewer, airframe):
         return fewer
     circles, count = expected_circles(fewer, autopilot, limits), len(fewer.waypoints) - 2
     if search is not None:
-        # By the chance at a waypoint of this path: on another it may be less.
+        # Assume the orbit probability per waypoint of this path: on another path it may be lower.
         allowed, scenario = max(1, int(MOST_CIRCLES * count / circles)), plan.scenario
         table = scenario.planner.model_copy(update={"waypoints": allowed + 2})
         other = replace(search(replace(scenario, planner=table)), scenario=scenario)
-        if other.safe and _is_settled(other, airframe):
+        if other.safe and _is_accepted(other, airframe):
             return other
-    return _refused(plan, _what_is_wrong(plan, autopilot, limits))
+    return _refused(plan, _orbit_problem(plan, autopilot, limits))
 
 
 def _refused(plan: Plan, problem: str) -> Plan:
@@ -76,20 +77,20 @@ def _refused(plan: Plan, problem: str) -> Plan:
     return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, problem)))
 
 
-def _is_settled(plan: Plan, airframe: Airframe) -> bool:
-    """Whether a plan expects few enough circles, and no corner, sharper for being one of few, leaves its corridor."""
+def _is_accepted(plan: Plan, airframe: Airframe) -> bool:
+    """Return True if a plan expects few enough orbits and no corner leaves the corridor."""
     if expected_circles(plan, airframe.autopilot, airframe.limits.surely()) > MOST_CIRCLES:
         return False
-    return max(_excursions(plan, airframe), default=0.0) <= _corridor(plan, airframe)
+    return max(_excursions(plan, airframe), default=0.0) <= _half_width(plan, airframe)
 
 
-def _corridor(plan: Plan, airframe: Airframe) -> float:
-    """How far (m) from its legs a plan's flight may be."""
+def _half_width(plan: Plan, airframe: Airframe) -> float:
+    """Return the largest distance from its legs that a flight of the plan may have, m."""
     return corridor_half_width(plan.scenario.limits.corridor_m, airframe.autopilot.acceptance_radius)
 
 
 def _excursions(plan: Plan, airframe: Airframe) -> list[float]:
-    """How far (m) from its legs each corner of a plan is flown in gusts; none where that is not known."""
+    """Return the distance from the legs at each corner in gusts, m; an empty list if not known."""
     limits = airframe.limits
     if (tracking := limits.tracking) is None:
         return []
@@ -97,20 +98,20 @@ def _excursions(plan: Plan, airframe: Airframe) -> list[float]:
     return [tracking.corner_excursion(float(one), v) + GUSTS_ASIDE for one, v in zip(turns, speeds, strict=True)]
 
 
-def _what_is_wide(plan: Plan, airframe: Airframe) -> str:
-    """Which corner leaves the corridor, in one line."""
+def _corridor_problem(plan: Plan, airframe: Airframe) -> str:
+    """Describe in a line the corner that leaves the corridor."""
     excursions = _excursions(plan, airframe)
     aside = max(excursions)
     return (
         f"in {plan.scenario.wind.turbulence} turbulence {airframe.autopilot.title} is {aside:.0f} m off the legs at the"
-        f" corner of waypoint {1 + excursions.index(aside)}; the corridor is {_corridor(plan, airframe):.0f} m"
+        f" corner of waypoint {1 + excursions.index(aside)}; the corridor is {_half_width(plan, airframe):.0f} m"
     )
 
 
 def expected_circles(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
-    """Circles at waypoints between its ends that a flight of a plan may expect.
+    """Return the expected number of orbits at the inner waypoints of a plan in one flight.
 
-    A leg that climbs or sinks leaves less of what the aircraft can; what is left counts against the gusts.
+    A leg that climbs or sinks leaves less of the climb or sink rate of the aircraft to act against the gusts.
     """
     turbulence, expected = plan.scenario.wind.turbulence, 0.0
     for rate, waypoint in zip(limits.climb_rates(plan.waypoints)[:-1, 1].tolist(), plan.waypoints[1:-1], strict=True):
@@ -120,7 +121,7 @@ def expected_circles(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
 
 
 def waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
-    """How many waypoints, both ends among them, other plans beside a safe one may have: as many as level flight allows.
+    """Return the most waypoints, ends included, that level flight allows in alternatives to a safe plan.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -138,12 +139,12 @@ def waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
     return max(count, min(scenario.planner.waypoints, 2 + int(MOST_CIRCLES / chance)))
 
 
-def _what_is_wrong(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
-    """Why a plan is not safe in its turbulence, and what would help, in one line."""
+def _orbit_problem(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
+    """Explain in a line why a plan is not safe in its turbulence, and what would help."""
     count, name = len(plan.waypoints) - 2, autopilot.height_parameter
     circles = expected_circles(plan, autopilot, limits)
     helps = "Less turbulence"
-    for value in _HELPFUL:
+    for value in _TRIED_ALTITUDE_RADII_M:
         if expected_circles(plan, autopilot.with_parameters(**{name: float(value)}), limits) <= MOST_CIRCLES:
             helps = f"{name} of {value} m"
             break

@@ -1,9 +1,9 @@
-"""Height that gusts take from or give to an aircraft that climbs or sinks less than they do, and plans that allow it.
+"""Altitude margin a plan needs because gusts can exceed the climb or sink rate of the aircraft.
 
-In a downdraft planfly's guidance gives up height before it stalls; in an updraft ArduPlane and PX4 rise before they
-exceed their airspeed. A plan is safe only if each leg leaves as much height as a gust may take or give there: above its
-clearance, below a maximum height above ground, and above or below missiles and zones. Where a plan leaves less, another
-is searched for that keeps further away and leaves more climb or sink unused.
+In a downdraft planfly's guidance gives up altitude before it stalls; in an updraft ArduPlane and PX4 rise before they
+exceed their airspeed.  A plan is safe only if each leg leaves as much height as a gust may take or give there: above
+its clearance, below a maximum height above ground, and above or below missiles and zones.  If a plan leaves less,
+another one is searched for that keeps further away and leaves more climb or sink unused.
 """
 
 import math
@@ -32,36 +32,41 @@ Floats = NDArray[np.float64]
 Search = Callable[[Limits], Plan]
 Gust = Literal["downdrafts", "updrafts"]
 
-# Rate of climb that a higher plan leaves unused for downdrafts: this many standard deviations of the vertical gusts,
-# but at most this share of the fastest climb. Where a height limit lies above the plan, a larger share is tried, too:
-# the more climb is left, the less height a downdraft takes.
-_UNUSED_SIGMAS, _UNUSED_SHARE, _UNUSED_SHARE_BELOW_A_LIMIT = 1.2, 0.25, 0.75
-# The same for the rate of sink that a lower plan leaves unused for updrafts.
-_UNUSED_SINK_SIGMAS, _UNUSED_SINK_SHARE = 1.0, 0.6
-# At a fixed end a flight spends only seconds: there a plan keeps this share of the height that level flight takes, and
-# from there more, until it is the whole of what the leg takes at this distance (m). Of 24 flights each of a Zagi in
-# moderate turbulence between ends with a half, none came below its clearance over ground at 0, 1,500 and 3,000 m; with
-# a quarter 5 did at 3,000 m.
-_SHARE_AT_ENDS, _GROWS_OVER = 0.5, 1500.0
-# Length of the parts of a leg near an end that are judged by themselves, m.
-_PART = 250.0
-# A path is compared with missiles and zones at heights that differ by this, m: none thicker is missed.
-_STEP = 2.5
-# A part of a leg must be this many times as long as the tangent of a turn that it holds.
-_LONGER_THAN_TANGENT = 1.05
+# Rate of climb that a higher plan leaves unused for downdrafts, in standard deviations of the vertical gusts.
+_UNUSED_SIGMAS = 1.2
+# Largest fraction of the fastest climb that is left unused.
+_UNUSED_CLIMB_FRACTION = 0.25
+# The same if a height limit lies above the plan: the more climb is left, the less height a downdraft takes.
+_UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT = 0.75
+# Rate of sink that a lower plan leaves unused for updrafts, in standard deviations of the vertical gusts.
+_UNUSED_SINK_SIGMAS = 1.0
+# Largest fraction of the fastest sink that is left unused.
+_UNUSED_SINK_FRACTION = 0.6
+# Fraction of the height needed in level flight that a plan keeps at a fixed end, where a flight spends only seconds.
+# Of 24 flights each of a Zagi in moderate turbulence between ends with a half, none came below its clearance over
+# ground at 0, 1,500 and 3,000 m; with a quarter 5 did at 3,000 m.
+_END_HEIGHT_FRACTION = 0.5
+# Distance from an end at which a plan keeps the full height that its leg needs, m; it grows linearly up to there.
+_FULL_HEIGHT_DISTANCE_M = 1500.0
+# Length of the parts of a leg near an end that are judged separately, m.
+_PART_LENGTH_M = 250.0
+# Height step at which a path is compared with missiles and zones, m: none thicker is missed.
+_HEIGHT_STEP_M = 2.5
+# Least ratio of the length of a part of a leg to the tangent of a turn in it.
+_TANGENT_RATIO = 1.05
 # Tolerance for rounding, m.
-_EPSILON = 1e-6
+_ROUNDING_TOLERANCE_M = 1e-6
 
 
 class Shortfall(NamedTuple):
-    """Something that a gust may take a plan into.
+    """Hazard that gusts may take a plan into.
 
     gust: "downdrafts" or "updrafts".
-    depth: m.
-    into: "into" a clearance, a missile's reach or a zone, "out of" one, or "above" a height, with its name.
-    where: on which leg, or at which end.
-    at_end: "start" or "destination" if no other path helps, because of the height of the end itself; otherwise "".
-    of_threats: whether it is a missile or a zone.
+    depth: how deep, m.
+    into: "into" a clearance, a missile's reach or a zone, "out of" a zone, or "above" a height, with its name.
+    where: the leg or the end.
+    at_end: "start" or "destination" if no other path helps, because the end itself is too low or high; otherwise "".
+    of_threats: true for a missile or a zone.
     """
 
     gust: Gust
@@ -73,11 +78,11 @@ class Shortfall(NamedTuple):
 
 
 def keep_height(plan: Plan, airframe: Airframe, search: Search | None = None) -> Plan:
-    """The plan if each leg leaves the height that a gust of one in a hundred takes or gives; otherwise another plan.
+    """Return the plan if each leg leaves the height for a one-in-a-hundred gust, or another plan.
 
-    Where no other plan is found, the plan is returned with the reason in its certificate, and is not safe.
+    If no other plan is found, the plan is returned with the reason in its certificate, and is not safe.
 
-    search: plans the same scenario within other limits; None if no other path is wanted.
+    search: plans the same scenario within other limits; None to search for no other path.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -88,10 +93,10 @@ def keep_height(plan: Plan, airframe: Airframe, search: Search | None = None) ->
     >>> keep_height(plan, airframe) is plan
     True
     """
-    if not plan.safe or not _is_moved(plan, airframe):
+    if not plan.safe or not _gusts_matter(plan, airframe):
         return plan
-    if no_height_is_enough := _climbs_too_little(plan, airframe):
-        return _refused(plan, [no_height_is_enough])
+    if climb_problem := _climb_problem(plan, airframe):
+        return _refused(plan, [climb_problem])
     shortfalls = find_shortfalls(plan, airframe)
     if not shortfalls:
         return plan
@@ -99,18 +104,23 @@ def keep_height(plan: Plan, airframe: Airframe, search: Search | None = None) ->
         other = _other_plan(plan, airframe, search, shortfalls)
         if other is not None:
             return other
-    return _refused(plan, [_in_words(one, plan, airframe) for one in shortfalls])
+    return _refused(plan, [_shortfall_text(one, plan, airframe) for one in shortfalls])
 
 
-def _is_moved(plan: Plan, airframe: Airframe) -> bool:
-    """Whether gusts may take the aircraft into something by more than its tracking error allows for."""
-    return any(moves(0.0, plan.scenario.wind.turbulence) for _, moves in _movements(plan.scenario, airframe.autopilot))
+def _gusts_matter(plan: Plan, airframe: Airframe) -> bool:
+    """Return True if gusts may move the aircraft further than its tracking error allows for."""
+    return any(
+        displacement(0.0, plan.scenario.wind.turbulence)
+        for _, displacement in _gust_displacements(plan.scenario, airframe.autopilot)
+    )
 
 
-def _movements(scenario: Scenario, autopilot: Autopilot) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
-    """Kinds of gusts that may take an autopilot into something, and how far (m) by the climb or sink left (m/s)."""
+def _gust_displacements(
+    scenario: Scenario, autopilot: Autopilot
+) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
+    """Return the gusts that matter, with their displacement (m) as a function of the rate left (m/s)."""
     found: list[tuple[Gust, Callable[[float, Turbulence], float]]] = [("downdrafts", autopilot.gust_sink)]
-    # Above a path is nothing to come into but a maximum height or a zone.
+    # Above a path there is nothing to hit but a maximum height or a zone.
     if scenario.zones or scenario.limits.max_height_m is not None:
         found.append(("updrafts", autopilot.gust_rise))
     return found
@@ -121,8 +131,8 @@ def _refused(plan: Plan, problems: list[str]) -> Plan:
     return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, *problems)))
 
 
-def _climbs_too_little(plan: Plan, airframe: Airframe) -> str:
-    """Why no height is enough for the downdrafts at the height of a plan, in one line; "" if some is.
+def _climb_problem(plan: Plan, airframe: Airframe) -> str:
+    """Explain in a line why no height is enough for downdrafts at the plan's altitude; "" if one is.
 
     With a climb of less than `LEAST_SIGMAS`, several downdrafts take an aircraft down before it has climbed back. Of 24
     flights of a Zagi that climbs 0.57 standard deviations 3 came down by more than 47 m, of 24 with 0.8 none did.
@@ -139,17 +149,17 @@ def _climbs_too_little(plan: Plan, airframe: Airframe) -> str:
 
 
 def _other_plan(plan: Plan, airframe: Airframe, search: Search, shortfalls: list[Shortfall]) -> Plan | None:
-    """A plan that leaves the height that gusts need, None if none is found. shortfalls: of the plan."""
-    shares = [_UNUSED_SHARE]
-    if _is_below_a_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
-        shares.append(_UNUSED_SHARE_BELOW_A_LIMIT)
+    """Search for a plan that leaves the height that gusts need, or return None if there is none."""
+    shares = [_UNUSED_CLIMB_FRACTION]
+    if _exceeds_a_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
+        shares.append(_UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT)
     seen = list(shortfalls)
     for unused, from_threats in product(shares, (False, True)):
-        # Most ways lead beside missiles and zones: more is kept from them only if a way that was found leads above one.
+        # Most paths lead past missiles and zones at the side: keep away from their tops only if a path led above one.
         if from_threats and not any(one.of_threats for one in seen):
             continue
         within = limits_in_gusts(plan, airframe, unused)
-        # Without a maximum height the first of the two keeps nothing for updrafts but sink.
+        # Without a maximum height the first of the two limits keeps only sink for updrafts, no distance.
         from_zones_alone = all(one.of_threats for one in shortfalls) and plan.scenario.limits.max_height_m is None
         if not from_threats and from_zones_alone and not within.reserve_height:
             continue
@@ -164,12 +174,12 @@ def _other_plan(plan: Plan, airframe: Airframe, search: Search, shortfalls: list
 
 
 def _from_threats(kept: Limits) -> Limits:
-    """Limits that keep from missiles and zones what they keep from the ground or from the maximum height."""
+    """Extend the distance that limits keep from the ground or the maximum height to missiles and zones."""
     return replace(kept, reserve_threats=max(kept.reserve_height, kept.reserve_above))
 
 
-def _is_below_a_limit(plan: Plan, higher: float) -> bool:
-    """Whether a plan that flies this much (m) higher between its ends exceeds a ceiling or a greatest height."""
+def _exceeds_a_limit(plan: Plan, higher: float) -> bool:
+    """Return True if a plan flown `higher` m higher exceeds a ceiling or a maximum height."""
     if not higher:
         return False
     scenario, inner = plan.scenario, plan.waypoints[1:-1]
@@ -181,34 +191,34 @@ def _is_below_a_limit(plan: Plan, higher: float) -> bool:
     return bool((inner[:, 2] + higher > np.minimum.reduce(limits)).any())
 
 
-def limits_in_gusts(plan: Plan, airframe: Airframe, unused: float = _UNUSED_SHARE) -> Limits:
-    """The limits of a search, at the heights of a plan, for paths that leave the height that gusts need.
+def limits_in_gusts(plan: Plan, airframe: Airframe, unused: float = _UNUSED_CLIMB_FRACTION) -> Limits:
+    """Return search limits for paths that leave the height that gusts need, at the plan's altitude.
 
-    unused: largest share of the fastest climb that is left unused for downdrafts.
+    unused: largest fraction of the fastest climb that is left unused for downdrafts.
     """
     limits, autopilot, turbulence = airframe.limits.surely(), airframe.autopilot, plan.scenario.wind.turbulence
     climb, sink = limits.rates(float(plan.waypoints[:, 2].max()))
     deviation = gust_deviation(turbulence)
-    for gust, moves in _movements(plan.scenario, autopilot):
-        if not moves(0.0, turbulence):
+    for gust, displacement in _gust_displacements(plan.scenario, autopilot):
+        if not displacement(0.0, turbulence):
             continue
         if gust == "downdrafts":
             left = max(0.0, min(_UNUSED_SIGMAS * deviation, unused * climb))
-            limits = replace(limits, reserve_height=moves(left, turbulence), reserve_climb=left)
+            limits = replace(limits, reserve_height=displacement(left, turbulence), reserve_climb=left)
         else:
-            left = max(LEAST_SIGMAS * deviation, min(_UNUSED_SINK_SIGMAS * deviation, _UNUSED_SINK_SHARE * sink))
+            left = max(LEAST_SIGMAS * deviation, min(_UNUSED_SINK_SIGMAS * deviation, _UNUSED_SINK_FRACTION * sink))
             if sink < LEAST_SIGMAS * deviation:
                 left = 0.0
-            limits = replace(limits, reserve_above=moves(left, turbulence), reserve_sink=left)
+            limits = replace(limits, reserve_above=displacement(left, turbulence), reserve_sink=left)
     return limits
 
 
 def limits_of_others(plan: Plan, airframe: Airframe) -> Limits:
-    """The limits of a search for plans beside a safe one: the tightest of `keep_height` that the safe plan meets."""
+    """Return search limits for alternatives to a safe plan: the tightest limits that it meets."""
     limits = airframe.limits.surely()
-    if not _is_moved(plan, airframe):
+    if not _gusts_matter(plan, airframe):
         return limits
-    for unused in (_UNUSED_SHARE, _UNUSED_SHARE_BELOW_A_LIMIT):
+    for unused in (_UNUSED_CLIMB_FRACTION, _UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT):
         kept = limits_in_gusts(plan, airframe, unused)
         for within in (_from_threats(kept), kept):
             if certify(make_problem(plan.scenario, within), plan.waypoints).ok:
@@ -220,11 +230,11 @@ def limits_of_others(plan: Plan, airframe: Airframe) -> Limits:
 
 
 class _Parts(NamedTuple):
-    """A path cut into parts near its ends.
+    """Path cut into parts near its ends.
 
-    gust: which kind of gusts is looked at.
+    gust: the kind of gusts.
     points: (p, 3) m. legs: (p - 1) the leg of each part.
-    before, after: (p,) height that a gust may take or give there on the part that ends, and on the one that begins, m.
+    before, after: (p,) height that a gust may take or give at a point, on the part before it and the part after it, m.
     """
 
     gust: Gust
@@ -235,45 +245,45 @@ class _Parts(NamedTuple):
 
 
 def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
-    """What gusts may take a plan into: its clearance or maximum height, a missile and a zone, the deepest of each."""
+    """Find the deepest displacement by gusts into each of clearance or maximum height, missile and zone."""
     limits, autopilot, turbulence = airframe.limits.surely(), airframe.autopilot, plan.scenario.wind.turbulence
     problem = make_problem(plan.scenario, limits)
     rates = np.array([limits.rates(float(amsl)) for amsl in plan.waypoints[:, 2]])
     climbs, found = limits.climb_rates(plan.waypoints), list[Shortfall | None]()
-    for gust, moves in _movements(plan.scenario, autopilot):
-        if not moves(0.0, turbulence):
+    for gust, displacement in _gust_displacements(plan.scenario, autopilot):
+        if not displacement(0.0, turbulence):
             continue
         down = gust == "downdrafts"
         able, used = (rates[:, 0], np.maximum(0.0, climbs)) if down else (rates[:, 1], np.maximum(0.0, -climbs))
         # The least that a leg leaves, at its beginning or at its end.
         left = np.minimum(able[:-1] - used[:, 0], able[1:] - used[:, 1])
-        # ArduPlane and PX4 stray in height even without such a gust; planfly's guidance does not.
+        # ArduPlane and PX4 have an altitude error even without such a gust; planfly's guidance does not.
         strays = 0.0 if down else float(problem.certified.tracking.up)
-        needs = np.array([moves(float(one), turbulence) + strays for one in left])
-        at_ends = _SHARE_AT_ENDS * np.array([moves(float(able[k]), turbulence) + strays for k in (0, -1)])
-        parts = _cut(problem, plan.waypoints, gust, needs, at_ends)
+        needs = np.array([displacement(float(one), turbulence) + strays for one in left])
+        at_ends = _END_HEIGHT_FRACTION * np.array([displacement(float(able[k]), turbulence) + strays for k in (0, -1)])
+        parts = _cut_into_parts(problem, plan.waypoints, gust, needs, at_ends)
         found += [
             _into_clearance(problem, parts) if down else _above_maximum(problem, parts),
             _into_missile(problem, parts) if down else None,
             _into_zone(problem, parts),
         ]
-    return [one for one in found if one is not None and one.depth > _EPSILON]
+    return [one for one in found if one is not None and one.depth > _ROUNDING_TOLERANCE_M]
 
 
-def _cut(problem: Problem, waypoints: Floats, gust: Gust, needs: Floats, at_ends: Floats) -> _Parts:
-    """A path (w, 3) in parts: legs near an end are cut, but not where a turn leaves them.
+def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, needs: Floats, at_ends: Floats) -> _Parts:
+    """Cut the legs of a path (w, 3) near its ends into parts, but not within a turn.
 
-    needs: (w - 1,) height that gusts may take or give on each leg, m. at_ends: (2,) what counts of it at the ends, m.
+    needs: (w - 1,) height that gusts may take or give on each leg, m. at_ends: (2,) height needed at the ends, m.
     """
     ends = waypoints[[0, -1]]
-    tangents = turn_tangents(problem.certified.aircraft, waypoints) * _LONGER_THAN_TANGENT
+    tangents = turn_tangents(problem.certified.aircraft, waypoints) * _TANGENT_RATIO
     points, legs = [waypoints[0]], list[int]()
     for leg, (a, b) in enumerate(pairwise(waypoints)):
         run = math.dist(a[:2], b[:2])
-        count = math.ceil(run / _PART)
+        count = math.ceil(run / _PART_LENGTH_M)
         for along in run * np.arange(1, count) / count:
             point = a + (b - a) * along / run
-            is_near = min(math.dist(point, end) for end in ends) <= _GROWS_OVER + _PART
+            is_near = min(math.dist(point, end) for end in ends) <= _FULL_HEIGHT_DISTANCE_M + _PART_LENGTH_M
             if is_near and tangents[leg] <= along <= run - tangents[leg + 1]:
                 points.append(point)
                 legs.append(leg)
@@ -281,13 +291,13 @@ def _cut(problem: Problem, waypoints: Floats, gust: Gust, needs: Floats, at_ends
         legs.append(leg)
     path, own = np.array(points), needs[legs]
     away = np.array([np.linalg.norm(path - end, axis=1) for end in ends])
-    share, at_end = np.minimum(1.0, away.min(axis=0) / _GROWS_OVER), at_ends[away.argmin(axis=0)]
+    share, at_end = np.minimum(1.0, away.min(axis=0) / _FULL_HEIGHT_DISTANCE_M), at_ends[away.argmin(axis=0)]
     before, after = (at_end + share * (need - at_end) for need in ([*own[:1], *own], [*own, *own[-1:]]))
     return _Parts(gust, path, legs, before, after)
 
 
-def _at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, int]]:
-    """Name, height above ground (m) and index of the points at both ends."""
+def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, int]]:
+    """Return name, height above ground (m) and index of the points at both ends."""
     terrain = problem.scenario.terrain
     if terrain is None:  # pragma: no cover - a problem has one
         return []
@@ -296,16 +306,16 @@ def _at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, int]]:
 
 
 def _into_clearance(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """How far a downdraft may take a path below its clearance, where that is deepest; None if nowhere."""
+    """Find the deepest displacement of a path by a downdraft below its clearance; None if there is none."""
     data = problem.certified
     into = f"into the clearance of {data.clearance:g} m"
-    for name, over, k in _at_ends(problem, parts):
-        if (depth := float(parts.after[k]) + data.clearance - over) > _EPSILON:
+    for name, over, k in _heights_at_ends(problem, parts):
+        if (depth := float(parts.after[k]) + data.clearance - over) > _ROUNDING_TOLERANCE_M:
             return Shortfall(parts.gust, depth, into, f"at its {name}", at_end=name)
     lowest = Shortfall(parts.gust, 0.0, into, "")
     for piece in heights_above_ground(data, parts.points):
         k = int(piece["number"])
-        # A part needs what it needs at its end nearer to the path's.
+        # A part needs the height of its end that is nearer to the end of the path.
         need = max(parts.before[k], parts.after[k]) if piece["of_arc"] else min(parts.after[k], parts.before[k + 1])
         depth = float(need) + data.clearance - float(piece["height"])
         if depth > lowest.depth:
@@ -314,29 +324,29 @@ def _into_clearance(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _above_maximum(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """How far an updraft may take a path above its maximum height above ground; None if nowhere or without one."""
+    """Find the highest displacement by an updraft above the maximum height; None if there is none."""
     data, most = problem.certified, problem.certified.airspace.max_height
     if most == math.inf:
         return None
     above = f"above the {most:.0f} m over ground that are allowed"
-    for name, over, k in _at_ends(problem, parts):
-        if (depth := over + float(parts.after[k]) - most) > _EPSILON:
+    for name, over, k in _heights_at_ends(problem, parts):
+        if (depth := over + float(parts.after[k]) - most) > _ROUNDING_TOLERANCE_M:
             return Shortfall(parts.gust, depth, above, f"at its {name}", at_end=name)
-    pieces = airspace_pieces(data, _moved(parts)[-1])
+    pieces = airspace_pieces(data, _gust_paths(parts)[-1])
     highest = max(pieces, key=lambda piece: float(piece["height"]))
     where = f"on leg {parts.legs[min(int(highest['number']), len(parts.legs) - 1)]}"
     return Shortfall(parts.gust, float(highest["height"]) - most, above, where)
 
 
 def _into_missile(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """How far a gust may take a path into a missile's sphere, where that is deepest; None if nowhere."""
+    """Find the deepest displacement by a gust into the sphere of a missile; None if there is none."""
     threats = problem.scenario.threats
-    paths = _moved(parts) if (threats.kill_radius > 0.0).any() else []
+    paths = _gust_paths(parts) if (threats.kill_radius > 0.0).any() else []
     deepest = min(paths, key=lambda path: kill_distance(problem.certified, path), default=None)
     if deepest is None or (distance := kill_distance(problem.certified, deepest)) >= 0.0:
         return None
     begins, steps = deepest[:-1, None], np.diff(deepest, axis=0)[:, None]
-    # Where each leg is nearest to each missile, as a share of the leg.
+    # Nearest point of each leg to each missile, as a fraction of the leg.
     along = ((threats.position - begins) * steps).sum(axis=2) / (steps**2).sum(axis=2)
     nearest = begins + np.clip(along, 0.0, 1.0)[..., None] * steps
     outside = np.linalg.norm(nearest - threats.position, axis=2) - threats.kill_radius
@@ -348,11 +358,11 @@ def _into_missile(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _into_zone(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """How far a gust may take a path into an exclusion zone, or out of an inclusion zone; None if nowhere."""
+    """Find the deepest displacement into exclusion or out of inclusion zones; None if there is none."""
     data = problem.certified
     if not is_limited(data.airspace) or not problem.scenario.zones:
         return None
-    found = [piece for path in _moved(parts) for piece in airspace_pieces(data, path)]
+    found = [piece for path in _gust_paths(parts) for piece in airspace_pieces(data, path)]
     worst = min(found, key=lambda piece: float(piece["zones"]["nearest"]))
     if worst["zones"]["nearest"] >= 0.0:
         return None
@@ -363,23 +373,23 @@ def _into_zone(problem: Problem, parts: _Parts) -> Shortfall | None:
     return Shortfall(parts.gust, -float(worst["zones"]["nearest"]), into, where, of_threats=True)
 
 
-def _moved(parts: _Parts) -> list[Floats]:
-    """The path (p, 3) as gusts move it, at steps on the way in which nothing is missed; the last is the whole way."""
+def _gust_paths(parts: _Parts) -> list[Floats]:
+    """Return the path (p, 3) displaced by gusts in steps that miss no hazard, up to the full displacement."""
     heights = np.maximum(parts.before, parts.after)
-    count = max(1, math.ceil(float(heights.max()) / _STEP))
+    count = max(1, math.ceil(float(heights.max()) / _HEIGHT_STEP_M))
     whole = np.array([0.0, 0.0, -1.0 if parts.gust == "downdrafts" else 1.0]) * heights[:, None]
     return [np.ascontiguousarray(parts.points + whole * k / count) for k in range(1, count + 1)]
 
 
-def _in_words(one: Shortfall, plan: Plan, airframe: Airframe) -> str:
-    """One line for a person, with what would help."""
+def _shortfall_text(one: Shortfall, plan: Plan, airframe: Airframe) -> str:
+    """Describe a shortfall in one line, with what would help."""
     better = "climbs better" if one.gust == "downdrafts" else "sinks faster"
     helps = f"less turbulence, an aircraft that {better}"
     is_held_down = one.gust == "updrafts" and not one.of_threats
     if one.at_end:
         lies = "higher" if one.gust == "downdrafts" else "lower"
         helps += f" or a {one.at_end} that is {math.ceil(one.depth)} m {lies}"
-    elif is_held_down or _is_below_a_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
+    elif is_held_down or _exceeds_a_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
         helps += " or a higher limit on its height"
     else:
         helps = f"less turbulence, or an aircraft that {better},"

@@ -1,4 +1,4 @@
-"""Imported flights: another program's log in a scenario, along its mission, in its wind: judged, and flown again."""
+"""Import flights logged by other programs: place them in a scenario, judge them, and fly them again."""
 
 import hashlib
 import math
@@ -40,22 +40,23 @@ from world.scenario_tables import FlightTable
 
 Floats = NDArray[np.float64]
 
-_BLOCK = 2**20
-# Items that a mission has at least.
-_FEWEST = 2
+# Bytes that are hashed at a time.
+_HASH_BLOCK_BYTES = 2**20
+# Least number of items of a mission.
+_MIN_MISSION_ITEMS = 2
 
 
 @dataclass(frozen=True, slots=True)
 class ImportOptions:
-    """What the options say of a flight beside its log; None where they say nothing.
+    """Options for an imported flight, in addition to its log; None if an option is not given.
 
-    plan: a mission file or plan.json that was to be flown.
-    scenario: to judge it in.  terrain: an elevation file.
-    aircraft: its name or folder; without one none of an aircraft's limits count.
-    datum: of the log's heights where it states none.
-    number: which flight of the log, from 1.
-    wind_given: the wind is another's, not the log's.
-    fences: to be kept to beside the mission's and the scenario's own.
+    plan: mission file or plan.json that was to be flown.
+    scenario: scenario to judge the flight in.  terrain: elevation file.
+    aircraft: name or folder; without an aircraft none of its limits apply.
+    datum: vertical datum of the altitudes of the log, if the log states none.
+    number: number of the flight in the log, from 1.
+    wind_given: true if the wind is given instead of taken from the log.
+    fences: fences that apply in addition to the fences of the mission and the scenario.
     """
 
     plan: Path | None = None
@@ -70,10 +71,10 @@ class ImportOptions:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class ImportedFlight:
-    """An imported flight, judged.
+    """Imported flight with its verdict.
 
-    setup: with its source.  track: its rows.  events: what the vehicle said.
-    ended: how the log shows that it ended.
+    setup: setup with its source.  track: rows of the track.  events: messages of the vehicle.
+    ended: how the flight ended, according to the log.
     """
 
     setup: FlightSetup
@@ -84,46 +85,46 @@ class ImportedFlight:
 
     @property
     def lossy(self) -> bool:
-        """Whether some of the log could not be read."""
+        """True if some of the log could not be read."""
         return self.setup.source is not None and self.setup.source.damage.lossy
 
     def __repr__(self) -> str:
         return f"<ImportedFlight {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
 
     def _repr_html_(self) -> str:
-        """How a notebook shows it."""
+        """Return the HTML for a notebook."""
         return self.verdict._repr_html_() + self.track._repr_html_()
 
 
 def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) -> ImportedFlight:
-    """Read a log, set it into its world and judge it.
+    """Read a log, place it in its scenario and judge the flight.
 
     change: makes another scenario of the one that the flight is judged in.  Raises LogError for a file that is no log
-    of an aeroplane's flight, MissionError where no mission is known, and for a plan that is not the one flown.
+    of an aeroplane's flight, MissionError if no mission is known or the plan is not the one flown.
     """
     flight = make_flight(open_log(path), options.number)
-    mission, origin_of_mission, planned_in = _mission(path, flight, options)
+    mission, origin_of_mission, planned_in = _find_mission(path, flight, options)
     mission = options.fences.on_mission(mission)
     plan_heights = options.plan is not None or flight.mission is None or flight.mission.with_heights
     if not plan_heights:
         mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
-    _refuse_other_autopilot(path, mission, flight.raw.program)
-    scenario, placed = _world(mission, options, planned_in)
-    scenario, wind_source = _in_its_wind(options.fences.on_scenario(change(scenario)), flight, options)
+    _require_same_autopilot(path, mission, flight.raw.program)
+    scenario, placed = _place_mission(mission, options, planned_in)
+    scenario, wind_source = _with_logged_wind(options.fences.on_scenario(change(scenario)), flight, options)
     known = options.aircraft is not None or options.scenario is not None or planned_in is not None
     logged = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
-    # A flight by an autopilot that planfly does not know says what the aircraft can.
+    # Judge a flight by an autopilot unknown to planfly by the limits of the aircraft.
     autopilot, refused = logged or (PlanflyGuidance(scenario.flight.steering.guidance), ())
-    setup = _setup(scenario, placed, mission, autopilot, flight)
+    setup = _make_logged_setup(scenario, placed, mission, autopilot, flight)
     heights = flight.heights
     if options.datum is not None and heights.datum == "unstated":
         heights = replace(heights, datum=options.datum)
     notes = (
-        *_edges(flight),
-        *_other_flights(flight),
+        *_coverage_notes(flight),
+        *_other_flight_notes(flight),
         *refused,
         *mission.warnings,
-        *_differing(flight, mission, options),
+        *_plan_difference_notes(flight, mission, options),
     )
     source = ImportedLog(
         missing=None if options.plan is not None or flight.mission is None else flight.mission.missing,
@@ -152,12 +153,12 @@ def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) ->
         if mismatch is not None:
             raise MissionError(f"{path}: not flown by {options.plan}: {mismatch.text}", file=path)
     verdict = judge_flight(setup, track, "")
-    ended = "completed" if verdict.complete else _end_of(verdict)
-    return ImportedFlight(setup, track, _events(flight), verdict, ended)
+    ended = "completed" if verdict.complete else _completion_text(verdict)
+    return ImportedFlight(setup, track, _flight_events(flight), verdict, ended)
 
 
-def _refuse_other_autopilot(path: Path, mission: Mission, program: str) -> None:
-    """Raise MissionError for a plan that was written for another autopilot than the one that wrote the log."""
+def _require_same_autopilot(path: Path, mission: Mission, program: str) -> None:
+    """Raise MissionError for a plan that was written for another autopilot than the one in the log."""
     flown = next((name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), "")
     if mission.autopilot and flown and mission.autopilot != flown:
         allowed = f"the flight of {path} is {program}'s: `plan` names the mission that was flown"
@@ -165,8 +166,8 @@ def _refuse_other_autopilot(path: Path, mission: Mission, program: str) -> None:
         raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
 
 
-def _mission(path: Path, flight: LoggedFlight, options: ImportOptions) -> tuple[Mission, str, Scenario | None]:
-    """The mission that was to be flown, whose it is, and the scenario that its plan was made in."""
+def _find_mission(path: Path, flight: LoggedFlight, options: ImportOptions) -> tuple[Mission, str, Scenario | None]:
+    """Return the mission that was to be flown, its origin, and the scenario of its plan."""
     if options.plan is not None:
         if options.plan.suffix.lower() == ".json":
             opened = open_plan(options.plan, options.terrain)
@@ -179,7 +180,7 @@ def _mission(path: Path, flight: LoggedFlight, options: ImportOptions) -> tuple[
     if flight.mission is None:
         raise LogError(f"{path}: holds no mission: `plan` names the one that was to be flown", file=path)
     found = flight.mission
-    if found.missing is not None and len(found.mission.items) < _FEWEST:
+    if found.missing is not None and len(found.mission.items) < _MIN_MISSION_ITEMS:
         lacking = [missing_text(found.missing), *found.mission.warnings[:1]]
         lacking.append("`plan` names the mission that was to be flown")
         raise LogError(f"{path}: {'; '.join(lacking)}", file=path)
@@ -187,21 +188,23 @@ def _mission(path: Path, flight: LoggedFlight, options: ImportOptions) -> tuple[
     return found.mission, f"{found.origin} of the log{when}, {len(found.mission.items)} items", None
 
 
-def _world(mission: Mission, options: ImportOptions, planned_in: Scenario | None) -> tuple[Scenario, PlacedMission]:
-    """The scenario that a flight is judged in, and its mission's places there."""
+def _place_mission(
+    mission: Mission, options: ImportOptions, planned_in: Scenario | None
+) -> tuple[Scenario, PlacedMission]:
+    """Return the scenario that a flight is judged in, and the mission placed in it."""
     scenario = planned_in
     if options.scenario is not None:
         scenario = load_scenario(options.scenario, options.terrain)
     if scenario is None:
-        # As ArduPlane flies: so that a flight in the simulation can be held against it.
+        # Place the mission as ArduPlane flies it, so that a simulated flight can be compared with the log.
         table = FlightTable() if options.aircraft is None else FlightTable(aircraft=options.aircraft)
         implied = implied_scenario(mission, options.terrain, table, vertical_legs=True)
         return implied.scenario, implied.placed
     return scenario, place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
 
 
-def _in_its_wind(scenario: Scenario, flight: LoggedFlight, options: ImportOptions) -> tuple[Scenario, str]:
-    """The scenario in the mean wind of the stretches, and where that is from."""
+def _with_logged_wind(scenario: Scenario, flight: LoggedFlight, options: ImportOptions) -> tuple[Scenario, str]:
+    """Return the scenario with the mean wind of the mission parts, and the source of the wind."""
     if options.wind_given:
         return scenario, "as given"
     found = mean_wind(flight)
@@ -212,7 +215,7 @@ def _in_its_wind(scenario: Scenario, flight: LoggedFlight, options: ImportOption
     return blown, f"from {round(math.degrees(found.from_course)) % 360:03d}°, by {found.source} of the log"
 
 
-def _setup(
+def _make_logged_setup(
     scenario: Scenario,
     placed: PlacedMission,
     mission: Mission,
@@ -220,7 +223,7 @@ def _setup(
     flight: LoggedFlight,
 ) -> FlightSetup:
     aircraft, battery = find_airframe(scenario)
-    limits = _limits(scenario, autopilot, flight, aircraft.airspeed)
+    limits = _logged_limits(scenario, autopilot, flight, aircraft.airspeed)
     return FlightSetup(
         scenario=scenario,
         mission=mission,
@@ -236,8 +239,8 @@ def _setup(
     )
 
 
-def _limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, usual: float) -> Limits:
-    """Limits at the speed that was to be flown: the autopilot's, the scenario's, or the one that was flown."""
+def _logged_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, usual: float) -> Limits:
+    """Return limits at the airspeed of the autopilot or the scenario, or the median of the flight."""
     aircraft, _ = find_airframe(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
     airspeed, bank = scenario.flight.airspeed_mps or usual, math.radians(scenario.flight.max_bank_deg)
@@ -253,13 +256,13 @@ def _limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, usua
 def _sha256(path: Path) -> str:
     digest = hashlib.sha256()
     with path.open("rb") as file:
-        while block := file.read(_BLOCK):
+        while block := file.read(_HASH_BLOCK_BYTES):
             digest.update(block)
     return digest.hexdigest()
 
 
-def _edges(flight: LoggedFlight) -> tuple[str, ...]:
-    """What the log does not hold of the flight by its nature, in words: before it, after it, between its rows."""
+def _coverage_notes(flight: LoggedFlight) -> tuple[str, ...]:
+    """Describe the parts of the flight that the log lacks: before it, after it, between its rows."""
     notes = []
     if flight.begins:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
@@ -271,16 +274,16 @@ def _edges(flight: LoggedFlight) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _other_flights(flight: LoggedFlight) -> tuple[str, ...]:
-    """That a log holds other flights, in words."""
+def _other_flight_notes(flight: LoggedFlight) -> tuple[str, ...]:
+    """Note the other flights of a log."""
     if flight.count == 1:
         return ()
     others = ", ".join(f"at {start:.0f} s ({along:.0f} s along its mission)" for start, along in flight.others)
     return (f"flight {flight.number} of {flight.count} is judged; the others began {others} (--flight N)",)
 
 
-def _differing(flight: LoggedFlight, mission: Mission, options: ImportOptions) -> tuple[str, ...]:
-    """That the plan is not what the log's own mission is, in words."""
+def _plan_difference_notes(flight: LoggedFlight, mission: Mission, options: ImportOptions) -> tuple[str, ...]:
+    """Describe the differences between the plan and the mission of the log."""
     if options.plan is None or flight.mission is None:
         return ()
     own = flight.mission.mission.items
@@ -293,8 +296,8 @@ def _differing(flight: LoggedFlight, mission: Mission, options: ImportOptions) -
     return (f"{len(changed)} items of the log's own mission lie elsewhere than the plan's, item {changed[0]} first",)
 
 
-def _events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
-    """What the vehicle said during the flight, and the modes it was in."""
+def _flight_events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
+    """Return the messages of the vehicle during the flight, and its modes."""
     if not len(flight.time):
         return ()
     low, high = float(flight.time[0]), float(flight.time[-1])
@@ -309,29 +312,30 @@ def _events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
     return tuple(sorted(inside, key=lambda event: event.time))
 
 
-def _end_of(verdict: Verdict) -> str:
+def _completion_text(verdict: Verdict) -> str:
     found = next((item for item in verdict.findings if item.rule == "completion"), None)
     return "not judged" if found is None else found.brief
 
 
 # ----------------------------------------------------------------------
-# The mission of an imported flight, flown again by the model of its aircraft.
 
 
 def fly_again(
     setup: FlightSetup, track: Track, aircraft: str | None, turbulence: str | None, advance: Advance, most: int = 9
 ) -> tuple[Reflight, ...]:
-    """Fly the legs of every stretch again, in the wind of the log, and hold the flights side by side: longest first.
+    """Fly the logged parts of the mission again in simulation and compare the flights, the longest first.
 
-    setup: with its source.  aircraft: that flies it, in place of the setup's.  turbulence: in place of the scenario's.
-    most: of the stretches, the longest.
+    setup: setup with its source.  aircraft: flown in place of the aircraft of the setup.  turbulence: in place of the
+    scenario's turbulence.  most: greatest number of parts, the longest are chosen.
 
-    Raises LogError for a flight that followed none of its mission, and StartError where the model cannot begin.
+    Raises LogError for a flight that followed none of its mission, and StartError if the model cannot begin.
     """
-    return tuple(_one_again(setup, legs, aircraft, turbulence, advance) for legs in _stretches(setup, track)[:most])
+    return tuple(
+        _fly_part_again(setup, legs, aircraft, turbulence, advance) for legs in _flown_parts(setup, track)[:most]
+    )
 
 
-def _one_again(
+def _fly_part_again(
     setup: FlightSetup, legs: FlownLegs, aircraft: str | None, turbulence: str | None, advance: Advance
 ) -> Reflight:
     scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
@@ -360,7 +364,7 @@ def _one_again(
     return compare_with_model(own, legs, flown.track, flown.ended, stands_in=stands_in)
 
 
-def _stretches(setup: FlightSetup, track: Track) -> list[FlownLegs]:
+def _flown_parts(setup: FlightSetup, track: Track) -> list[FlownLegs]:
     source = setup.source
     stretches = () if source is None else source.stretches
     found = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]

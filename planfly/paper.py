@@ -1,4 +1,4 @@
-"""Section V of the paper: seeded plans of each problem in each encoding, and the table that they come to."""
+"""Section V of the paper: seeded plans of each problem in each encoding, and their table."""
 
 import csv
 import io
@@ -30,19 +30,22 @@ from world.scenario import Scenario, load_scenario, with_planner
 Floats = NDArray[np.float64]
 
 
+# Numbers of threats in the problems of the paper.
 PROBLEMS = (7, 15, 30, 60)
-# The paper's planner, and what it is compared with: the baselines of Figs. 9-12, polar with two ranges of its angle, as
-# the paper states none, and a polar encoding of ours.
+# Planner of the paper.
 PAPER = "umda"
+# Planners of comparison: the baselines of Figs. 9-12, polar with two ranges of its angle, as the paper states none, and
+# a polar encoding of planfly.
 BASELINES = ("umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing")
-# Ours too: the paper's planner in a strip along the straight line, which no other encoding gets; half widths by the
-# number of threats, m.
-STRIP, STRIP_ACROSS = "umda-strip", {7: 2500.0, 15: 2500.0, 30: 2500.0, 60: 1500.0}
+# The planner of the paper in a strip along the straight line, which no other encoding gets; an addition of planfly.
+STRIP = "umda-strip"
+# Half width of the strip by the number of threats, m.
+STRIP_ACROSS = {7: 2500.0, 15: 2500.0, 30: 2500.0, 60: 1500.0}
 
 
 @dataclass(frozen=True, slots=True)
 class SeededPlan:
-    """What tables and figures need of one plan.
+    """Values of one plan for tables and figures.
 
     threats: number in the problem.
     waypoints: (w, 3) world m.
@@ -68,19 +71,20 @@ class SeededPlan:
 
     @property
     def safe(self) -> bool:
-        """As the paper counts: no violation and no kill exposure on its six points a leg."""
+        """True if safe by the paper: no violation and no kill exposure on its six points a leg."""
         return not any(self.violations) and self.objectives[Objective.KILL_EXPOSURE] == 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class TableRow:
-    """One line of the table: the plans of one algorithm for one problem; table.csv has columns of these names.
+    """One line of the table: the plans of one algorithm for one problem.
 
-    runs: number of seeds planned with.
-    safe: plans that are by the paper's points.
-    certified: plans that are by the continuous check.
+    The columns of table.csv have these names.
+    runs: number of seeds.
+    safe: number of plans that are safe on the points of the paper.
+    certified: number of plans that pass the continuous check.
     length_median, length_worst: path length ratio of the safe plans, None without any.
-    kill_median, kill_worst, detection_median: the paper's sums, of all plans.
+    kill_median, kill_worst, detection_median: the sums of the paper, of all plans.
     kill_probability_worst: of all plans.
     seconds_median: CPU time of a search.
     """
@@ -100,14 +104,15 @@ class TableRow:
 
 
 def problem_name(threats: int) -> str:
-    """Name of the embedded scenario of a problem."""
+    """Return the name of the embedded scenario of a problem."""
     return f"paper-{threats:02d}"
 
 
 def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> float:
-    """1 minus the product of (1 - p) over the dividing points and units within reach; p = (scale / d)^4, at most 1.
+    """Return 1 minus the product of (1 - p) over points and units in reach; p = (scale / d)^4, at most 1.
 
-    waypoints: (w, 3).  kind: "kill" or "detection".  The paper's sums (eq. 9, 10) have no upper bound; this has.
+    The points are the dividing points of the legs.
+    waypoints: (w, 3).  kind: "kill" or "detection".  The sums of the paper (eq. 9, 10) have no upper bound; this has.
     """
     share = np.arange(6)[:, None] / 6.0
     points = np.concatenate([a + share * (b - a) for a, b in itertools.pairwise(waypoints)])
@@ -121,7 +126,7 @@ def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> fl
 
 
 def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
-    """Plan once, and keep what tables and figures need; algorithm: a name of the planner's, or `STRIP`."""
+    """Plan once and keep the values for tables and figures; algorithm: name of a planner, or `STRIP`."""
     scenario = load_scenario(problem_name(threats))
     searched = algorithm
     if algorithm == STRIP:
@@ -149,10 +154,11 @@ def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
 def plan_section(
     problems: Sequence[int], seeds: int, algorithm: str, jobs: int | None = None, advance: Advance | None = None
 ) -> list[SeededPlan]:
-    """All plans, in the order of problem, algorithm and seed 1..seeds, whatever the number of processes.
+    """Make all plans, ordered by problem, algorithm and seed 1..seeds for any number of processes.
 
-    algorithm: shown in place of the paper's; the strip and the baselines always run beside it.  jobs: processes,
-    by default one for each core that this process may use.  Raises ScenarioError for an unknown algorithm.
+    algorithm: listed in place of the paper's planner; the strip and the baselines are always planned, too.
+    jobs: processes, by default one for each core that this process may use.  Raises ScenarioError for an unknown
+    algorithm.
     """
     names = [find_algorithm(algorithm, "algorithm").name]
     names += [name for name in (STRIP, *BASELINES) if name not in names]
@@ -170,7 +176,7 @@ def plan_section(
 
 
 def usable_cores() -> int:
-    """Cores that this process may use; where the system does not say, all that there are.
+    """Return the number of cores that this process may use, or all cores if the system does not say.
 
     >>> usable_cores() >= 1
     True
@@ -180,25 +186,25 @@ def usable_cores() -> int:
 
 
 def _results(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPlan]:
-    """Results in the order of the tasks.  The first runs here: it compiles what the other processes then load."""
+    """Yield results in the order of the tasks; the first runs here and compiles kernels for the others."""
     yield plan_once(*tasks[0])
     if count == 1:
         yield from (plan_once(*task) for task in tasks[1:])
         return
     pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=end_with_parent)
     try:
-        # All of them are started here.
+        # All processes are started here.
         with children_ignore_sigint(), uninterrupted():
             results = pool.map(_plan_task, tasks[1:])
         yield from results
     except BaseException:
-        # What they plan now, nobody waits for.
+        # End the processes: their results are no longer needed.
         pool.shutdown(wait=False, cancel_futures=True)
         end_children(active_children())
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-        # Their semaphores go with the last who knows of it.
+        # The semaphores of the pool are released with its last reference.
         del pool
 
 
@@ -238,21 +244,22 @@ def _column(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Fl
 
 
 # ----------------------------------------------------------------------
-# What it leaves: the table on the terminal, and JSON, CSV and figures in a folder.
+# ----------------------------------------------------------------------
+# Output: the table on the terminal, and JSON, CSV and figures in a folder.
 
 PAPER_SCHEMA = "planfly.paper/1"
-# Files that any command may write; older ones of these names are cleared first.
+# Files that any command may write; older files of these names are cleared first.
 FILES = ("table.csv", "runs.csv", "runs.json", "times.csv", "convergence.png")
 
 
 def file_names(problems: Sequence[int]) -> list[str]:
-    """Every file of a folder for these problems."""
+    """Return the names of all files in a folder for these problems."""
     pictures = [f"{kind}-{threats:02d}.png" for threats in problems for kind in ("paths", "encodings")]
     return [*FILES, *pictures]
 
 
 def table_text(rows: Sequence[TableRow]) -> str:
-    """The table for a terminal."""
+    """Format the table for a terminal."""
     head = (
         f"{'threats':>7}  {'algorithm':<15}{'safe':>7}{'certified':>11}  {'PLR median':>10}  {'worst':>6}"
         f"  {'PKill median':>12}  {'worst':>6}  {'PRD median':>10}  {'CPU s':>6}"
@@ -277,7 +284,7 @@ def _number(value: float | None, digits: int) -> str:
 
 
 def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededPlan]) -> None:
-    """table.csv, runs.csv and runs.json, the same bytes for the same seeds; times.csv, which is not."""
+    """Write table.csv, runs.csv and runs.json, reproducible for a seed, and times.csv, which is not."""
     columns = [item.name for item in fields(TableRow) if item.name != "seconds_median"]
     write_whole(folder / "table.csv", _csv(columns, ([getattr(row, name) for name in columns] for row in rows)))
     write_whole(folder / "runs.csv", _csv(_PLAN_COLUMNS, (list(_plan_row(item).values()) for item in plans)))
@@ -336,7 +343,7 @@ def _csv(columns: Sequence[str], rows: Any) -> str:
 
 
 def write_figures(folder: Path, plans: Sequence[SeededPlan]) -> None:
-    """Figures as the paper's 5-8 (paths), 9-12 (encodings) and the convergence over generations."""
+    """Draw the figures of the paper: 5-8 (paths), 9-12 (encodings) and the convergence over generations."""
     from logs.views.drawing import write_png
     from logs.views.paper import PaperPath, draw_convergence, draw_encodings, draw_paths
 
@@ -366,9 +373,9 @@ def write_figures(folder: Path, plans: Sequence[SeededPlan]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class PaperTables:
-    """What `planfly.paper_tables` returns.
+    """Result of `planfly.paper_tables`.
 
-    rows: the table, a row for each problem and algorithm.  plans: what it is made of.
+    rows: the table, a row for each problem and algorithm.  plans: the plans in it.
     """
 
     rows: tuple[TableRow, ...]
@@ -387,10 +394,10 @@ def paper_tables(
     """Plan section V of the paper again: seeded plans of its problems in three encodings.
 
     problems: numbers of threats, out of 7, 15, 30 and 60.  runs: seeds 1..runs of each.
-    algorithm: beside the two baselines.  jobs: processes; None for one a core.
-    out: a folder for tables and figures; None writes none.  overwrite: whether results that lie there are replaced.
+    algorithm: planned in addition to the baselines.  jobs: processes; None for one a core.
+    out: folder for tables and figures; None writes none.  overwrite: true to replace existing results.
 
-    A script that calls it does so under ``if __name__ == "__main__":``, for the processes import it.
+    A script must call it under ``if __name__ == "__main__":``, because its processes import the script.
     Raises a `planfly.PlanflyError` for bad input.
     """
     check_arguments(problems=tuple(problems), runs=runs, jobs=jobs)

@@ -1,7 +1,7 @@
-"""The worst returns, flown by ArduPlane's own program beside its law.
+"""Worst returns to launch, flown again by the ArduPlane program to check planfly's control law.
 
-Each is a flight of its own, on the mission by which `planfly.return_flights` flies one by the law.  What the program
-does of it counts where it is worse than what the law has; it makes nothing better.
+Each is a separate flight, on the mission by which `planfly.return_flights` flies a return by the control law.  The
+result of the program replaces the result of the law only if it is worse; it never improves a judgement.
 """
 
 import math
@@ -40,20 +40,22 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-# The way in to a return's start is this high over the ground all along, m, or it is not flown.
-_WAY_IN = 20.0
-# So near (m) to a place, or headed for it within this angle (rad), a return has gone there.
-_THERE, _HEADED = 500.0, math.radians(10.0)
-# Rows of a second of a track.
-_SECOND = 60
+# Least height above ground of the lead-in to the start of a return, m; a return with a lower lead-in is not flown.
+_MIN_LEAD_IN_HEIGHT_M = 20.0
+# A return that ends within this distance of a place has arrived there, m.
+_ARRIVAL_DISTANCE_M = 500.0
+# A return that heads for a place within this angle is on its path there, rad.
+_ARRIVAL_HEADING_TOLERANCE_RAD = math.radians(10.0)
+# Rows of a track in a second.
+_ROWS_PER_SECOND = 60
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramReturn:
-    """One return by the law and by the program.
+    """One return as flown by the control law and by the program.
 
-    law: as it was judged.  flown: what the program made of it; None where it could not be flown.
-    reason: why it could not be; "" where it was.  log: kept of the flight; None for none.
+    law: the return as it was judged.  flown: the return by the program, or None if it could not be flown.
+    reason: why the program could not fly it; "" if it did.  log: the log of the flight, or None if it was not kept.
     """
 
     law: ReturnFlown
@@ -63,7 +65,7 @@ class ProgramReturn:
 
     @property
     def agrees(self) -> bool:
-        """Whether both go to the same place and come to the same."""
+        """True if both go to the same place with the same kind of outcome."""
         return self.flown is not None and (self.flown.kind, self.flown.target.name) == (
             self.law.kind,
             self.law.target.name,
@@ -71,15 +73,15 @@ class ProgramReturn:
 
     @property
     def worse(self) -> bool:
-        """Whether the program does harm that the law does not."""
+        """True if the program does harm that the control law does not."""
         return self.flown is not None and KINDS.index(self.flown.kind) < KINDS.index(self.law.kind)
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramReturns:
-    """Returns that a program flew.
+    """Returns that the program flew.
 
-    program: what it calls itself; "" where it flew none.  each: the worst first.
+    program: its name and version; "" if it flew none.  each: the returns, the worst first.
     """
 
     program: str
@@ -87,11 +89,11 @@ class ProgramReturns:
 
     @property
     def flown(self) -> tuple[ProgramReturn, ...]:
-        """Those that it could fly."""
+        """The returns that the program could fly."""
         return tuple(one for one in self.each if one.flown is not None)
 
     def headline(self) -> str:
-        """All of them in a line.
+        """Return a one-line summary.
 
         >>> ProgramReturns("", ()).headline()
         'by the program: no return could be flown'
@@ -105,7 +107,7 @@ class ProgramReturns:
         return f"by {self.program} itself: {len(self.flown)} of the worst flown, {compared}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
-        """Each in a line: where it begins, what it comes to by the law and by the program, and whether they agree."""
+        """Describe each return in a line: start, outcome by the law and by the program, agreement."""
         out = []
         for one in self.each:
             east, north, _ = one.law.start
@@ -122,13 +124,13 @@ class ProgramReturns:
         return out
 
     def put_right(self, returns: Returns) -> Returns:
-        """Returns with what the program flew in the place of what the law has, where that is worse."""
+        """Return the returns, with the result of the program wherever it is worse than the result of the law."""
         worse = {id(one.law): one.flown for one in self.each if one.worse}
         return replace(returns, each=tuple(worse.get(id(one)) or one for one in returns.each))
 
 
 def refuse_program(program: Path) -> None:
-    """Raise ArgumentError for a program whose returns nothing is known of to compare with."""
+    """Raise ArgumentError for a program whose returns planfly cannot compare, as it has no model of them."""
     kind = program_autopilot(program)
     if not issubclass(kind, ArduPlaneSitl):
         allowed = f"ArduPlane's program is expected: how {kind.title} returns is not flown here"
@@ -138,9 +140,10 @@ def refuse_program(program: Path) -> None:
 def worst_apart(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, points: int
 ) -> list[tuple[ReturnFlown, int]]:
-    """So many of the worst returns that a flight can begin at, the worst first, each with the number of its start.
+    """Choose at most `points` of the worst returns that can be flown, each with the number of its start.
 
-    Their starts are further apart than half of their share of the way: neighbouring seconds show the same.
+    The worst comes first.  Starts closer together than half of their share of the path are skipped: neighbouring
+    seconds show the same.
     """
     rows = starts.rows
     place = np.column_stack([rows["east"], rows["north"]])
@@ -159,28 +162,28 @@ def worst_apart(
 
 
 def _worst_first(one: ReturnFlown) -> tuple[int, float]:
-    """As `badness`; of safe ones the nearest to a limit first."""
+    """Return the sort key of a return: `badness`, and for safe returns the one nearest to a limit first."""
     return (KINDS.index("safe"), doubt(one)) if one.safe else badness(one)
 
 
 def _is_clear(world: ReturnWorld, row: Record) -> bool:
-    """Whether the straight way in to a start is over the ground."""
+    """Return True if the straight lead-in to a start stays above the ground."""
     if world.scenario.terrain is None:
         return True
     velocity = np.array([float(row[f"velocity_{name}"]) for name in ("east", "north", "up")])
     begin = np.array([float(row[name]) for name in ("east", "north", "up")])
     back = np.linspace(0.0, LEAD / max(1.0, math.hypot(*velocity[:2])), 26)
-    way = begin - back[:, None] * velocity
-    return bool((way[:, 2] - world.scenario.terrain.height(way[:, 0], way[:, 1])).min() > _WAY_IN)
+    path = begin - back[:, None] * velocity
+    return bool((path[:, 2] - world.scenario.terrain.height(path[:, 0], path[:, 1])).min() > _MIN_LEAD_IN_HEIGHT_M)
 
 
 def fly_by_program(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, program: Path, points: int, folder: Path | None
 ) -> ProgramReturns:
-    """Fly so many of the worst returns by ArduPlane's program, in the mean wind, with exact navigation.
+    """Fly at most `points` of the worst returns by ArduPlane, in the mean wind, with exact navigation.
 
-    folder: where the logs of the flights are written, ours and the program's; None for nowhere.
-    Raises FlightError for a program that does not start, or breaks off.
+    folder: target of the flight logs, both planfly's and the program's; None writes none.
+    Raises FlightError if the program does not start or breaks off.
     """
     flown, version = [], ""
     for number, (one, k) in enumerate(worst_apart(world, starts, returns, points), 1):
@@ -200,74 +203,76 @@ def fly_by_program(
 
 
 def _as_flown(world: ReturnWorld, law: ReturnFlown, start: Record, track: Track, ended: str) -> ReturnFlown | None:
-    """What a flight made of a return that the law has flown, too; None where it did not come to its start."""
+    """Judge a return flown by the program; None if the flight did not reach the start of the return."""
     whole = from_start(track, start)
     if whole is None:
         return None
     begin = len(track) - len(whole)
-    position = _to_landing(law.target, whole)
-    target = _went_to(world, law.target, position)
-    met = met_on_way(world, position)
+    position = _until_landing(law.target, whole)
+    target = _flown_target(world, law.target, position)
+    closest = met_on_way(world, position)
     hits = ended == "ground contact" and len(position) == len(whole)
-    arrives = hits or bool(np.hypot(*(position[-1, :2] - np.array(_end_of(target)[:2]))) < _THERE)
+    arrives = hits or bool(np.hypot(*(position[-1, :2] - np.array(_end_position(target)[:2]))) < _ARRIVAL_DISTANCE_M)
     record: Record = np.zeros(1, RETURN_FLOWN)[0]
-    clearance = min(0.0, met.clearance) if hits else met.clearance
+    clearance = min(0.0, closest.clearance) if hits else closest.clearance
     record["ended"] = HIT if hits or clearance <= 0.0 else CIRCLED if arrives else NEVER
     if math.isnan(clearance):
         record["ended"] = OFF_GROUND
-    record["clearance"], record["outside"], record["threat"] = clearance, met.outside, met.threat
+    record["clearance"], record["outside"], record["threat"] = clearance, closest.outside, closest.threat
     used = float(track.energy[begin + len(position) - 1] - track.energy[begin])
     left = law.left + law.energy - used
-    zone = zone_met(world, position[::_SECOND]) if world.airspace.zones else -1
+    zone = zone_met(world, position[::_ROWS_PER_SECOND]) if world.airspace.zones else -1
     return replace(
         law,
         target=target,
         kind=kind_of(world, record, zone, left, law.floor),
         clearance=clearance,
-        clearance_at=met.at,
-        outside=met.outside,
-        threat=met.threat,
+        clearance_at=closest.at,
+        outside=closest.outside,
+        threat=closest.threat,
         zone=zone,
         energy=used,
         left=left,
     )
 
 
-def _end_of(target: ReturnTarget) -> tuple[float, float, float]:
-    """The last place up to which a return is judged: its circle's middle, or the last place before the landing."""
+def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
+    """Return the place where judgement ends: the loiter center, or the last place before the landing."""
     if target.landing is None:
         return target.position
     return (target.landing, *target.landing.onward)[-1].place
 
 
-def _to_landing(target: ReturnTarget, position: Floats) -> Floats:
-    """A way (t, 3) up to where it is judged: one to a landing sequence ends at the last place before the landing."""
+def _until_landing(target: ReturnTarget, position: Floats) -> Floats:
+    """Cut a path (t, 3) to a landing sequence at the last place before the landing."""
     if target.landing is None:
         return position
-    return position[: int(np.argmin(np.linalg.norm(position - np.array(_end_of(target)), axis=1))) + 1]
+    return position[: int(np.argmin(np.linalg.norm(position - np.array(_end_position(target)), axis=1))) + 1]
 
 
-def _went_to(world: ReturnWorld, law: ReturnTarget, position: Floats) -> ReturnTarget:
-    """Where a way (t, 3) leads: of all places that a return may go to, the one where it ends, or that it heads for.
+def _flown_target(world: ReturnWorld, law: ReturnTarget, position: Floats) -> ReturnTarget:
+    """Identify the target of a path (t, 3): the place where it ends, or else the place that it heads for.
 
-    The law's where it leads to none of them.
+    All places that a return may go to are tried.  Falls back to the target of the law.
     """
-    last, before = position[-1, :2], position[max(0, len(position) - 5 * _SECOND), :2]
+    last, before = position[-1, :2], position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
     course = math.atan2(*(last - before))
     best, least = law, math.inf
-    for target in (law, *_others(world, law)):
-        off = np.array(_end_of(target)[:2]) - last
+    for target in (law, *_other_targets(world, law)):
+        off = np.array(_end_position(target)[:2]) - last
         away = math.hypot(*off)
         turned = abs(math.remainder(math.atan2(*off) - course, math.tau))
-        # One that it ends at comes before any that it heads for.
-        rank = away / _THERE if away < _THERE else 1.0 + turned / _HEADED
+        # A place at which the path ends ranks before any that it heads for.
+        rank = (
+            away / _ARRIVAL_DISTANCE_M if away < _ARRIVAL_DISTANCE_M else 1.0 + turned / _ARRIVAL_HEADING_TOLERANCE_RAD
+        )
         if rank < min(least, 2.0):
             best, least = target, rank
     return best
 
 
-def _others(world: ReturnWorld, law: ReturnTarget) -> Iterator[ReturnTarget]:
-    """Home and all rally points but the law's target, as targets."""
+def _other_targets(world: ReturnWorld, law: ReturnTarget) -> Iterator[ReturnTarget]:
+    """Yield home and all rally points, except the target of the law."""
     home = ArduPlane(world.parameters).return_rules.height + world.home.up
     places = [
         ("home", (world.home.east, world.home.north, home)),

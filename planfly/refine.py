@@ -1,4 +1,4 @@
-"""Tightening a scenario's limits by what a flight could not do, for the next round of planning.
+"""Tighten the limits of a scenario by what a flight could not do, for the next round of planning.
 
 Only the planning is tightened: every round is judged against the scenario as it was given.
 """
@@ -18,15 +18,17 @@ from world.scenario import Scenario, from_spec
 
 Spec = dict[str, Any]
 
-# Beyond what the flight fell short by, m.
+# Added to the clearance by which a flight fell short, m.
 CLEARANCE_BUFFER = 5.0
+# Added to the distance by which a flight entered the reach of a missile, m.
 MISSILE_BUFFER = 10.0
+# Added to the distance by which a flight violated a zone, m.
 ZONE_BUFFER = 5.0
-# Where a limit is already the aircraft's and the flight failed all the same, this share of it is left.
+# Fraction of a limit that is left if it is already the limit of the aircraft and the flight failed nevertheless.
 TIGHTENED_SHARE = 0.9
-# Bank (deg) below which it is not tightened further.
+# Least bank to which a plan is tightened, degrees.
 MIN_BANK_DEG = 5.0
-# What follows a round that another follows.
+# Remark on a round that is followed by another.
 GO_ON = "tightened and planned again"
 
 Tightened = Literal[
@@ -37,11 +39,11 @@ Tightened = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Tightening:
-    """One number of the scenario to plan in, changed.
+    """Change of one number in the scenario to plan in.
 
     what: its key.
-    name: of the threat that it belongs to, "" for the scenario's own.
-    current, wanted: in the key's unit, or "aircraft" for the aircraft's limit.
+    name: the threat that it belongs to, or "" if it belongs to the scenario itself.
+    current, wanted: in the unit of the key, or "aircraft" for the limit of the aircraft.
     """
 
     what: Tightened
@@ -51,7 +53,7 @@ class Tightening:
 
 
 def tightening_text(change: Tightening) -> str:
-    """One tightening, as ``rounds.json`` and the terminal have it.
+    """Describe one tightening, as in ``rounds.json`` and on the terminal.
 
     >>> tightening_text(Tightening("min_clearance_m", 60.0, 72.5))
     'limits.min_clearance_m: 60 to 72.5'
@@ -69,12 +71,12 @@ def tightening_text(change: Tightening) -> str:
 
 
 def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list[Tightening]]:
-    """The scenario to plan in next, and what was changed; no changes where nothing can be tightened."""
+    """Return the next scenario to plan in and its changes; no changes if nothing can be tightened."""
     spec = copy.deepcopy(scenario.to_json())
     failed = [item for item in verdict.findings if item.ok is False]
     changes = _slopes(spec, failed) + _turns(spec, scenario, failed)
     if not changes:
-        # A flight that cannot follow its plan comes down lower and closer too: that is no reason of its own.
+        # A flight that cannot follow its plan also flies lower and closer: that is no separate cause.
         changes = _clearance(spec, scenario, failed) + _missiles(spec, failed)
         changes += _height(spec, scenario, failed) + _zones(spec, scenario, failed)
     if not changes:
@@ -131,7 +133,7 @@ def _clearance(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Ti
 
 
 def _height(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
-    """A lower greatest height above ground, where the flight came too high and can fly lower."""
+    """Lower the maximum height above ground if the flight exceeded it and can fly lower."""
     now = scenario.limits.max_height_m
     over = [-item.margin for item in failed if item.rule == "height" and item.margin is not None]
     if now is None or not over:
@@ -144,7 +146,7 @@ def _height(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tight
 
 
 def _zones(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
-    """A larger margin beside zones, where the flight and not the plan itself violates one."""
+    """Widen the margin around zones if the flight violates one and the plan itself does not."""
     mine = [item for item in failed if item.rule == "fence" and not (item.planned or 0.0) > ROUNDING]
     deep = [-item.margin for item in mine if item.margin is not None]
     if not deep:
@@ -160,7 +162,8 @@ def _missiles(spec: Spec, failed: list[Finding]) -> list[Tightening]:
     changes = []
     for item in failed:
         if item.planned:
-            # The plan itself enters it: the planner knew no way outside, and a larger sphere leaves none either.
+            # The plan itself enters the sphere: the planner found no path outside it, and a larger sphere leaves none
+            # either.
             continue
         for step in _distances(item):
             threat = spec["threats"][item.place.index]
@@ -171,7 +174,7 @@ def _missiles(spec: Spec, failed: list[Finding]) -> list[Tightening]:
 
 
 def _distances(item: Finding) -> list[Change]:
-    """What a finding suggests of the distance to a missile."""
+    """Return the distances to a missile that a finding suggests."""
     return [change for suggestion in item.suggestions for change in suggestion if change.what == "distance"]
 
 
@@ -183,10 +186,10 @@ def refine(scenario: Scenario, most: int, one_round: OneRound, keep: Callable[[i
     """Plan and fly in rounds, each tightened by the one before, until flyable or shown not to be.
 
     most: rounds after the first.
-    one_round: plans in a scenario and flies; the verdict, and whether it was flown.
-    keep: is called with the number of a round whose results another will replace.
+    one_round: plans in a scenario and flies; returns the verdict, and whether it was flown.
+    keep: called with the number of a round whose results will be replaced by another round.
 
-    Returns the last verdict, and what each round changed and gave as ``rounds.json`` holds it.
+    Returns the last verdict, and the changes and results of each round in the format of ``rounds.json``.
     """
     rounds: Rounds = []
     planned_in, changes = scenario, list[Tightening]()
@@ -203,15 +206,15 @@ def refine(scenario: Scenario, most: int, one_round: OneRound, keep: Callable[[i
             }
         )
         planned_in, changes = tighten_limits(planned_in, verdict)
-        rounds[-1]["next"] = _next(verdict, flown, number == most, changes)
+        rounds[-1]["next"] = _next_step(verdict, flown, number == most, changes)
         if rounds[-1]["next"] != GO_ON:
             break
         keep(number)
     return verdict, rounds
 
 
-def _next(verdict: Verdict, flown: bool, last: bool, changes: list[Tightening]) -> str:
-    """What follows from a round."""
+def _next_step(verdict: Verdict, flown: bool, last: bool, changes: list[Tightening]) -> str:
+    """Return the remark on what follows a round."""
     if verdict.flyable:
         return "done: it flies"
     if verdict.undecided:

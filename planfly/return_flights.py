@@ -1,4 +1,4 @@
-"""A return to launch flown in JSBSim, by the whole law or by ArduPlane itself."""
+"""A return to launch flown in JSBSim, by the full control law or by the ArduPlane program."""
 
 import math
 from dataclasses import replace
@@ -22,19 +22,21 @@ from world.kernels import Record
 
 Floats = NDArray[np.float64]
 
-# It is flown in from so far away, m, so that it is steady where the return begins.
+# Length of the lead-in, m, so that the flight is steady at the start of the return.
 LEAD = 500.0
-# A flight that passes the start further away than this, m, across the ground or in height, has not begun there.
-_ASIDE, _HEIGHT = 60.0, 15.0
-# From a waypoint on, a law is late on a slope by this, s; so far ahead in height the waypoint stands.
-_LATE = 3.0
+# A flight that passes the start at a larger horizontal distance has not begun there, m.
+_MAX_START_DISTANCE_M = 60.0
+# The same for the vertical distance, m.
+_MAX_START_HEIGHT_ERROR_M = 15.0
+# Delay of the control law in following a slope after a waypoint, s; the start waypoint is set ahead in altitude by it.
+_SLOPE_DELAY_S = 3.0
 
 
 class Met(NamedTuple):
-    """What a way came to meet.
+    """Nearest approaches of a path to ground and missiles.
 
-    clearance: least height above ground, m, NaN where that is not known; at: (3,) m, where.
-    outside: least distance outside a kill sphere, m, inf for none; threat: which, -1 for none.
+    clearance: least height above ground, m, NaN if not known; at: (3,) its place, m.
+    outside: least distance outside a kill sphere, m, inf without any; threat: index of the threat, -1 without any.
     """
 
     clearance: float
@@ -44,9 +46,9 @@ class Met(NamedTuple):
 
 
 def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
-    """Least height above ground and least distance outside a kill sphere of a return flown in JSBSim, m.
+    """Return least height above ground and least distance outside a kill sphere of a flight in JSBSim, m.
 
-    Exact navigation and the mean wind alone, as on the point mass.  start: a record of
+    The flight has exact navigation and the mean wind alone, as with the point mass.  start: a record of
     `flight.autopilots.arduplane.swift_return.RETURN_START`.  None for a return that cannot be flown.
     """
     try:
@@ -64,28 +66,28 @@ def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
 def return_setup(
     world: ReturnWorld, start: Record, landing: LandingStart | None = None
 ) -> tuple[FlightSetup, Airframe]:
-    """The flight of a return by the law, in the mean wind alone: it is flown in to where that begins.
+    """Make the setup of a return by the control law, in the mean wind alone, with a lead-in to its start.
 
     landing: the landing sequence that it leads to, None for none.
     Raises MissionError for a return that cannot be laid out, and ScenarioError or ParameterError as `load_airframe`.
     """
     scenario = replace(world.scenario, wind=replace(world.scenario.wind, turbulence="none"))
     airframe = replace(load_airframe(scenario), autopilot=ArduPlane(world.parameters))
-    return replace(make_setup(scenario, airframe, _mission(world, start, landing), 1), nav="perfect"), airframe
+    return replace(make_setup(scenario, airframe, _return_mission(world, start, landing), 1), nav="perfect"), airframe
 
 
 def from_start(track: Track, start: Record) -> Floats | None:
-    """Positions (t, 3) of a flight from where its return begins; None where it does not come there."""
+    """Return positions (t, 3) from the start of the return on; None if the flight does not reach it."""
     begin = np.array([float(start["east"]), float(start["north"])])
     near = np.hypot(*(track.position[: round(2.0 * LEAD / 10.0 * 60.0), :2] - begin).T)
-    if not near.size or float(near.min()) > _ASIDE:
+    if not near.size or float(near.min()) > _MAX_START_DISTANCE_M:
         return None
     position: Floats = track.position[int(np.argmin(near)) :]
-    return None if abs(float(position[0, 2]) - float(start["up"])) > _HEIGHT else position
+    return None if abs(float(position[0, 2]) - float(start["up"])) > _MAX_START_HEIGHT_ERROR_M else position
 
 
 def met_on_way(world: ReturnWorld, position: Floats) -> Met:
-    """What a way (t, 3) comes nearest to."""
+    """Find the nearest approaches of a path (t, 3) to ground and missiles."""
     low, at = math.nan, (math.nan, math.nan, math.nan)
     if world.scenario.terrain is not None:
         above = position[:, 2] - world.scenario.terrain.height(position[:, 0], position[:, 1])
@@ -101,12 +103,12 @@ def met_on_way(world: ReturnWorld, position: Floats) -> Met:
     return Met(low, at, outside, threat)
 
 
-def _mission(world: ReturnWorld, start: Record, landing: LandingStart | None) -> Mission:
-    """A mission that passes a start on its course and slope, and returns from there, to a landing sequence if any."""
+def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | None) -> Mission:
+    """Make a mission that passes a start on its course and slope, and returns from there."""
     east, north, up = (float(start[name]) for name in ("east", "north", "up"))
     ve, vn, vu = (float(start[f"velocity_{name}"]) for name in ("east", "north", "up"))
     over = max(1.0, math.hypot(ve, vn))
-    up += _LATE * vu
+    up += _SLOPE_DELAY_S * vu
     places = [(east - LEAD * ve / over, north - LEAD * vn / over, up - LEAD * vu / over), (east, north, up)]
     origin, mission = world.scenario.origin, world.setup.mission
     items = []
@@ -117,7 +119,7 @@ def _mission(world: ReturnWorld, start: Record, landing: LandingStart | None) ->
     back = int(Command.NAV_RETURN_TO_LAUNCH)
     items.append(MissionItem(3, back, int(Frame.MISSION), (0.0,) * 4, 0.0, 0.0, 0.0))
     if landing is not None:
-        items += _sequence(mission.items, landing)
+        items += _landing_items(mission.items, landing)
     rally = []
     for number, point in enumerate(world.rally):
         lat, lon = (float(value) for value in to_geo(origin, point.east, point.north))
@@ -128,8 +130,8 @@ def _mission(world: ReturnWorld, start: Record, landing: LandingStart | None) ->
     return Mission(home, tuple(items), rally=tuple(rally), source=mission.source)
 
 
-def _sequence(items: tuple[MissionItem, ...], landing: LandingStart) -> list[MissionItem]:
-    """The items of a landing sequence, from its DO_LAND_START to the landing, numbered from 4."""
+def _landing_items(items: tuple[MissionItem, ...], landing: LandingStart) -> list[MissionItem]:
+    """Return the items of a landing sequence, from its DO_LAND_START to the landing, numbered from 4."""
     first = next(k for k, item in enumerate(items) if item.seq == landing.item)
     begin = max(k for k in range(first) if items[k].command == Command.DO_LAND_START)
     end = next(k for k in range(first, len(items)) if items[k].command in LANDINGS)

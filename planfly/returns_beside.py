@@ -1,4 +1,4 @@
-"""Returns to launch beside a verdict: from a few places of a flight, in a line, in a log's scene and in pictures."""
+"""Summary of returns to launch next to a verdict: judge a few starts for a line, a scene and pictures."""
 
 from dataclasses import dataclass
 
@@ -13,22 +13,22 @@ from world.errors import PlanflyError
 
 
 def return_starts(setup: FlightSetup, track: Track | None, every: float) -> ReturnStarts:
-    """Of the track, or of the planned path where nothing was flown."""
+    """Return starts on the track, or on the planned path if nothing was flown."""
     if track is not None and len(track):
         return flown_starts(setup, track, every)
     return planned_starts(setup, every)
 
 
-# Returns of which the line beside a verdict is made, and its pictures.
-_FEW = 50
+# Number of returns in the summary and its pictures.
+_SUMMARY_RETURNS = 50
 
 
 @dataclass(frozen=True, slots=True)
 class ReturnsBeside:
-    """Returns from a few places of a flight, beside its verdict; those in JSBSim are left out.
+    """Returns from a few places of a flight, without simulation in JSBSim, to accompany its verdict.
 
-    line: all of them in a line; "" where there is nothing to judge.
-    world, starts, returns: None where nothing is judged.
+    line: summary of all returns in a line; "" if nothing can be judged.
+    world, starts, returns: None if nothing is judged.
     """
 
     line: str = ""
@@ -37,20 +37,20 @@ class ReturnsBeside:
     returns: Returns | None = None
 
     def drawn(self) -> DrawnReturns | None:
-        """What pictures show of them, glides without the engine too, which take some seconds to find."""
+        """Return the data of the pictures, with glides without the engine, which take some seconds to find."""
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
         return drawn_returns(self.world, self.starts, self.returns, judge_glides(self.world, self.starts))
 
     def plainly_drawn(self) -> DrawnReturns | None:
-        """The same without glides and least heights: some hundredths of a second."""
+        """Return the data of the pictures without glides and least heights, in some hundredths of a second."""
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
         return plainly_drawn(self.world, self.starts, self.returns)
 
 
 def returns_beside(setup: FlightSetup, track: Track | None) -> ReturnsBeside:
-    """Of a flight, or of the planned path; nothing without a home or a terrain."""
+    """Judge returns of a flight or of the planned path; empty without a home or a terrain."""
     if setup.mission.home is None or setup.scenario.terrain is None:
         return ReturnsBeside()
     try:
@@ -58,7 +58,7 @@ def returns_beside(setup: FlightSetup, track: Track | None) -> ReturnsBeside:
         seconds = setup.path.length / max(1.0, setup.airspeed)
         if track is not None and len(track):
             seconds = float(track.time[-1] - track.time[0])
-        every = max(1.0, seconds / _FEW)
+        every = max(1.0, seconds / _SUMMARY_RETURNS)
         starts = return_starts(setup, track, every)
         found = judge_returns(world, starts, every)
     except PlanflyError as error:
@@ -69,5 +69,5 @@ def returns_beside(setup: FlightSetup, track: Track | None) -> ReturnsBeside:
 
 
 def returns_line(setup: FlightSetup, track: Track | None) -> str:
-    """Returns from a few places of a flight, or of the planned path, in a line; "" without a home or a terrain."""
+    """Summarise returns of a flight or of the planned path in a line; "" without a home or a terrain."""
     return returns_beside(setup, track).line

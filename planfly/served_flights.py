@@ -1,4 +1,4 @@
-"""The process that flies, as ``planfly serve`` sets it up: scenario, verdicts as texts, and logs."""
+"""The flight process of ``planfly serve``: scenario, verdicts as status texts, and logs."""
 
 import contextlib
 import math
@@ -62,23 +62,23 @@ from world.scenario import Scenario, at_time, in_the_air, load_scenario, with_fl
 Floats = NDArray[np.float64]
 
 DEFAULT_SCENARIO = "jacksboro-air"
-# How long LOITER and GUIDED circle in one log, s: a circle's laps are laid out, and judged, one by one.
+# Duration of a loiter in LOITER and GUIDED in one log, s: each lap of a loiter is laid out, and judged, separately.
 HELD = 900.0
-# Most texts about one verdict; the log has the rest.
+# Greatest number of texts about one verdict; the log has the rest.
 _MAX_TEXTS = 4
 
 
 @dataclass(frozen=True, slots=True)
 class ServeOptions:
-    """What the command line asks to serve; both processes load it for themselves.
+    """Options of the command line for serving; both processes load them for themselves.
 
-    mission: a file's path, "" for none.
-    scenario, terrain: None where not named.
-    flight: entries of the scenario's [flight] that take the place of its own; None for those it keeps.
-    speed: times real time.
-    logs: the folder of the flight logs.
-    at: when it is flown, None where not stated.
-    fences: named beside the mission; a station that uploads another fence replaces the items, not the zones.
+    mission: path of a file, "" for none.
+    scenario, terrain: None if not given.
+    flight: entries that replace entries of the scenario's [flight] table; None keeps an entry.
+    speed: ratio to real time.
+    logs: folder of the flight logs.
+    at: time of the flight, None if not stated.
+    fences: named in addition to the mission; a station that uploads another fence replaces the items, not the zones.
     """
 
     mission: str
@@ -93,7 +93,7 @@ class ServeOptions:
 
 @dataclass(frozen=True, slots=True)
 class ServedScenario:
-    """The scenario, the aircraft in it, the seed, and the mission to begin with."""
+    """Scenario, aircraft, seed, and the initial mission."""
 
     scenario: Scenario
     airframe: Airframe
@@ -102,7 +102,7 @@ class ServedScenario:
 
 
 def open_served(options: ServeOptions) -> ServedScenario:
-    """Load what is served.  Raises PlanflyError."""
+    """Load the scenario and mission to serve.  Raises PlanflyError."""
 
     def change(scenario: Scenario) -> Scenario:
         return with_file_autopilot(with_flight(at_time(scenario, options.at), **options.flight))
@@ -118,7 +118,7 @@ def open_served(options: ServeOptions) -> ServedScenario:
 
 
 def flown_parameters(scenario: Scenario, stated: Mapping[str, float]) -> dict[str, float]:
-    """What the law of a scenario's autopilot flies with, by name, where some of it is stated.
+    """Return the parameters of the control law of a scenario by name, after stated values are applied.
 
     The cruise airspeed is the one that is flown.  Raises PlanflyError for values that are not allowed.
     """
@@ -140,7 +140,7 @@ def fly_process(connection: Connection, options: ServeOptions) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     send_event(connection, ProcessReady())
     serve_flights(connection, factory)
-    # The link waits for this, and not for the interpreter to be taken down.
+    # The link waits for this, not for the shutdown of the interpreter.
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     connection.close()
 
@@ -151,14 +151,14 @@ class ServedFlights:
     def __init__(self, options: ServeOptions) -> None:
         self._served = open_served(options)
         self._logs = options.logs
-        # With the parameters that the mission was judged with last.
+        # Airframe with the parameters of the last judged mission.
         self._airframe = self._served.airframe
         self._parameters: tuple[tuple[str, float], ...] = ()
         self.aircraft = self._airframe.aircraft
         self.speed = options.speed
 
     def warm(self) -> None:
-        """Fly half a second and judge it, so that no station waits for compilers later."""
+        """Fly half a second and judge it, so that no station has to wait for compilers later."""
         scenario = self._served.scenario
         points = np.linspace(scenario.start, scenario.destination, 3)
         lats, lons = to_geo(scenario.origin, points[:, 0], points[:, 1])
@@ -174,14 +174,14 @@ class ServedFlights:
             judge_flight(setup, as_track(rows), "warm")
 
     def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
-        """Judge a mission on its geometry, and see that it can be started."""
+        """Judge the geometry of a mission, and check that the flight can be started."""
         served = self._served
         try:
             if request.parameters != self._parameters:
                 self._airframe = load_airframe(served.scenario, dict(request.parameters))
                 self._parameters = request.parameters
             setup = make_setup(served.scenario, self._airframe, request.mission, served.seed)
-            # Its first tick says whether it can start, and has the loop compiled.
+            # The first tick shows whether it can start, and compiles the flight loop.
             flight = Flight(setup, self.aircraft)
             flight.block(1)
         except PlanflyError as error:
@@ -200,7 +200,7 @@ class ServedFlights:
         return PreparedFlight(setup, flight.map), judged
 
     def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:
-        """The way that a station asks for, from where the aircraft is; it circles for `HELD`."""
+        """Lay out the path that a station requests from the present position; a loiter lasts `HELD`."""
         served = self._served
         lat, lon = (on_grid(float(value)) for value in to_geo(served.scenario.origin, here[0], here[1]))
         none = (0.0, 0.0, 0.0, 0.0)
@@ -210,9 +210,9 @@ class ServedFlights:
         elif request.mode == RTL:
             items = (MissionItem(0, int(Command.NAV_RETURN_TO_LAUNCH), int(Frame.MISSION), none, 0.0, 0.0, 0.0),)
         else:
-            items = (_circled(begin, request.place),)
+            items = (_loiter_item(begin, request.place),)
         mission = replace(request.mission, items=(begin, *items), source=MODE_NAMES[request.mode])
-        # Whoever is in the air goes on there, and lands nowhere.
+        # The aircraft is in the air: there is no take-off, and it does not land.
         setup = make_setup(in_the_air(served.scenario), self._airframe, mission, served.seed)
         return PreparedFlight(setup, LocalMap.around(setup))
 
@@ -230,8 +230,8 @@ class ServedFlights:
         return ServedLog(path, setup, self.aircraft, mode)
 
 
-def _circled(here: MissionItem, place: Place) -> MissionItem:
-    """A circle about a place, of which what is not named is that of here."""
+def _loiter_item(here: MissionItem, place: Place) -> MissionItem:
+    """Return a loiter about a place; values that the place does not state are taken from `here`."""
     located = math.isfinite(place.lat_deg) and math.isfinite(place.lon_deg)
     height = replace(here, frame=place.frame, alt=place.alt) if math.isfinite(place.alt) else here
     return replace(
@@ -254,16 +254,16 @@ class ServedLog:
         self._blocks: list[Track] = []
 
     def write(self, block: Track) -> None:
-        """Append rows, and leave none in our hands."""
+        """Append rows and flush them to the file."""
         self._blocks.append(block)
         self._recorder.write(block)
         self._recorder.flush()
 
     def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
-        """Judge the flight and close the log.  hurry: see `planfly.reference_flights.judge_with_reference_flights`.
+        """Judge the flight and close the log.
 
-        In a hurry, a way that was left before is not judged: `planfly check` does it.  One that was left within a
-        second leaves no log.
+        hurry: see `planfly.reference_flights.judge_with_reference_flights`.  In a hurry, a path that was abandoned is
+        not judged: `planfly check` does it.  A path abandoned within a second leaves no log.
         """
         track = join_tracks(self._blocks)
         left = ended.startswith((LEFT_FOR, HELD_ON))
@@ -291,7 +291,7 @@ class ServedLog:
 
 
 def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...]:
-    """Texts about a mission for stations: verdict, size, and what is not flown as written."""
+    """Return texts about a mission for stations: verdict, size, and items that are not flown as written."""
     route = setup.route
     length = float(np.linalg.norm(np.diff(route.waypoints[:, :2], axis=0), axis=1).sum()) / 1000.0
     size = StatusText(f"mission: {len(route.waypoints)} waypoints, {length:.1f} km; {route.started}", INFO)
@@ -299,20 +299,20 @@ def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...
     return (size, *verdict_texts("geometry", verdict), *notes)
 
 
-# What fails of a way because the aircraft was sent on before its end.
-_UNFINISHED = ("completion", "loiter", "waypoint", "turn", "survey")
+# Rules that fail on a path only because the aircraft left it before its end.
+_RULES_OF_UNFINISHED_PATHS = ("completion", "loiter", "waypoint", "turn", "survey")
 
 
 def left_texts(level: str, ended: str, verdict: Verdict) -> tuple[StatusText, ...]:
-    """The verdict on a way that the aircraft was sent on from, on what was flown of it."""
-    failed = [item for item in verdict.findings if item.ok is False and item.rule not in _UNFINISHED]
+    """Return the verdict on the flown part of a path that the aircraft left early."""
+    failed = [item for item in verdict.findings if item.ok is False and item.rule not in _RULES_OF_UNFINISHED_PATHS]
     found = "1 finding" if len(failed) == 1 else f"{len(failed) or 'no'} findings"
     first = StatusText(f"verdict ({level}): {ended}; {found} failed until then", INFO)
     return (first, *_failed_texts(failed))
 
 
 def verdict_texts(level: str, verdict: Verdict) -> tuple[StatusText, ...]:
-    """A verdict in a few lines, the worst first."""
+    """Describe a verdict in a few lines, the worst finding first."""
     failed = [finding for finding in verdict.findings if finding.ok is False]
     if verdict.flyable:
         return (StatusText(f"verdict ({level}): FLYABLE", INFO),)
@@ -330,6 +330,6 @@ def _failed_texts(failed: list[Finding]) -> list[StatusText]:
 
 
 def _heading(item: Finding) -> str:
-    """Rule and place, the place once."""
+    """Return the rule and the place, without repeating the place."""
     word = rule_word(item.rule)
     return word if item.placed else f"{word} at {place_text(item.place)}"

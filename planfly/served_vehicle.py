@@ -1,4 +1,4 @@
-"""The vehicle that ``planfly serve`` is to ground stations: its link, and the processes that fly for it."""
+"""The vehicle that ``planfly serve`` presents to ground stations: its link and its flight processes."""
 
 import contextlib
 import math
@@ -19,8 +19,8 @@ from world.frames import to_geo
 from world.interruption import children_ignore_sigint, end_children, uninterrupted
 from world.scenario import Scenario
 
-# A process that has been asked to end may take this long to do so before it is killed, s.
-_CHILD_PATIENCE = 0.3
+# Time that a process has to end when asked to, before it is killed, s.
+_CHILD_END_TIMEOUT_S = 0.3
 
 
 def serve_vehicle(
@@ -30,13 +30,13 @@ def serve_vehicle(
     stop: Callable[[], bool],
     on_message: Callable[[str], None],
 ) -> None:
-    """Be the vehicle until ``stop`` is true.  on_message: called with what happens, a line each."""
+    """Serve as the vehicle until ``stop`` is true.  on_message: called with each message in a line."""
     with contextlib.ExitStack() as opened:
         link = Link(access)
         opened.callback(link.close)
         pool = _FlightPool(options)
         opened.callback(pool.end)
-        vehicle = _vehicle(link, pool, served, options.speed, on_message)
+        vehicle = _make_vehicle(link, pool, served, options.speed, on_message)
         host, port = link.address
         targets = ", ".join(f"{station}:{number}" for station, number in access.to)
         on_message(f"vehicle {SYSTEM} at {host}:{port}, calling {targets}; scenario {served.scenario.name}")
@@ -52,7 +52,7 @@ def serve_vehicle(
         on_message(f"frames dropped: {dropped}")
 
 
-def _vehicle(
+def _make_vehicle(
     link: Link, pool: "_FlightPool", served: ServedScenario, speed: float, on_message: Callable[[str], None]
 ) -> Vehicle:
     airframe = served.airframe
@@ -75,7 +75,7 @@ def _vehicle(
 
 
 class _FlightPool:
-    """Processes that fly, of which the vehicle asks for another when one has died."""
+    """Flight processes; the vehicle requests another when one has died."""
 
     def __init__(self, options: ServeOptions) -> None:
         self._options = options
@@ -83,7 +83,7 @@ class _FlightPool:
         self._children: list[multiprocessing.process.BaseProcess] = []
 
     def spawn(self) -> Connection:
-        """Start one, and return the link's end of its pipe."""
+        """Start a process, and return the link's end of its pipe."""
         for child in self._children:
             child.join(timeout=0.0)
         self._children = [child for child in self._children if child.is_alive()]
@@ -96,12 +96,12 @@ class _FlightPool:
         return ours
 
     def end(self) -> None:
-        """End those that have not ended yet."""
-        end_children([child for child in self._children if child.is_alive()], _CHILD_PATIENCE)
+        """End the processes that are still alive."""
+        end_children([child for child in self._children if child.is_alive()], _CHILD_END_TIMEOUT_S)
 
 
 def standby_at_start(scenario: Scenario) -> Standby:
-    """State and home of an aircraft without a mission: at the scenario's start, on a course to its destination."""
+    """Return state and home without a mission: at the scenario's start, on a course to its destination."""
     east, north, amsl = (float(value) for value in scenario.start)
     lat, lon = (float(value) for value in to_geo(scenario.origin, east, north))
     ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(east, north))

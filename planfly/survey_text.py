@@ -1,4 +1,4 @@
-"""Photo lines of a survey, and what would help them, in words."""
+"""Text on the photo lines of a survey and on remedies for them."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from planfly.survey_remedies import NearMiss, SurveyRemedy, nth
 
 
 def usable(measure: LineMeasure | None) -> bool:
-    """Whether enough of a line can be used.
+    """Return True if enough of a line can be used.
 
     >>> usable(None)
     False
@@ -20,7 +20,7 @@ def usable(measure: LineMeasure | None) -> bool:
 
 
 def lines_headline(measures: list[LineMeasure | None]) -> str:
-    """How many of some lines can be used, and which is the worst.
+    """Count the lines that can be used, and name the worst.
 
     >>> lines_headline([None, None])
     '0 of 2 photo lines can be used; line 1 is the worst: not flown'
@@ -36,7 +36,7 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
 
 
 def line_text(number: int, measure: LineMeasure | None) -> str:
-    """One line: its length, how much of it can be used, and what the rest lacks."""
+    """Describe one line: its length, its usable share, and the faults of the rest."""
     if measure is None:
         return f"line {number:<3} not flown"
     said = f"line {number:<3} {measure.length:6.0f} m  {100.0 * measure.good:5.1f} % can be used"
@@ -46,13 +46,13 @@ def line_text(number: int, measure: LineMeasure | None) -> str:
 
 
 def survey_text(survey: Survey) -> str:
-    """A survey's lines, spacing and course."""
+    """Describe the lines, spacing and course of a survey."""
     course = round(math.degrees(survey.course)) % 360
     return f"{len(survey.lines)} lines, {survey.spacing:.0f} m apart, the first on course {course}°"
 
 
 def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
-    """How much a survey's photos overlap, along its lines and across; or that nobody knows.
+    """Describe the overlap of photos along the lines and across them, or say that it is not known.
 
     >>> overlap_lines(None)
     ('overlap not judged: the camera is not known (--camera)',)
@@ -68,7 +68,7 @@ def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
 
 
 def kept_overlap(measure: OverlapMeasure | None) -> bool:
-    """Whether photos overlap as they were asked to, as far as that is known.
+    """Return True if photos overlap as required, as far as that is known.
 
     >>> kept_overlap(None)
     True
@@ -80,7 +80,7 @@ def kept_overlap(measure: OverlapMeasure | None) -> bool:
 
 
 def needed_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
-    """From where on a survey's lines can be used, which says how much longer its turn-arounds would have to be."""
+    """Describe from where on lines can be used, which shows the turn-arounds that would be needed."""
     some = [one for one in lines if one is not None and one.good > 0.0]
     if not some:
         return (
@@ -92,12 +92,12 @@ def needed_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
 
 
 def near_miss_text(near: NearMiss) -> str:
-    """The trial that came nearest, and what of it does not pass."""
+    """Describe the best trial that did not pass, and why it did not."""
     return f"{near.what}: {near.usable} of {near.lines} photo lines can be used; {near.verdict.headline}"
 
 
 def remedy_text(remedy: SurveyRemedy, length: float) -> str:
-    """What would help, and what it costs of way.  length: of the route as it is, m."""
+    """Describe a remedy and the path length that it costs.  length: of the present route, m."""
     match remedy.kind:
         case "side":
             change = "the lines from the other side"
@@ -112,7 +112,7 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
         case "parameter":
             change = f"{remedy.name} {remedy.value:g} instead of {remedy.current:g} (--params)"
         case "airspeed":
-            # A mission that is too slow is made faster by its items.
+            # A mission that is too slow is made faster by its items, not by an option.
             how = f" (--airspeed {remedy.value:g})" if remedy.value < remedy.current else ""
             change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s{how}"
     if remedy.kind in ("parameter", "airspeed") and not math.isnan(remedy.turn_around):

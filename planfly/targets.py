@@ -1,13 +1,13 @@
-"""Files and folders that are written: refused where they would destroy something, cleared where they are ours."""
+"""Output files and folders: refuse to overwrite foreign files, clear old results of planfly."""
 
 import hashlib
 from pathlib import Path
 
 from world.errors import PlanflyError
 
-# Where results go that nobody named a place for.
+# Default folder of results.
 RESULTS = Path("runs")
-# The same as a pattern: {name} and {seed} in a path stand for the scenario's or mission's name and the seed.
+# The same as a pattern: {name} and {seed} in a path stand for the name of the scenario or mission and the seed.
 RUN_FOLDER = "runs/{name}-seed{seed}"
 
 RUN_FILES = (
@@ -28,29 +28,30 @@ RUN_FILES = (
     "report.html",
 )
 _FIGURES = ("map", "profile", "scene", "turns", "envelope")
-# What a report and a comparison may write, figures as SVG included.
+# Files of a report and a comparison, including figures as SVG.
 LOG_FIGURES = ("report.html", *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")))
 COMPARE_FILES = (
     *(f"compare-{name}.{kind}" for kind in ("png", "svg") for name in ("map", "profile")),
     "compare.html",
 )
-# What `planfly.survey` may write: the picture of the lines, and missions and parameters that would help.
+# Files of `planfly.survey`: the picture of the lines, and missions and parameters that would help.
 SURVEY_FILES = (
     "survey.png",
     *(f"{kind}.waypoints" for kind in ("side", "turn-around", "every", "course", "parameter", "airspeed")),
     "parameter.param",
 )
-# Returns that a program may fly, at the most.
+# Greatest number of returns that a program may fly.
 MAX_BY_PROGRAM = 20
-# What `planfly.returns` may write.
+# Files of `planfly.returns`.
 RETURN_FILES = (
     *(f"{name}.png" for name in ("returns", "worst-returns", "return-heights", "glide")),
     "returns.kml",
     "returns.mcap",
     *(f"worst-return-{k}{suffix}" for k in range(1, MAX_BY_PROGRAM + 1) for suffix in (".mcap", ".BIN")),
 )
-# Stretches of a flight that are flown again, and what is written of each: of those after the first with its number.
+# Greatest number of parts of a flight that are flown again.
 REFLOWN = 9
+# Files of each part that is flown again, numbered from the second part on.
 REFLY_FILES = tuple(
     name
     for ending in ("", *(f"-{number}" for number in range(2, REFLOWN + 1)))
@@ -62,7 +63,7 @@ REFLY_FILES = tuple(
 
 
 def refuse_existing(path: Path, overwrite: bool, source: Path | None = None) -> None:
-    """Refuse a target file that exists, is a folder, cannot be made, or is the input.  Raises PlanflyError."""
+    """Raise PlanflyError for a target file that exists, is a folder, cannot be made, or is the input."""
     if source is not None and path.exists() and source.exists() and path.samefile(source):
         raise PlanflyError(f"{path}: is the input itself; name another file to write", file=path)
     if path.is_dir():
@@ -82,7 +83,7 @@ def refuse_folder(folder: Path, overwrite: bool) -> None:
 
 
 def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
-    """Make a folder and clear old results of ours: what is written there, never anything else that lies there."""
+    """Make a folder and clear old results of planfly in it, never any other file."""
     folder.mkdir(parents=True, exist_ok=True)
     rounds = sorted(folder.glob("round-[0-9]*")) if files is RUN_FILES else []
     if files is RUN_FILES:
@@ -95,7 +96,7 @@ def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
 
 
 def clean_folder(out: str | Path, files: tuple[str, ...], *, overwrite: bool) -> Path:
-    """A target folder, checked as `refuse_folder` does, made, and cleared of older files of ours."""
+    """Return a target folder, checked by `refuse_folder`, made, and cleared of old results of planfly."""
     folder = Path(out)
     refuse_folder(folder, overwrite)
     prepare_folder(folder, files)
@@ -103,7 +104,7 @@ def clean_folder(out: str | Path, files: tuple[str, ...], *, overwrite: bool) ->
 
 
 def is_pattern(target: str | Path) -> bool:
-    """Whether a path is made of the name and the seed of what is written.
+    """Return True if a path contains a placeholder for the name or the seed.
 
     >>> is_pattern("runs/{name}-seed{seed}/flight.mcap"), is_pattern("flight.mcap")
     (True, False)
@@ -112,9 +113,9 @@ def is_pattern(target: str | Path) -> bool:
 
 
 def filled_pattern(target: str | Path, name: str, seed: int) -> Path:
-    """A path with its {name} and {seed} filled in; the name so that it stays one folder, and no other name's.
+    """Fill in {name} and {seed} of a path; the name is made a safe and distinct folder name.
 
-    A name that has to change for that ends with the beginning of its SHA-256.
+    A name that has to be changed ends with the beginning of its SHA-256.
 
     >>> str(filled_pattern(RUN_FOLDER, "a/b", 3)), str(filled_pattern(RUN_FOLDER, "a b", 3))
     ('runs/a-b-c14cdd-seed3', 'runs/a-b-c8687a-seed3')
@@ -126,7 +127,7 @@ def filled_pattern(target: str | Path, name: str, seed: int) -> Path:
 
 
 def file_target(target: str | Path, name: str, seed: int, *, overwrite: bool, source: Path | None = None) -> Path:
-    """The file to write, checked as `refuse_existing` does; the folder of a pattern is made by whoever writes."""
+    """Return the file to write, checked as by `refuse_existing`; the caller makes the folder of a pattern."""
     path = filled_pattern(target, name, seed)
     if path.parent.exists() or not is_pattern(target):
         refuse_existing(path, overwrite, source)

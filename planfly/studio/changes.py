@@ -1,7 +1,7 @@
-"""What a flight has that the one before it had not, by places and figures, whatever was inserted or deleted between.
+"""Differences between a flight and the previous one, although items were inserted or deleted.
 
-Items have other numbers when one is inserted or deleted before them: those of two missions that are the same, or that
-stand between such, are matched first, and legs are known by the items at their ends.
+Inserting or deleting an item renumbers the later ones: equal items of both missions, and items between equal ones, are
+matched first, and legs are identified by the items at their ends.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,18 +15,21 @@ from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import place_text, quantity_text
 
-# A place: its kind, and the items that it is at, by their order in the mission, or its number; None for what is none.
+# Identity of a place: its kind, and its items, by their order in the mission or by their number; None for no item.
 PlaceKey = tuple[str, int | None, int | None]
-# Changes of a state, and of figures where no state has changed, that are named.
-_STATES, _FIGURES = 6, 3
+# Greatest number of changes of state that are named.
+_MAX_STATE_CHANGES = 6
+# Greatest number of changes of value that are named if no state has changed.
+_MAX_VALUE_CHANGES = 3
+# Sort key of the states.
 _WORST_FIRST = {False: 0, None: 1, True: 2}
 
 
 class Figure(NamedTuple):
-    """What a rule found at a place.
+    """Result of a rule at a place.
 
-    ok: None where it was not judged.  value, margin: in ``unit``, None for none.
-    place: in words, by the numbers of its own mission.  scale: a difference of the margin that is noticeable.
+    ok: None if not judged.  value, margin: in ``unit``, or None.
+    place: in words, by the numbers of its own mission.  scale: smallest noticeable difference of the margin.
     """
 
     ok: bool | None
@@ -38,7 +41,7 @@ class Figure(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Its value in words, "" for none."""
+        """Value in words, "" for none."""
         return "" if self.value is None else quantity_text(self.value, self.unit)
 
 
@@ -46,9 +49,10 @@ _Found = dict[tuple[str, PlaceKey], Figure]
 
 
 class Figures(NamedTuple):
-    """A flight as another is compared with it.
+    """Results of a flight, for a comparison with another.
 
-    items: what each item of its mission is, in order.  found: the worst of each rule at each place.  seconds: in all.
+    items: contents of each item of its mission, in order.  found: worst result of each rule at each place.
+    seconds: duration of the flight.
     """
 
     items: tuple[tuple[float, ...], ...]
@@ -57,12 +61,12 @@ class Figures(NamedTuple):
 
 
 def flight_figures(mission: Mission, route: Route, findings: Iterable[Finding], seconds: float) -> Figures:
-    """The figures of a flight of a mission."""
+    """Collect the results of a flight of a mission."""
     items = tuple((float(item.command), item.lat_deg, item.lon_deg, item.alt) for item in mission.items)
     order = {item.seq: k for k, item in enumerate(mission.items)}
     found: _Found = {}
     for item in findings:
-        key, words = _place(item.place, route.items.tolist(), order)
+        key, words = _place_key(item.place, route.items.tolist(), order)
         value = item.planned if item.flown is None else item.flown
         figure = Figure(item.ok, value, item.margin, item.unit, words, RULE_WORDS[item.rule].scale)
         old = found.get((item.rule, key))
@@ -75,8 +79,8 @@ def _badness(figure: Figure) -> tuple[int, float]:
     return _WORST_FIRST[figure.ok], 0.0 if figure.margin is None else figure.margin
 
 
-def _place(place: Place, route: Sequence[int], order: dict[int, int]) -> tuple[PlaceKey, str]:
-    """What a place is known by in another mission, and its words: legs and waypoints by the numbers of items."""
+def _place_key(place: Place, route: Sequence[int], order: dict[int, int]) -> tuple[PlaceKey, str]:
+    """Return the identity of a place across missions, and its words: legs and waypoints by item numbers."""
     if place.kind == "leg" and place.index is not None:
         first, last = (route[place.index + k] for k in (0, 1))
         if first in order and last in order:
@@ -90,14 +94,14 @@ def _place(place: Place, route: Sequence[int], order: dict[int, int]) -> tuple[P
 
 
 def same_items(before: Sequence[tuple[float, ...]], now: Sequence[tuple[float, ...]]) -> dict[int, int]:
-    """The order that items of one mission have in another; those that are gone are left out.
+    """Map the order of items in one mission to their order in another; removed items are left out.
 
     >>> a, b, c, d = [(16.0, 46.0, 8.0 + k, 100.0) for k in range(4)]
     >>> same_items([a, b, c], [a, d, b, c]), same_items([a, b, c], [a, c]), same_items([a, b, c], [a, d, c])
     ({0: 0, 1: 2, 2: 3}, {0: 0, 2: 1}, {0: 0, 1: 1, 2: 2})
     """
     found: dict[int, int] = {}
-    # NaN is like no other number: what has none of a number has it in both.
+    # NaN is unequal to itself: replace it by None, so that equal items are found equal.
     old, new = ([tuple(None if v != v else v for v in one) for one in side] for side in (before, now))
     for kind, a, a_end, b, b_end in SequenceMatcher(a=old, b=new, autojunk=False).get_opcodes():
         if kind == "equal" or (kind == "replace" and a_end - a == b_end - b):
@@ -106,7 +110,7 @@ def same_items(before: Sequence[tuple[float, ...]], now: Sequence[tuple[float, .
 
 
 def changes(before: Figures | None, now: Figures) -> list[str]:
-    """What has changed since the flight before, in words; nothing for the first.
+    """Describe the changes since the previous flight, in words; nothing for the first flight.
 
     >>> leg = ("clearance", ("leg", 0, 1))
     >>> items = ((16.0, 46.0, 8.0, 100.0), (16.0, 46.0, 8.1, 100.0))
@@ -119,23 +123,28 @@ def changes(before: Figures | None, now: Figures) -> list[str]:
     """
     if before is None:
         return []
-    old = _in_numbers_of(before, now)
-    found = _changed_states(old, now.found)
-    if len(found) > _STATES:
-        found[_STATES:] = [f"and {len(found) - _STATES} more"]
+    old = _renumbered(before, now)
+    found = _state_changes(old, now.found)
+    if len(found) > _MAX_STATE_CHANGES:
+        found[_MAX_STATE_CHANGES:] = [f"and {len(found) - _MAX_STATE_CHANGES} more"]
     if not found:
-        found = _changed_figures(old, now.found)
+        found = _value_changes(old, now.found)
     longer = now.seconds - before.seconds
     if abs(longer) >= 0.5:
         found.append(f"{abs(longer):.0f} s {'longer' if longer > 0.0 else 'shorter'}")
     return found or ["nothing"]
 
 
-_OF_ITEMS, _GONE_PLACE, _GONE = ("leg", "waypoint", "mission"), "gone", -1
+# Kinds of places that are identified by items.
+_OF_ITEMS = ("leg", "waypoint", "mission")
+# Kind of a place whose item was removed.
+_GONE_PLACE = "gone"
+# Order of a removed item.
+_GONE = -1
 
 
-def _in_numbers_of(before: Figures, now: Figures) -> _Found:
-    """The figures of before by the places of now; those of items that are gone by places that none is."""
+def _renumbered(before: Figures, now: Figures) -> _Found:
+    """Return the earlier results by present places; results at removed items get places of their own."""
     same, found = same_items(before.items, now.items), {}
     for number, ((rule, (kind, first, last)), figure) in enumerate(before.found.items()):
         if kind in _OF_ITEMS and first is not None and last is not None:
@@ -146,37 +155,39 @@ def _in_numbers_of(before: Figures, now: Figures) -> _Found:
     return found
 
 
-def _changed_states(old: _Found, new: _Found) -> list[str]:
-    """What fails and did not, or did and does not, with both figures; what is worse first."""
+def _state_changes(old: _Found, new: _Found) -> list[str]:
+    """Describe the places whose state has changed, with both values; the worse first."""
     worse, better = [], []
     for (rule, key), now in new.items():
         was = old.get((rule, key))
         failed = was is not None and was.ok is False
         if now.ok is False and not failed:
-            worse.append(_said(rule, now, was, "fails now"))
+            worse.append(_change_text(rule, now, was, "fails now"))
         elif now.ok is not False and failed:
-            better.append(_said(rule, now, was, "now passes" if now.ok else "is not judged now"))
+            better.append(_change_text(rule, now, was, "now passes" if now.ok else "is not judged now"))
     there = {key for _, key in new}
     for (rule, key), was in old.items():
         if was.ok is False and (rule, key) not in new:
             gone = key not in there and key[0] in (*_OF_ITEMS, _GONE_PLACE)
             better.append(
-                f"the former {_said(rule, was, None, 'is gone')}" if gone else _said(rule, was, None, "now passes")
+                f"the former {_change_text(rule, was, None, 'is gone')}"
+                if gone
+                else _change_text(rule, was, None, "now passes")
             )
     return worse + better
 
 
-def _said(rule: str, now: Figure, was: Figure | None, end: str) -> str:
+def _change_text(rule: str, now: Figure, was: Figure | None, end: str) -> str:
     values = dict.fromkeys(one.text for one in (was, now) if one is not None and one.text)
     figures = " \u2192 ".join(values)
     return f"{now.place}: {RULE_WORDS[rule].word} {figures}".rstrip() + f", {end}"
 
 
-def _changed_figures(old: _Found, new: _Found) -> list[str]:
-    """Where no state has changed: what still fails, and what of each rule is closest to its limit, the most first."""
+def _value_changes(old: _Found, new: _Found) -> list[str]:
+    """Describe changes of value if no state has changed: of failures, then of the closest margins."""
     both = [(rule, old[rule, key], now) for (rule, key), now in new.items() if now.ok is False and (rule, key) in old]
-    still = [_said(rule, now, was, "still fails") for rule, was, now in both if was.text != now.text]
-    least_old, least_new = _closest(old), _closest(new)
+    still = [_change_text(rule, now, was, "still fails") for rule, was, now in both if was.text != now.text]
+    least_old, least_new = _closest_by_rule(old), _closest_by_rule(new)
     found = []
     for rule, now in least_new.items():
         was = least_old.get(rule)
@@ -185,10 +196,10 @@ def _changed_figures(old: _Found, new: _Found) -> list[str]:
         moved = abs((now.margin or 0.0) - (was.margin or 0.0)) / was.scale
         there = now.place if was.place == now.place else f"{was.place}, now {now.place}"
         found.append((moved, f"closest to its limit: {RULE_WORDS[rule].word} {was.text} \u2192 {now.text} ({there})"))
-    return still[:_FIGURES] + [text for _, text in sorted(found, reverse=True)[:_FIGURES]]
+    return still[:_MAX_VALUE_CHANGES] + [text for _, text in sorted(found, reverse=True)[:_MAX_VALUE_CHANGES]]
 
 
-def _closest(figures: _Found) -> dict[str, Figure]:
+def _closest_by_rule(figures: _Found) -> dict[str, Figure]:
     found: dict[str, Figure] = {}
     for (rule, _), figure in figures.items():
         if figure.margin is not None and (rule not in found or figure.margin < (found[rule].margin or 0.0)):

@@ -1,7 +1,7 @@
-"""A mission under edit in its world: where its items lie, the route that it comes to, and its geometric verdict.
+"""Editing context of a mission: places of its items, its route, and its geometric verdict.
 
-World and aircraft are loaded once.  A mission that was not changed is judged as it was opened, a plan with its
-certificate; a changed one as a mission file is.
+Scenario and aircraft are loaded once.  An unchanged mission is judged as it was opened, a plan with its certificate;
+a changed mission is judged like a mission file.
 """
 
 import math
@@ -29,15 +29,15 @@ from world.frames import to_geo, to_map
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
-# A mission without a scenario gets a new one around it where it comes so near to the edge of its own, m.
-_RIM = 500.0
+# Distance from the edge of its scenario, m, at which a mission without a given scenario gets a new one around it.
+_EDGE_DISTANCE_M = 500.0
 _NO_FENCES = NamedFences()
-_NONE_SET = SetParameters()
+_DEFAULT_PARAMETERS = SetParameters()
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A mission, its setup with the route requirements, and its geometric verdict."""
+    """Mission with its setup, its route requirements and its geometric verdict."""
 
     mission: Mission
     setup: FlightSetup
@@ -47,14 +47,14 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class Desk:
-    """What a mission under edit is judged with.
+    """Everything that a mission under edit is judged with.
 
-    scenario: its world; airframe: loaded of it; seed: of its flight.
-    opened: the setup as it was opened, with its plan if it is of one.
-    terrain: of a mission that came without a scenario, the elevation file named; None for none.
-    planned: whether the acceptance radii are planfly's, and follow the turns.
-    fences: named beside a mission; their zones stand in every world that is made around it.
-    parameters: of the autopilot, that were set in the studio.
+    scenario: its world; airframe: the aircraft loaded for it; seed: seed of its flight.
+    opened: the setup as it was opened, with its plan if there is one.
+    terrain: elevation file named for a mission without a scenario, or None.
+    planned: true if the acceptance radii were set by planfly, and follow the turns.
+    fences: fences named with a mission; their zones are part of every scenario that is made around it.
+    parameters: parameters of the autopilot that were set in the studio.
     """
 
     scenario: Scenario
@@ -64,11 +64,11 @@ class Desk:
     terrain: str | None = None
     planned: bool = False
     fences: NamedFences = _NO_FENCES
-    parameters: SetParameters = _NONE_SET
+    parameters: SetParameters = _DEFAULT_PARAMETERS
 
     @classmethod
     def of(cls, opened: OpenedMission, terrain: str | None = None, fences: NamedFences = _NO_FENCES) -> "Desk":
-        """The desk of an opened mission or plan."""
+        """Return the context of an opened mission or plan."""
         setup = opened.setup
         return cls(
             setup.scenario,
@@ -81,27 +81,32 @@ class Desk:
         )
 
     def flown_as(self, scenario: Scenario, parameters: SetParameters) -> "Desk":
-        """The desk with the same mission in another weather, or with another aircraft or autopilot.
+        """Return the context of the same mission in other weather, or with another aircraft or autopilot.
 
-        A plan's certificate is of the world in which it was planned: it does not count in another.
+        The certificate of a plan applies only to the world in which it was planned.
         """
         airframe = parameters.airframe(scenario)
         setup = make_setup(scenario, airframe, self.opened.mission, self.seed)
         return replace(self, scenario=scenario, airframe=airframe, opened=setup, parameters=parameters)
 
     def of_plan(self, plan: Plan, mission: Mission) -> "Desk":
-        """The desk of a plan that was made here; its mission counts with its certificate until it is changed."""
+        """Return the context of a new plan; its certificate applies until the mission is changed."""
         setup = make_setup(self.scenario, self.airframe, mission, self.seed, plan=plan)
         return replace(self, opened=setup, planned=True)
 
     def around(self, mission: Mission) -> "Desk":
-        """The desk, in a new world if the mission has left the one that was made around it."""
+        """Return the context, in a new scenario if the mission has left the one that was made around it."""
         if not self.scenario.external:
             return self
         points = self.points(mission)[:, :2]
         (west, east), (south, north) = self.scenario.bounds.tolist()
         low, high = points.min(axis=0), points.max(axis=0)
-        if low[0] > west + _RIM and high[0] < east - _RIM and low[1] > south + _RIM and high[1] < north - _RIM:
+        if (
+            low[0] > west + _EDGE_DISTANCE_M
+            and high[0] < east - _EDGE_DISTANCE_M
+            and low[1] > south + _EDGE_DISTANCE_M
+            and high[1] < north - _EDGE_DISTANCE_M
+        ):
             return self
         made = implied_scenario(mission, self.terrain, self.scenario.flight, vertical_legs=True).scenario
         spec = made.spec.model_copy(update={"wind": self.scenario.spec.wind, "limits": self.scenario.spec.limits})
@@ -112,29 +117,29 @@ class Desk:
     # Places.
 
     def placed(self, mission: Mission) -> PlacedMission:
-        """A mission's stops on the map, jumps unrolled."""
+        """Return the stops of a mission on the map, with jumps unrolled."""
         return place_stops(mission, self.scenario.origin, self.scenario.terrain, vertical_legs=True)
 
     def points(self, mission: Mission, placed: PlacedMission | None = None) -> Floats:
-        """East, north and height above mean sea level of each place of `edits.places`, (n, 3) m.
+        """Return east, north and altitude AMSL of each place of `edits.places`, (n, 3) m.
 
-        A landing's height is that of its touchdown.  One that no flight comes to has the height that its frame says,
-        NaN where that is not known.
+        The altitude of a landing is the altitude of its touchdown.  An item that no flight reaches has the altitude
+        that it states, NaN if not known.
         """
         placed = self.placed(mission) if placed is None else placed
         heights = {stop.stop.item: float(stop.position[2]) for stop in reversed(placed.stops)}
         items = [mission.items[k] for k in places(mission)]
         east, north = to_map(self.scenario.origin, [one.lat_deg for one in items], [one.lon_deg for one in items])
         up = [
-            self._height_by_frame(mission, one, x, y)
+            self._stated_altitude(mission, one, x, y)
             if one.command in LANDINGS or one.seq not in heights
             else heights[one.seq]
             for one, x, y in zip(items, np.asarray(east).tolist(), np.asarray(north).tolist(), strict=True)
         ]
         return np.stack([east, north, up], axis=1)
 
-    def _height_by_frame(self, mission: Mission, item: MissionItem, east: float, north: float) -> float:
-        """Height above mean sea level that an item states, m; NaN where it states none, or over unknown ground."""
+    def _stated_altitude(self, mission: Mission, item: MissionItem, east: float, north: float) -> float:
+        """Return the altitude AMSL that an item states, m; NaN if it states none, or over unknown ground."""
         if item.frame in AMSL:
             return item.alt
         terrain, home = self.scenario.terrain, mission.home
@@ -148,35 +153,35 @@ class Desk:
         return math.nan if terrain is None else float(terrain.height(east, north)) + item.alt
 
     def flown(self, mission: Mission) -> frozenset[int]:
-        """Numbers of the items that a flight comes to."""
+        """Return the numbers of the items that a flight reaches."""
         return frozenset(stop.stop.item for stop in self.placed(mission).stops)
 
     def geographic(self, east: float, north: float) -> tuple[float, float]:
-        """Latitude and longitude of a place on the map, degrees."""
+        """Return latitude and longitude of a place on the map, degrees."""
         lat, lon = to_geo(self.scenario.origin, east, north)
         return float(lat), float(lon)
 
     def retuned(self, mission: Mission, index: int) -> Mission:
-        """A planned mission with the acceptance radii that its turns about an item come to; any other as it is."""
+        """Adapt the acceptance radii of a planned mission to its turns near an item."""
         if not self.planned:
             return mission
         own = places(mission)
         at = int(np.searchsorted(own, index))
         chain = own[max(0, at - 2) : at + 3]
-        points = self._flat_points(mission, chain)
+        points = self._planned_points(mission, chain)
         frame = self.airframe
         radii = acceptance_radii(self.scenario, points, frame.airspeed, frame.max_bank, frame.limits.tracking)
         items = list(mission.items)
         for k, radius in zip(chain, radii.tolist(), strict=True):
-            # At the ends of the chain the turn is not known, but at those of the mission there is none.
+            # The turn at an end of the chain is not known, unless it is an end of the mission, which has no turn.
             inner = k not in (chain[0], chain[-1]) or k in (own[0], own[-1])
             if inner and items[k].command == Command.NAV_WAYPOINT:
                 params = items[k].params
                 items[k] = replace(items[k], params=(params[0], radius, *params[2:]))
         return replace(mission, items=tuple(items))
 
-    def _flat_points(self, mission: Mission, chosen: tuple[int, ...]) -> Floats:
-        """Places of a planned mission, whose heights are above mean sea level; a landing's is that of its line-up."""
+    def _planned_points(self, mission: Mission, chosen: tuple[int, ...]) -> Floats:
+        """Return the places of a planned mission, AMSL; a landing has the altitude of the item before it."""
         items = [mission.items[k] for k in chosen]
         east, north = to_map(self.scenario.origin, [one.lat_deg for one in items], [one.lon_deg for one in items])
         up = [one.alt for one in items]
@@ -189,27 +194,27 @@ class Desk:
     # Verdicts.
 
     def setup(self, mission: Mission) -> FlightSetup:
-        """Everything that decides the flight of a mission.  Raises MissionError for one that cannot be laid out."""
-        # The setup's mission names its autopilot; its items are those that were opened.
+        """Make the flight setup of a mission.  Raises MissionError for one that cannot be laid out."""
+        # The mission of the setup names its autopilot; its items are the opened ones.
         if mission.items is self.opened.mission.items and self.scenario is self.opened.scenario:
             return self.opened
         return make_setup(self.scenario, self.airframe, mission, self.seed, placed=self.placed(mission))
 
     def judge(self, mission: Mission) -> Judged:
-        """The whole geometric verdict on a mission."""
+        """Judge the whole geometry of a mission."""
         setup = self.setup(mission)
         requirements = route_requirements(setup)
         return Judged(mission, setup, requirements, judge_geometry(setup, requirements))
 
     def route(self, mission: Mission) -> Route:
-        """The route that a mission comes to, without the notes that are made for people."""
+        """Lay out the route of a mission, without the notes for people."""
         frame, fly_over = self.airframe, self.scenario.flight.fly_over
         rules = frame.autopilot.route_rules
         laid = lay_route(self.placed(mission), frame.airspeed, fly_over, frame.limits, rules)
         return with_end_courses(laid, self.scenario, frame.limits)
 
     def part(self, mission: Mission, route: Route) -> FlightSetup:
-        """A setup of a part of a mission's route, of which legs and corners are judged and nothing is flown."""
+        """Make a setup of a part of the route, whose legs and corners are judged; nothing is flown."""
         frame = self.airframe
         return FlightSetup(
             scenario=self.scenario,

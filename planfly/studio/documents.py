@@ -1,4 +1,4 @@
-"""What is opened in the studio, and what a mission under edit is saved as, with what each form leaves out."""
+"""Open documents in the studio, and save the mission under edit, with the losses of each file format."""
 
 import contextlib
 import json
@@ -36,26 +36,29 @@ from world.scenario import Scenario, embedded_names, load_scenario
 
 Floats = NDArray[np.float64]
 
-# A file that is dropped on the page, bytes.
+# Largest file that may be dropped on the page, bytes.
 MAX_DROPPED = 16 * 2**20
-# What may be dropped: all that `planfly check` reads and that names no other file.
+# File types that may be dropped: all that `planfly check` reads and that name no other file.
 DROPPED = (".waypoints", ".txt", ".plan", ".json", ".mcap", ".bin", ".tlog", ".ulg", ".gpx", ".igc", ".kml", ".kmz")
-# What a mission is opened from and saved as; and what else is saved.
+# File types that a mission is opened from and saved as.
 KINDS = {"waypoints": ".waypoints", "plan": ".plan", "plan.json": ".json", "kml": ".kml"}
+# All file types that are saved.
 SAVED = KINDS | {"parm": ".parm"}
-# Places that are so near are one: a file's grid of 1e-7 degrees, and m.
-_SAME_DEGREES, _SAME_PLACE = 2e-7, 0.02
+# Latitudes and longitudes within this are the same place, degrees; a file has a grid of 1e-7 degrees.
+_SAME_PLACE_DEG = 2e-7
+# Altitudes within this are the same, m.
+_SAME_ALTITUDE_M = 0.02
 
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """An opened mission and where it is from.
+    """Opened mission and its origin.
 
-    name: for people; stem: of files that are saved.
-    opened: with its setup and airframe.
-    kind: of `KINDS`, "" for what was no mission file; data: its bytes, which an unchanged mission is saved as.
-    path: the file that the command named; None for any other.  on_disk: the bytes that it has, as far as is known.
-    to_plan: whether it is a scenario that has no path yet.
+    name: shown to people; stem: stem of the names of saved files.
+    opened: mission with its setup and airframe.
+    kind: one of `KINDS`, "" if not opened from a mission file; data: its bytes, saved again for an unchanged mission.
+    path: file that the command named, or None.  on_disk: its present bytes, as far as is known.
+    to_plan: true for a scenario that has no path yet.
     """
 
     name: str
@@ -70,7 +73,7 @@ class Document:
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """In which world a mission is opened, as the command names it; None keeps what it has."""
+    """World in which a mission is opened, as given on the command line; None keeps the mission's value."""
 
     scenario: str | None = None
     terrain: str | None = None
@@ -83,7 +86,7 @@ def open_document(target: str, world: World) -> Document:
     """Open a scenario, a plan, a mission or a log, by name or path.  Raises PlanflyError."""
     if target in embedded_names() or target.lower().endswith(".toml"):
         scenario = world.change(load_scenario(target, world.terrain))
-        return _of_scenario(scenario, world.seed)
+        return _scenario_document(scenario, world.seed)
     path = Path(target)
     opened = _open_file(path, world)
     kind = next((kind for kind, suffix in KINDS.items() if suffix == path.suffix.lower()), "")
@@ -93,7 +96,7 @@ def open_document(target: str, world: World) -> Document:
 
 
 def open_dropped(name: str, data: bytes, world: World) -> Document:
-    """Open a file that was dropped on the page: its bytes, and of its name the suffix.  Raises PlanflyError."""
+    """Open a file that was dropped on the page; only the suffix of its name is used.  Raises PlanflyError."""
     suffix = Path(name).suffix.lower()
     shown = "".join(ch if ch.isprintable() and ch not in "/\\" else "_" for ch in name)[-60:] or "dropped"
     if suffix not in DROPPED:
@@ -104,7 +107,7 @@ def open_dropped(name: str, data: bytes, world: World) -> Document:
         file = folder / f"dropped{suffix}"
         file.write_bytes(data)
         if data.startswith(MCAP_MAGIC):
-            _refuse_log_of_other_files(shown, file)
+            _refuse_log_naming_files(shown, file)
         try:
             opened = open_document(str(file), world)
         except PlanflyError as error:
@@ -112,12 +115,12 @@ def open_dropped(name: str, data: bytes, world: World) -> Document:
     return replace(opened, name=shown, stem=Path(shown).stem, path=None)
 
 
-def _refuse_log_of_other_files(name: str, file: Path) -> None:
-    """Refuse a log whose scenario, or that of whose plan, names files of this machine."""
+def _refuse_log_naming_files(name: str, file: Path) -> None:
+    """Refuse a log whose scenario, or whose plan's scenario, names files of this machine."""
     found = Container()
     with file.open("rb") as stream, contextlib.suppress(PlanflyError, *PARSE_ERRORS):
         stream.seek(len(MAGIC))
-        # What is wrong with a log is said where it is read: what comes before that counts.
+        # Errors of the log are reported when it is read; attachments before the error are checked here.
         for _ in read_chunks(stream, found):
             pass
     if SCENARIO_FILE in found.attachments:
@@ -126,13 +129,13 @@ def _refuse_log_of_other_files(name: str, file: Path) -> None:
 
 
 def _refuse_other_files(name: str, data: bytes) -> None:
-    """Refuse a plan whose scenario names files of this machine: the page may not have any read."""
+    """Refuse a plan whose scenario names files of this machine, which a page must not read."""
     try:
         scenario = json.loads(data)["scenario"]
         named = [scenario.get("terrain", {}).get("path"), scenario.get("flight", {}).get("params")]
-        named += [scenario.get("zones_file"), _folder(scenario.get("flight", {}).get("aircraft"))]
+        named += [scenario.get("zones_file"), _aircraft_folder(scenario.get("flight", {}).get("aircraft"))]
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
-        # What is wrong with it is said where it is read.
+        # Errors of the plan are reported when it is read.
         return
     for one in named:
         if one is not None and str(one) not in EMBEDDED:
@@ -140,23 +143,23 @@ def _refuse_other_files(name: str, data: bytes) -> None:
             raise MissionError.at(name, "scenario", str(one)[:60], allowed)
 
 
-def _folder(aircraft: Any) -> str | None:
+def _aircraft_folder(aircraft: Any) -> str | None:
     return aircraft if isinstance(aircraft, str) and ("/" in aircraft or "\\" in aircraft) else None
 
 
 def _open_file(path: Path, world: World) -> OpenedMission:
-    """A plan, a mission, or the mission of a log."""
+    """Open a plan, a mission, or the mission of a log."""
     if path.is_file() and is_imported_log(path):
-        found = _imported(path, world)
-        return _unflown(found.setup.scenario, found.setup.mission, found.setup.seed, path.stem)
+        found = _open_imported_log(path, world)
+        return _open_log_mission(found.setup.scenario, found.setup.mission, found.setup.seed, path.stem)
     if path.is_file() and is_log(path):
         setup = read_log(path).setup
-        return _unflown(world.change(setup.scenario), setup.mission, setup.seed, path.stem)
+        return _open_log_mission(world.change(setup.scenario), setup.mission, setup.seed, path.stem)
     return opened_mission(path, world.scenario, world.terrain, world.seed, world.fence, world.change)
 
 
-def _imported(path: Path, world: World) -> ImportedFlight:
-    """The flight of another program's log.  Raises PlanflyError, in the studio's words for a track alone."""
+def _open_imported_log(path: Path, world: World) -> ImportedFlight:
+    """Read a log of another program.  Raises PlanflyError, with the studio's text for a mere track."""
     try:
         return read_imported(path, scenario=world.scenario, terrain=world.terrain, fence=world.fence)
     except LogError as error:
@@ -166,14 +169,14 @@ def _imported(path: Path, world: World) -> ImportedFlight:
         raise MissionError(f"{path}: {alone}", file=path) from None
 
 
-def _unflown(scenario: Scenario, mission: Mission, seed: int, stem: str) -> OpenedMission:
-    """The mission of a log, to be flown again."""
+def _open_log_mission(scenario: Scenario, mission: Mission, seed: int, stem: str) -> OpenedMission:
+    """Open the mission of a log, to be flown again."""
     airframe = load_airframe(scenario)
     return OpenedMission(make_setup(scenario, airframe, mission, seed), airframe, stem)
 
 
-def _of_scenario(scenario: Scenario, seed: int | None) -> Document:
-    """A scenario with the straight line from its start to its destination, until a path is planned."""
+def _scenario_document(scenario: Scenario, seed: int | None) -> Document:
+    """Open a scenario with the straight line from start to destination, until a path is planned."""
     airframe, number = load_airframe(scenario), choose_seed(scenario, seed)
     mission = planned_mission(straight_plan(scenario, number), airframe)
     opened = OpenedMission(make_setup(scenario, airframe, mission, number), airframe, scenario.name)
@@ -181,25 +184,25 @@ def _of_scenario(scenario: Scenario, seed: int | None) -> Document:
 
 
 def straight_plan(scenario: Scenario, seed: int) -> Plan:
-    """The straight line as a plan that nobody has certified."""
+    """Return the straight line as a plan without a certificate."""
     line = np.stack([scenario.start, scenario.destination])
     certificate = Certificate(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ("not planned yet",))
     return Plan(scenario, line, np.zeros(4, dtype=np.int64), np.zeros(4), certificate, seed, "", 0, np.zeros((0, 3)))
 
 
 def planned_mission(plan: Plan, airframe: Airframe) -> Mission:
-    """The mission of a plan."""
+    """Make the mission of a plan."""
     tracking = airframe.limits.tracking
     return plan_mission(plan, airframe.airspeed, airframe.max_bank, source=plan.scenario.name, tracking=tracking)
 
 
 # ----------------------------------------------------------------------
-# Saved.
+# Saving.
 
 
 @dataclass(frozen=True, slots=True)
 class Saved:
-    """A file's name and bytes, and what it leaves out of what is shown, a line each."""
+    """Name and bytes of a file, and a list of the contents that the format cannot hold, a line each."""
 
     name: str
     data: bytes
@@ -207,9 +210,9 @@ class Saved:
 
 
 def save_document(document: Document, desk: Desk, judged: Judged, kind: str) -> Saved:
-    """The mission under edit in one of `KINDS`.  Raises PlanflyError where it cannot be.
+    """Return the mission under edit in one of `KINDS`.  Raises PlanflyError if the format cannot hold it.
 
-    An unchanged mission in the form that it was opened in is the file that was opened.
+    An unchanged mission in its original format is saved as the original bytes.
     """
     mission, name = judged.mission, f"{document.stem}{SAVED[kind]}"
     if kind == "parm":
@@ -225,7 +228,7 @@ def save_document(document: Document, desk: Desk, judged: Judged, kind: str) -> 
         return Saved(name, _bytes(text), ("a map only: the commands, speeds and frames of the items are not in it",))
     mission = replace(mission, autopilot=judged.setup.autopilot.name)
     text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
-    losses = (*_losses(desk, mission, text, name, kind), *_lost_settings(before, desk))
+    losses = (*_format_losses(desk, mission, text, name, kind), *_lost_settings(before, desk))
     return Saved(name, text.encode(), losses)
 
 
@@ -233,8 +236,8 @@ def _bytes(text: str | bytes) -> bytes:
     return text.encode() if isinstance(text, str) else text
 
 
-def _losses(desk: Desk, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
-    """What a ground station's file does not hold of a mission and its world."""
+def _format_losses(desk: Desk, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
+    """List what the file of a ground station cannot hold of a mission and its world."""
     kept, found = parse_mission(text, name), []
     apart: Mapping[str, tuple[int, str]] = {
         "fence items": (len(mission.fences) - len(kept.fences), ".plan holds them"),
@@ -252,7 +255,7 @@ def _losses(desk: Desk, mission: Mission, text: str, name: str, kind: str) -> tu
 
 
 def _lost_settings(before: Scenario, desk: Desk) -> tuple[str, ...]:
-    """What was set here of how a mission is flown, which no ground station's file holds."""
+    """List the settings changed here, which no file of a ground station holds."""
     now = desk.scenario
     differs = {
         "wind": before.spec.wind != now.spec.wind,
@@ -265,34 +268,34 @@ def _lost_settings(before: Scenario, desk: Desk) -> tuple[str, ...]:
 
 
 def _lost_parameters(desk: Desk) -> tuple[str, ...]:
-    """The autopilot's parameters that were set here, which only their own file holds."""
+    """Note the autopilot parameters set here, which only a parameter file holds."""
     count = len(desk.parameters.values)
     return (f"{count} parameter{'s' if count != 1 else ''} set here: .parm holds them",) if count else ()
 
 
 def _saved_parameters(name: str, desk: Desk) -> Saved:
-    """The parameters that were set here, as a file for the aircraft.  Raises PlanflyError where none was."""
+    """Return the parameters that were set here as a file.  Raises PlanflyError if none was set."""
     if not desk.parameters.values:
         raise PlanflyError("no parameter was set here: Settings sets them", field="form")
     return Saved(name, desk.parameters.text(f"set in planfly studio for {desk.airframe.autopilot.title}").encode())
 
 
 def _saved_plan(name: str, desk: Desk, judged: Judged) -> Saved:
-    """The mission as a plan of its scenario, with the certificate that its path has now."""
+    """Return the mission as a plan of its scenario, with the present certificate of its path."""
     plan = judged.setup.plan
     if plan is not None:
         return Saved(name, plan_json(plan).encode())
     made = certified_plan(desk, judged)
-    anew = not desk.planned or planned_mission(made, desk.airframe).items != judged.mission.items
-    losses = ["the items: a plan holds places alone, and its mission is made of them anew"] if anew else []
+    changed = not desk.planned or planned_mission(made, desk.airframe).items != judged.mission.items
+    losses = ["the items: a plan holds places alone, and its mission is made of them anew"] if changed else []
     if not made.feasible:
         problem = (made.certificate.problems or ("violations are counted",))[0]
         losses.append(f"it is a plan that is not feasible: {problem}")
     return Saved(name, plan_json(made).encode(), (*losses, *_lost_parameters(desk)))
 
 
-def _refuse_what_no_plan_holds(mission: Mission) -> None:
-    """Refuse what a plan of edited waypoints would drop: ways to the ground, and speeds along the way."""
+def _require_plain_waypoints(mission: Mission) -> None:
+    """Refuse items that a plan of waypoints would drop: take-off, landing, speed changes en route."""
     first = next((k for k, item in enumerate(mission.items) if item.has_position), 0)
     for k, item in enumerate(mission.items):
         lost = "its take-off" if item.command in TAKEOFFS else "its landing" if item.command in LANDINGS else ""
@@ -304,7 +307,7 @@ def _refuse_what_no_plan_holds(mission: Mission) -> None:
 
 
 def certified_plan(desk: Desk, judged: Judged) -> Plan:
-    """A plan of the route's waypoints, scored and certified as the planner's are.
+    """Make a plan of the waypoints of the route, scored and certified like plans of the planner.
 
     Raises MissionError for a mission that no plan can hold: without a scenario, or with more than plain waypoints.
     """
@@ -321,13 +324,13 @@ def certified_plan(desk: Desk, judged: Judged) -> Plan:
         or any(one.frame not in AMSL and one.has_position for one in mission.items)
     ):
         raise MissionError(f"{name}: a plan holds plain waypoints above mean sea level, once each", file=name)
-    if (made := _between_its_ways(desk, mission)) is not None:
+    if (made := _plan_with_ground_phases(desk, mission)) is not None:
         return made
-    _refuse_what_no_plan_holds(mission)
-    return _scored(desk, np.array(route.waypoints)[route.items >= 0])
+    _require_plain_waypoints(mission)
+    return _scored_plan(desk, np.array(route.waypoints)[route.items >= 0])
 
 
-def _scored(desk: Desk, waypoints: Floats) -> Plan:
+def _scored_plan(desk: Desk, waypoints: Floats) -> Plan:
     problem = make_problem(desk.scenario, desk.airframe.limits.surely())
     certificate = certify(problem, waypoints)
     counts, objectives = paper_scores(problem.certified, waypoints[None])
@@ -336,11 +339,12 @@ def _scored(desk: Desk, waypoints: Floats) -> Plan:
     )
 
 
-def _between_its_ways(desk: Desk, mission: Mission) -> Plan | None:
-    """The plan that was edited with its ways to the ground as they were, None where there are none.
+def _plan_with_ground_phases(desk: Desk, mission: Mission) -> Plan | None:
+    """Return an edited plan with its unchanged departure and approach, or None if it has none.
 
-    The ways were found free with the turns at their ends: the legs in the air next to them have to be the plan's, too.
-    Raises MissionError where they are not.
+    Departure and approach were certified with the turns at their ends, so the adjacent legs in the air must be
+    unchanged.
+    Raises MissionError if they are not.
     """
     base = desk.opened.plan
     if base is None or base.ways is None or (base.ways.climb, base.ways.descent) == (None, None):
@@ -350,23 +354,23 @@ def _between_its_ways(desk: Desk, mission: Mission) -> Plan | None:
     after = 0 if descent is None else len(descent.waypoints) + len(descent.line_up) + 1
     waypoints = points[before : len(points) - after]
     kept = len(waypoints) > 1 and all(
-        way is None or np.allclose(waypoints[ends], base.waypoints[ends], atol=_SAME_PLACE)
+        way is None or np.allclose(waypoints[ends], base.waypoints[ends], atol=_SAME_ALTITUDE_M)
         for way, ends in ((climb, slice(2)), (descent, slice(-2, None)))
     )
     if kept:
-        made = replace(_scored(desk, waypoints), ways=base.ways)
+        made = replace(_scored_plan(desk, waypoints), ways=base.ways)
         own = [one for one in base.certificate.problems if one.startswith(("climb-out: ", "landing: "))]
         made = replace(made, certificate=replace(made.certificate, problems=(*made.certificate.problems, *own)))
-        if _are_places_of(planned_mission(made, desk.airframe), mission):
+        if _have_same_places(planned_mission(made, desk.airframe), mission):
             return made
     why = "its ways to the ground, or the legs next to them, are not its plan's any more: save a .plan, or plan again"
     raise MissionError(f"{mission.source}: {why}", file=mission.source)
 
 
-def _are_places_of(one: Mission, other: Mission) -> bool:
-    """Whether two missions do the same at the same places."""
+def _have_same_places(one: Mission, other: Mission) -> bool:
+    """Return True if two missions have the same commands at the same places."""
     done = [[(item.command, item.has_position or item.params) for item in mission.items] for mission in (one, other)]
     if done[0] != done[1]:
         return False
     here, there = (np.array([(item.lat_deg, item.lon_deg, item.alt) for item in it.items]) for it in (one, other))
-    return bool((np.abs(here - there) <= (_SAME_DEGREES, _SAME_DEGREES, _SAME_PLACE)).all())
+    return bool((np.abs(here - there) <= (_SAME_PLACE_DEG, _SAME_PLACE_DEG, _SAME_ALTITUDE_M)).all())

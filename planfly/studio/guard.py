@@ -1,8 +1,8 @@
-"""Who may speak with the studio: pages that it served itself, on this machine, by the address that it printed.
+"""Access control: only pages that the studio served, on this machine, at the printed address.
 
-A page of any site may send requests to 127.0.0.1, and a site may point a name of its own there.  Browsers state both,
-as Origin and as Host, and where a request comes from as Sec-Fetch-Site; no page can change what they state.  The guard
-stands before all of the application, websockets included.
+A page of any site may send requests to 127.0.0.1, and a site may point its own host name there.  Browsers state both,
+as Origin and as Host, and the source of a request as Sec-Fetch-Site; no page can change these headers.  The guard
+precedes all of the application, websockets included.
 """
 
 from collections.abc import Awaitable, Callable, Iterable, MutableMapping
@@ -19,9 +19,9 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' blob: data:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-# Headers of a request that has a body.
+# Headers that announce a body.
 _BODIES = (b"content-length", b"transfer-encoding")
-# With every answer, refusals included.
+# Headers of every answer, refusals included.
 HEADERS = (
     (b"content-security-policy", POLICY.encode()),
     (b"x-content-type-options", b"nosniff"),
@@ -34,7 +34,7 @@ HEADERS = (
 
 
 def refusal(scope: Scope, port: int) -> tuple[int, str]:
-    """The status and the words with which a request is refused; (0, "") for one that is let in.
+    """Return status and text of a refusal; (0, "") if the request is accepted.
 
     >>> asked = {"type": "http", "method": "GET", "path": "/", "headers": [(b"host", b"evil.test:80")]}
     >>> refusal(asked, 80)
@@ -53,23 +53,23 @@ def refusal(scope: Scope, port: int) -> tuple[int, str]:
         return (0, "") if origins else (403, "a page says where it is from")
     if scope.get("method") not in ("GET", "HEAD") or any(name in _BODIES and value != "0" for name, value in headers):
         return 405, "nothing is sent here"
-    if sites and sites != ["same-origin"] and sites != ["none"] and not _walks_in(scope, headers):
+    if sites and sites != ["same-origin"] and sites != ["none"] and not _is_page_visit(scope, headers):
         return 403, "another page may not ask"
     return 0, ""
 
 
-def _walks_in(scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
-    """Whether a person follows a link to the page itself, which holds nothing before a token is given."""
+def _is_page_visit(scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
+    """Return True for a visit of the page itself, which holds nothing before a token is given."""
     found = dict(headers)
     is_document = found.get(b"sec-fetch-mode") == "navigate" and found.get(b"sec-fetch-dest") == "document"
     return scope["path"] == "/" and is_document
 
 
 class Guard:
-    """An ASGI application that refuses, or hands on and adds the headers."""
+    """ASGI application that refuses requests, or forwards them and adds the headers."""
 
     def __init__(self, app: App, port: int) -> None:
-        """app: what is guarded.  port: where it listens."""
+        """Guard an application.  port: the port that it listens on."""
         self._app, self._port = app, port
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -91,7 +91,7 @@ class Guard:
         if status:
             text = words.encode()
             plain = [(b"content-type", b"text/plain; charset=utf-8"), (b"content-length", str(len(text)).encode())]
-            # What else comes of a refused request is not read.
+            # The rest of a refused request is not read.
             plain.append((b"connection", b"close"))
             await answer({"type": "http.response.start", "status": status, "headers": plain})
             await answer({"type": "http.response.body", "body": text})

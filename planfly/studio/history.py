@@ -1,19 +1,19 @@
-"""What was done to a mission, in order, so that it can be undone and done again."""
+"""History of edits of a mission, for undo and redo."""
 
 from dataclasses import dataclass, field
 
 from flight.mission.items import Mission
 
-# Steps that are kept; the first mission always is.
+# Greatest number of steps that are kept; the first mission always is.
 MAX_STEPS = 1_000
 
 
 @dataclass(slots=True)
 class History:
-    """Missions, each made of the one before it.
+    """Missions, each made from the previous one.
 
-    steps: the mission as opened, and what each edit made of it, with words for it.
-    at: the one that is shown.
+    first: the mission as opened.  steps: the result of each edit, with its description.
+    at: number of steps that are in effect.
 
     >>> history = History(Mission(None, ()))
     >>> history.add(Mission(None, (), source="moved"), "move item 3")
@@ -27,30 +27,30 @@ class History:
 
     @property
     def mission(self) -> Mission:
-        """The mission as it is shown."""
+        """The mission at the present step."""
         return self.steps[self.at - 1][0] if self.at else self.first
 
     @property
     def undo_text(self) -> str:
-        """What would be undone; "" for nothing."""
+        """Text of the next undo; "" for nothing."""
         return self.steps[self.at - 1][1] if self.at else ""
 
     @property
     def redo_text(self) -> str:
-        """What would be done again; "" for nothing."""
+        """Text of the next redo; "" for nothing."""
         return self.steps[self.at][1] if self.at < len(self.steps) else ""
 
     def add(self, mission: Mission, text: str) -> None:
-        """Note an edit; what was undone before it is gone.  The oldest steps go where there are too many."""
+        """Record an edit and drop undone ones.  The oldest steps are dropped if there are too many."""
         self.steps = [*self.steps[: self.at], (mission, text)][-MAX_STEPS:]
         self.at = len(self.steps)
 
     def undo(self) -> bool:
-        """Take the last edit back; whether there was one."""
+        """Undo the last edit; return True if there was one."""
         self.at, before = max(0, self.at - 1), self.at
         return self.at != before
 
     def redo(self) -> bool:
-        """Do the edit again that was undone; whether there was one."""
+        """Redo the last undone edit; return True if there was one."""
         self.at, before = min(len(self.steps), self.at + 1), self.at
         return self.at != before

@@ -1,6 +1,6 @@
-"""What is kept of a session for a server that dies: the mission, how it is flown, and the plan that it is of.
+"""Autosave of a session, in case the server dies: the mission, its settings, and its plan.
 
-It counts for the document that it is of alone, which is known by its first mission.
+An autosave applies only to its own document, which is identified by its first mission.
 """
 
 import hashlib
@@ -19,18 +19,18 @@ from world.errors import PlanflyError
 from world.scenario import Scenario, from_spec
 
 _SCHEMA = "planfly.studio/1"
-# Of a scenario, what the studio changes.
-_SET = ("wind", "flight", "limits", "area")
+# Tables of a scenario that the studio changes.
+_SAVED_TABLES = ("wind", "flight", "limits", "area")
 
 
 def kept_text(desk: Desk, first: Mission, mission: Mission, plan: Plan | None, name: str) -> str:
-    """What is kept, as a file's text.
+    """Return the text of the autosave file.
 
-    first: the mission that was opened.  plan: that the mission is of, None where it was changed since.
+    first: the mission that was opened.  plan: the plan of the mission, None if the mission was changed since.
     """
     spec = desk.scenario.to_json()
-    # An area that was made around a mission is made anew.
-    names = [one for one in _SET if one in spec and (one != "area" or not desk.scenario.external)]
+    # An area that was made around a mission is made again when it is restored.
+    names = [one for one in _SAVED_TABLES if one in spec and (one != "area" or not desk.scenario.external)]
     data = {
         "schema": _SCHEMA,
         "name": name,
@@ -45,9 +45,9 @@ def kept_text(desk: Desk, first: Mission, mission: Mission, plan: Plan | None, n
 
 
 def read_kept(file: Path, desk: Desk, first: Mission) -> tuple[Mission, Desk] | None:
-    """The mission that was kept, and the desk that it was judged with; None where nothing was done to this document.
+    """Return the saved mission and its editing context; None if this document was not changed.
 
-    Raises OSError, ValueError, LookupError, TypeError or PlanflyError for what cannot be read.
+    Raises OSError, ValueError, LookupError, TypeError or PlanflyError for a file that cannot be read.
     """
     data = json.loads(file.read_text(encoding="utf-8"))
     if data["schema"] != _SCHEMA or data["first"] != mission_data(first):
@@ -56,24 +56,24 @@ def read_kept(file: Path, desk: Desk, first: Mission) -> tuple[Mission, Desk] | 
     try:
         found = _with_plan(_with_settings(desk, data), mission, data)
     except (ValueError, LookupError, TypeError, PlanflyError):
-        # What was edited counts more than how it was flown.
+        # If the settings cannot be restored, the edited mission still is.
         found = mission, desk
     return None if found[0] is first and found[1] is desk else found
 
 
 def kept_beside(file: Path, first: Mission) -> Path:
-    """Where another document is kept that was opened since the command began: beside what the command named."""
+    """Return the autosave path of a document opened after the first: a sibling of the file of the first."""
     digest = hashlib.sha256(json.dumps(mission_data(first)).encode()).hexdigest()[:8]
     return file.with_name(f"{file.stem}-{digest}{file.suffix}")
 
 
 def _with_settings(desk: Desk, data: Json) -> Desk:
-    """A desk with the settings that were kept; itself where they are its own."""
+    """Return the context with the saved settings; the same object if they are equal."""
     before: Scenario = desk.scenario
     spec, found = json.loads(json.dumps(before.to_json())), data.get("settings", {})
     own = data.get("parameters") or asdict(SetParameters())
     parameters = SetParameters(dict(own["values"]), own["file"], tuple(own["unused"]))
-    wanted = spec | {one: value for one, value in found.items() if one in _SET}
+    wanted = spec | {one: value for one, value in found.items() if one in _SAVED_TABLES}
     if wanted == spec and parameters == desk.parameters:
         made = desk
     else:
@@ -84,18 +84,18 @@ def _with_settings(desk: Desk, data: Json) -> Desk:
 
 
 def _with_plan(desk: Desk, mission: Mission, data: Json) -> tuple[Mission, Desk]:
-    """A mission and its desk, with the plan that it is of if that was kept."""
+    """Return a mission and its context, with its plan if one was saved."""
     if not data.get("plan"):
         return mission, desk
     plan = parse_plan(data["plan"], "kept", ground=desk.scenario.terrain)
     plan = replace(plan, scenario=desk.scenario)
     made = planned_mission(plan, desk.airframe)
-    # Kept in whole digits: what differs is no plan's any more.
+    # The autosave has whole digits: if the items differ, the mission was changed after planning.
     return (made, desk.of_plan(plan, made)) if made.items == mission.items else (mission, desk)
 
 
 def mission_data(mission: Mission) -> Json:
-    """A mission as plain data, of which `mission_from` makes the same again; NaN is null."""
+    """Convert a mission to plain data, from which `mission_from` makes the same mission; NaN becomes null."""
 
     def plain(item: MissionItem) -> list[Any]:
         numbers = [*item.params, item.lat_deg, item.lon_deg, item.alt]
@@ -109,7 +109,7 @@ def mission_data(mission: Mission) -> Json:
 
 
 def mission_from(data: Json, first: Mission) -> Mission:
-    """A mission of its data; what the items do not say is that of the first."""
+    """Make a mission of its data; all other fields are taken from the first mission."""
 
     def number(value: Any) -> float:
         return float("nan") if value is None else float(value)

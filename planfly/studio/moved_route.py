@@ -1,6 +1,6 @@
-"""The route of a mission of which a few waypoints were moved: that of before, with those rows elsewhere.
+"""Route of a mission after a few waypoints were moved: the previous route with rows replaced.
 
-To walk through the items of a long mission takes longer than to judge the legs about one of them.
+Laying out all items of a long mission takes longer than judging the legs around one of them.
 """
 
 import math
@@ -19,42 +19,46 @@ from world.scenario_tables import MAP_EXTENT
 
 Floats = NDArray[np.float64]
 
-# More items than these that differ are no drag.
-_MOST = 8
-# Waypoints in a row that are nearer than this may be merged, or stepped aside of each other, m.
-_NEAR = 2.0
-# Of a place that is reckoned alone, and among others, m: the last digits of a sine differ.
-_ALIKE = 1e-6
-# What may have a mission's places come to other rows than one each, wherever they are.
-_UNLIKE = frozenset(
+# A drag changes at most this number of items.
+_MAX_MOVED_ITEMS = 8
+# Successive waypoints that are nearer than this may be merged, or offset from each other, m.
+_MERGE_DISTANCE_M = 2.0
+# Tolerance between a place computed alone and among others, m: the last digits of a sine differ.
+_PLACE_TOLERANCE_M = 1e-6
+# Commands by which places of a mission do not correspond to one row each.
+_IRREGULAR_COMMANDS = frozenset(
     {Command.DO_JUMP, Command.DO_JUMP_TAG, Command.DO_SET_HOME, Command.CONDITION_GATE, Command.NAV_RETURN_TO_LAUNCH}
 )
 
 
 def moved_route(route: Route, before: Mission, now: Mission, scenario: Scenario, frame: Airframe) -> Route | None:
-    """The route of a mission that differs from another in a few waypoints; None where it has to be laid anew.
+    """Return the route after a few waypoints were moved; None if it has to be laid out again.
 
-    route: of the mission before.  It is laid anew wherever a move may change more than the waypoint's own row: beside
-    circles, merged places and heights that are kept, with jumps, gates, returns, landings and courses at the ends.
+    route: of the previous mission.  It is laid out again wherever a move may change more than the row of the waypoint:
+    next to loiters, merged places and kept altitudes, and with jumps, gates, returns, landings and courses at the ends.
     """
     if len(before.items) != len(now.items):
         return None
     pairs = [(old, new) for old, new in zip(before.items, now.items, strict=True) if old is not new]
-    if len(pairs) > _MOST or not all(_is_moved(*pair) for pair in pairs) or not _is_plain(route, now, scenario):
+    if (
+        len(pairs) > _MAX_MOVED_ITEMS
+        or not all(_is_move_of_waypoint(*pair) for pair in pairs)
+        or not _is_plain(route, now, scenario)
+    ):
         return None
     rows = {seq: row for row, seq in enumerate(route.items.tolist())}
     waypoints = {one.seq for one in now.items if one.command == Command.NAV_WAYPOINT}
     rules = frame.autopilot.route_rules
     points, acceptance, changed = np.array(route.waypoints), np.array(route.acceptance), set[int]()
     for old, new in pairs:
-        row, was, place = rows[new.seq], _placed(old, before, scenario), _placed(new, now, scenario)
-        beside = [k for k in (row - 1, row + 1) if 0 <= k <= route.legs]
-        if was is None or place is None or math.dist(was, points[row]) > _ALIKE:
+        row, was, place = rows[new.seq], _map_place(old, before, scenario), _map_place(new, now, scenario)
+        neighbours = [k for k in (row - 1, row + 1) if 0 <= k <= route.legs]
+        if was is None or place is None or math.dist(was, points[row]) > _PLACE_TOLERANCE_M:
             return None
-        if any(int(route.items[k]) not in waypoints or route.arcs[k] for k in beside):
+        if any(int(route.items[k]) not in waypoints or route.arcs[k] for k in neighbours):
             return None
         points[row], acceptance[row] = place, min(max(0.0, new.params[1]), rules.acceptance_limit)
-        changed |= {row, *beside}
+        changed |= {row, *neighbours}
     if any(_is_near(one, k) for one in (points, route.waypoints) for k in changed if k):
         return None
     over = fly_over_waypoints(points, route.airspeed, acceptance, frame.limits, rules.turn_distance)
@@ -62,28 +66,28 @@ def moved_route(route: Route, before: Mission, now: Mission, scenario: Scenario,
     return replace(route, waypoints=points, acceptance=acceptance, fly_over=fly_over)
 
 
-def _is_moved(old: MissionItem, new: MissionItem) -> bool:
-    """Whether a waypoint differs in its place and its acceptance radius alone."""
+def _is_move_of_waypoint(old: MissionItem, new: MissionItem) -> bool:
+    """Return True if a waypoint differs only in its place and its acceptance radius."""
     params = (*old.params[:1], new.params[1], *old.params[2:])
     same = replace(old, lat_deg=new.lat_deg, lon_deg=new.lon_deg, alt=new.alt, params=params) == new
     return same and new.command == Command.NAV_WAYPOINT and old.has_position and new.has_position
 
 
 def _is_plain(route: Route, mission: Mission, scenario: Scenario) -> bool:
-    """Whether each place of a mission is one stop of its route, whose height depends on no other."""
+    """Return True if each place of a mission is one stop of its route, with an independent altitude."""
     if route.return_from >= 0 or route.straight_to >= 0 or math.isfinite(route.landing_ground):
         return False
     if scenario.start_course is not None or scenario.destination_course is not None:
         return False
     flown = set(route.items.tolist())
     return not any(
-        one.command in _UNLIKE or (one.command in PLACES and (one.seq not in flown or math.isnan(one.alt)))
+        one.command in _IRREGULAR_COMMANDS or (one.command in PLACES and (one.seq not in flown or math.isnan(one.alt)))
         for one in mission.items
     )
 
 
-def _placed(item: MissionItem, mission: Mission, scenario: Scenario) -> tuple[float, float, float] | None:
-    """East, north and height of a waypoint, m; None where it is not known without the others, or beyond any map."""
+def _map_place(item: MissionItem, mission: Mission, scenario: Scenario) -> tuple[float, float, float] | None:
+    """Return east, north and altitude of a waypoint, m; None if it depends on others or is off any map."""
     x, y = to_map(scenario.origin, [item.lat_deg], [item.lon_deg])
     east, north, home, up = float(x[0]), float(y[0]), mission.home, math.nan
     if item.frame in AMSL:
@@ -97,5 +101,5 @@ def _placed(item: MissionItem, mission: Mission, scenario: Scenario) -> tuple[fl
 
 
 def _is_near(points: Floats, row: int) -> bool:
-    """Whether a waypoint is so near to the one before that both may be one."""
-    return math.dist(points[row - 1, :2], points[row, :2]) < _NEAR
+    """Return True if a waypoint is near enough to the one before that both may be merged."""
+    return math.dist(points[row - 1, :2], points[row, :2]) < _MERGE_DISTANCE_M

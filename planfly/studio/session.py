@@ -1,7 +1,7 @@
-"""The mission under edit as all pages see it: opened, changed, judged, saved, and kept beside for a server that dies.
+"""Session of the mission under edit, shared by all pages: open, edit, judge, save, and autosave.
 
-No part of it knows of connections or processes: `planfly.studio.server` does.  Every change has a revision, which only
-grows; an edit of an older one is refused, so that two pages never change what the other does not show.
+The session does not know connections or processes, which belong to `planfly.studio.server`.  Each change increases the
+revision; an edit of an older revision is refused, so that no page changes what another page does not show.
 """
 
 from dataclasses import dataclass, field, replace
@@ -27,25 +27,26 @@ from world.files import write_whole
 from world.frames import to_geo
 
 Edit = Move | Insert | Delete | Raise | Apply
-# A document with what it is judged with and what was done to it; so many are kept to go back to.
-_Place = tuple[Document, Desk, History]
-_MOST_LEFT = 8
+# Document, context and history of edits.
+_OpenedState = tuple[Document, Desk, History]
+# Greatest number of earlier documents that are kept for undo.
+_MAX_LEFT_DOCUMENTS = 8
 
 
 class StaleEdit(Exception):
-    """An edit of a sheet that another edit has changed since."""
+    """Edit of a sheet that another edit has changed since."""
 
 
 @dataclass(slots=True)
 class Session:
     """One mission under edit.
 
-    document: as opened.  desk: what it is judged with.  history: what was done to it.
-    rev: grows with every change.  judged: the mission as it is.
-    plans: paths that were planned and may be chosen, with the items that they would replace.
-    world_rev: grows with every change of the world.  document_rev: with every other document.
-    named: the file that the command named, the only one that is written over.  written: the mission as saved last.
-    left: documents that another was opened in place of, as they were left; undone: those whose opening was undone.
+    document: the document as opened.  desk: its editing context.  history: its edits.
+    rev: increases with every change.  judged: the present mission with its verdict.
+    plans: planned paths to choose from, with the items that they would replace.
+    world_rev: increases with every change of the world.  document_rev: increases with every other document.
+    named: file named on the command line, the only one that is overwritten.  written: the mission as saved last.
+    left: earlier documents, as they were left; undone: documents whose opening was undone.
     """
 
     document: Document
@@ -60,12 +61,12 @@ class Session:
     named: Path | None = None
     written: Mission | None = None
     document_rev: int = 1
-    left: list[_Place] = field(default_factory=list)
-    undone: list[_Place] = field(default_factory=list)
+    left: list[_OpenedState] = field(default_factory=list)
+    undone: list[_OpenedState] = field(default_factory=list)
 
     @classmethod
     def of(cls, document: Document, world: World) -> "Session":
-        """A session that begins with what was opened."""
+        """Start a session with an opened document."""
         desk = Desk.of(document.opened, world.terrain, read_named_fences(world.fence))
         judged = desk.judge(document.opened.setup.mission)
         history = History(document.opened.setup.mission)
@@ -73,17 +74,17 @@ class Session:
         return cls(document, world, desk, history, judged, named=named)
 
     def open(self, document: Document) -> None:
-        """Begin anew with another document; an undo before its first edit brings back what was there."""
+        """Open another document; an undo before its first edit brings back the previous one."""
         named = document.path is not None and document.path.resolve() == self.named
         made = Session.of(document if named else replace(document, path=None), self.world)
-        self.left, self.undone = [*self.left, self._place()][-_MOST_LEFT:], []
-        self._go_to((made.document, made.desk, made.history))
+        self.left, self.undone = [*self.left, self._state()][-_MAX_LEFT_DOCUMENTS:], []
+        self._restore_state((made.document, made.desk, made.history))
 
-    def _place(self) -> _Place:
+    def _state(self) -> _OpenedState:
         return self.document, self.desk, self.history
 
-    def _go_to(self, place: _Place) -> None:
-        """Show another document as it was left; nothing is changed where it cannot be judged."""
+    def _restore_state(self, place: _OpenedState) -> None:
+        """Show a document as it was left; nothing is changed if it cannot be judged."""
         _, desk, history = place
         judged = desk.judge(history.mission)
         self.document, self.desk, self.history = place
@@ -91,61 +92,61 @@ class Session:
         self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
         self.document_rev += 1
 
-    def _note(self, mission: Mission, text: str) -> None:
+    def _add_to_history(self, mission: Mission, text: str) -> None:
         self.history.add(mission, text)
         self.undone = []
 
     @property
     def undo_text(self) -> str:
-        """What would be undone, an opening before the first edit; "" for nothing."""
+        """Text of the next undo, which may undo opening a document; "" for nothing."""
         return self.history.undo_text or (f"open {self.document.name}" if self.left else "")
 
     @property
     def redo_text(self) -> str:
-        """What would be done again; "" for nothing."""
+        """Text of the next redo; "" for nothing."""
         return self.history.redo_text or (f"open {self.undone[-1][0].name}" if self.undone else "")
 
     @property
     def mission(self) -> Mission:
-        """The mission as it is."""
+        """The present mission."""
         return self.history.mission
 
     @property
     def is_changed(self) -> bool:
-        """Whether it differs from what was opened."""
+        """True if the mission differs from the opened one."""
         return self.mission is not self.history.first
 
     @property
     def is_unsaved(self) -> bool:
-        """Whether it differs from what was opened and from what was saved last."""
+        """True if the mission differs from the opened one and from the one saved last."""
         return self.is_changed and self.mission is not self.written
 
     # ------------------------------------------------------------------
     # Edits.
 
     def edit(self, message: Edit) -> None:
-        """Make an edit.  Raises StaleEdit, and MissionError for what no mission may be; nothing is changed then."""
+        """Apply an edit.  Raises StaleEdit, or MissionError for an invalid mission, and changes nothing then."""
         if message.rev != self.rev:
             raise StaleEdit
-        mission, text = self._edited(message)
+        mission, text = self._edited_mission(message)
         self._show(mission)
-        self._note(mission, text)
+        self._add_to_history(mission, text)
 
     def step(self, kind: str) -> None:
-        """Undo, redo, or revert to what was opened; nothing happens where there is nothing to."""
+        """Undo, redo, or revert to the opened mission; do nothing if there is nothing to undo."""
         if kind == "revert":
             if self.is_changed:
                 self._show(self.history.first)
-                self._note(self.history.first, "revert to the file")
+                self._add_to_history(self.history.first, "revert to the file")
             return
         if kind == "undo" and not self.history.undo_text and self.left:
-            place = self._place()
-            self._go_to(self.left[-1])
+            place = self._state()
+            self._restore_state(self.left[-1])
             self.left, self.undone = self.left[:-1], [*self.undone, place]
             return
         if kind == "redo" and not self.history.redo_text and self.undone:
-            place = self._place()
-            self._go_to(self.undone[-1])
+            place = self._state()
+            self._restore_state(self.undone[-1])
             self.left, self.undone = [*self.left, place], self.undone[:-1]
             return
         before = self.history.at
@@ -158,17 +159,17 @@ class Session:
             raise
 
     def preview(self, message: Drag) -> Json:
-        """What a drag would come to, which changes nothing: windows, or the whole where that is asked for."""
+        """Judge a drag without changing the mission: windows around the item, or the whole mission on request."""
         if message.rev != self.rev:
             raise StaleEdit
-        mission = self._placed(message.k, message.east, message.north, message.up)
+        mission = self._moved_mission(message.k, message.east, message.north, message.up)
         if not message.whole:
             return window_json(mission, *judge_windows(self.desk, mission, message.k, self.judged.setup))
         judged = self.desk.judge(mission)
         return {"sheet": sheet_json(self.desk, judged)}
 
     def replace_plan(self, message: Choose) -> None:
-        """Take one of the planned paths: all of the mission, or the items between two.  Raises StaleEdit."""
+        """Replace all of the mission, or the items between two, by a planned path.  Raises StaleEdit."""
         if message.rev != self.rev:
             raise StaleEdit
         plans, between = self.plans
@@ -178,14 +179,14 @@ class Session:
         if between is None:
             self._show_plan(plan)
             return
-        mission = self._joined(plan, *between)
+        mission = self._with_part_replaced(plan, *between)
         self._show(mission)
-        self._note(mission, "plan a part")
+        self._add_to_history(mission, "plan a part")
 
     def _show(self, mission: Mission, desk: Desk | None = None) -> None:
-        """Judge a mission as the one that is shown, in its world; nothing is changed where that fails.
+        """Judge a mission and show it; nothing is changed if that fails.
 
-        desk: with which it is judged, None for the one there is.  Paths that were planned before are gone.
+        desk: the context to judge it with, None for the present one.  Earlier planned paths are dropped.
         """
         desk = (self.desk if desk is None else desk).around(mission)
         judged = desk.judge(mission)
@@ -196,36 +197,36 @@ class Session:
         self.rev += 1
 
     def _show_plan(self, plan: Plan) -> None:
-        """A new plan takes the place of all; its certificate counts until it is edited."""
+        """Replace the mission by a new plan; its certificate applies until the mission is edited."""
         mission = planned_mission(plan, self.desk.airframe)
         self._show(mission, self.desk.of_plan(plan, mission))
-        self._note(mission, f"plan with seed {plan.seed}")
+        self._add_to_history(mission, f"plan with seed {plan.seed}")
 
-    def _edited(self, message: Edit) -> tuple[Mission, str]:
+    def _edited_mission(self, message: Edit) -> tuple[Mission, str]:
         match message:
             case Move():
                 item = edits.checked_place(self.mission, message.k)
-                mission = self._placed(message.k, message.east, message.north, message.up)
+                mission = self._moved_mission(message.k, message.east, message.north, message.up)
                 return mission, f"move item {item.seq}"
             case Insert():
-                return self._inserted(message)
+                return self._with_inserted(message)
             case Delete():
-                return self._deleted(message.ks)
+                return self._with_deleted(message.ks)
             case Raise():
-                chosen = self._raisable(message.ks)
+                chosen = self._items_to_raise(message.ks)
                 mission = edits.raised(self.mission, chosen, message.by)
                 which = "all items" if message.ks is None else f"{len(chosen)} item{'s' if len(chosen) != 1 else ''}"
                 return mission, f"{'raise' if message.by >= 0.0 else 'lower'} {which} by {abs(message.by):g} m"
             case Apply():
-                return self._applied(message)
+                return self._with_suggestion(message)
 
-    def _raisable(self, ks: list[int] | None) -> tuple[int, ...]:
-        """The items that are raised together: of those asked for, or all, what does not land; a landing alone is."""
+    def _items_to_raise(self, ks: list[int] | None) -> tuple[int, ...]:
+        """Return the items to raise: the given ones, or all, without landings unless there are only landings."""
         asked = edits.places(self.mission) if ks is None else tuple(ks)
         flying = tuple(k for k in asked if edits.checked_place(self.mission, k).command not in LANDINGS)
         return flying or asked
 
-    def _placed(self, k: int, east: float | None, north: float | None, up: float | None) -> Mission:
+    def _moved_mission(self, k: int, east: float | None, north: float | None, up: float | None) -> Mission:
         mission = self.mission
         edits.checked_place(mission, k)
         if east is not None and north is not None:
@@ -235,8 +236,8 @@ class Session:
             mission = edits.at_height(mission, k, up, now if np.isfinite(now) else up)
         return mission if mission is self.mission else self.desk.retuned(mission, k)
 
-    def _inserted(self, message: Insert) -> tuple[Mission, str]:
-        """A waypoint behind another, at the height halfway to the next in the frame of the one before."""
+    def _with_inserted(self, message: Insert) -> tuple[Mission, str]:
+        """Insert a waypoint after another, half way to the altitude of the next if both have the same frame."""
         mission, own = self.mission, edits.places(self.mission)
         before = edits.checked_place(mission, message.after)
         height, at = None, own.index(message.after)
@@ -248,7 +249,7 @@ class Session:
         made = edits.inserted(mission, message.after, *self.desk.geographic(message.east, message.north), height)
         return self.desk.retuned(made, edits.next_index(mission, message.after)), f"insert an item after {before.seq}"
 
-    def _deleted(self, ks: list[int]) -> tuple[Mission, str]:
+    def _with_deleted(self, ks: list[int]) -> tuple[Mission, str]:
         mission = self.mission
         for k in sorted(set(ks), reverse=True):
             mission = edits.deleted(mission, k)
@@ -257,7 +258,7 @@ class Session:
             mission = self.desk.retuned(mission, near)
         return mission, f"delete {len(set(ks))} item{'s' if len(set(ks)) != 1 else ''}"
 
-    def _applied(self, message: Apply) -> tuple[Mission, str]:
+    def _with_suggestion(self, message: Apply) -> tuple[Mission, str]:
         findings = self.judged.verdict.findings
         if not message.finding < len(findings):
             raise MissionError(f"{self.document.name}: that finding is not there any more", field="finding")
@@ -265,8 +266,8 @@ class Session:
         mission = apply_suggestion(self.desk, self.judged, item, message.which)
         return mission, f"apply a suggestion of {item.rule}"
 
-    def _joined(self, plan: Plan, first: int, last: int) -> Mission:
-        """The mission with a planned path's waypoints in place of the items between two."""
+    def _with_part_replaced(self, plan: Plan, first: int, last: int) -> Mission:
+        """Replace the items between two by the waypoints of a planned path."""
         mission = self.mission
         for k in [k for k in edits.places(mission) if first < k < last][::-1]:
             mission = edits.deleted(mission, k)
@@ -283,7 +284,7 @@ class Session:
         return mission
 
     def place_of(self, k: int) -> tuple[float, float, float]:
-        """East, north and height above mean sea level of an item, m.  Raises MissionError for one that is no place."""
+        """Return east, north and altitude AMSL of an item, m.  Raises MissionError if the item is no place."""
         edits.checked_place(self.mission, k)
         east, north, up = self.desk.points(self.mission)[edits.places(self.mission).index(k)].tolist()
         return east, north, up
@@ -292,7 +293,7 @@ class Session:
     # The world.
 
     def change_settings(self, asked: Settings) -> None:
-        """Fly the mission otherwise.  Raises PlanflyError for a value that no scenario may have."""
+        """Change the settings of the flight.  Raises PlanflyError for a value that no scenario may have."""
         scenario = changed_world(self.desk.scenario, asked)
         desk = self.desk.flown_as(scenario, changed_parameters(self.desk.parameters, scenario, asked))
         mission = self.mission
@@ -301,14 +302,14 @@ class Session:
         self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
 
     def settings_json(self) -> Json:
-        """The settings as they are."""
+        """Return the present settings."""
         return settings_json(self.desk.scenario, self.desk.airframe, self.desk.parameters)
 
     # ------------------------------------------------------------------
-    # What the page draws, and files.
+    # Page data, and files.
 
     def sheet(self) -> Json:
-        """All of the mission as it is."""
+        """Return the present mission with its verdict as page data."""
         return {
             "kind": "sheet",
             "rev": self.rev,
@@ -325,7 +326,7 @@ class Session:
         }
 
     def world_shown(self) -> Json:
-        """The world about it."""
+        """Return the world as page data."""
         return {
             "kind": "world",
             "world": self.world_rev,
@@ -334,14 +335,14 @@ class Session:
         }
 
     def save(self, form: str) -> Saved:
-        """The mission as a file.  Raises PlanflyError."""
+        """Return the mission as a file.  Raises PlanflyError."""
         saved = save_document(self.document, self.desk, self.judged, form)
         if form != "kml":
             self.written = self.mission
         return saved
 
     def save_over(self) -> Saved:
-        """Write the mission over the file that the command named.  Raises PlanflyError where there is none."""
+        """Overwrite the file that the command named.  Raises PlanflyError if there is none."""
         path = self.document.path
         if path is None or not self.document.kind:
             raise PlanflyError("no mission file was named: save it as a new one", field="over")
@@ -354,19 +355,19 @@ class Session:
         return saved
 
     # ------------------------------------------------------------------
-    # Kept beside, for a server that dies.
+    # Autosave, in case the server dies.
 
     @property
     def has_news(self) -> bool:
-        """Whether anything is to be kept: the mission, or how it is flown, differs from what was opened."""
+        """True if there is anything to autosave: the mission or its settings differ from the opened ones."""
         return self.is_changed or self.desk.scenario is not self.document.opened.setup.scenario
 
     def kept_file(self, file: Path) -> Path:
-        """Where this document is kept: what was opened since the command began, beside what it named."""
+        """Autosave path: the given file for the first document, a sibling for documents opened later."""
         return kept_beside(file, self.history.first) if self.left else file
 
     def keep(self, file: Path) -> None:
-        """Write what was done, if anything was since it was written last."""
+        """Write the autosave file, if anything was changed since the last time."""
         if self.kept_rev == self.rev:
             return
         file = self.kept_file(file)
@@ -376,9 +377,9 @@ class Session:
         self.kept_rev = self.rev
 
     def restore(self, file: Path) -> bool:
-        """Take what was kept of the same document, its mission as an edit; whether there was anything.
+        """Restore the autosave of the same document, its mission as an edit; return True if there was one.
 
-        What was kept of another document, or cannot be read, is left.
+        An autosave of another document, or one that cannot be read, is ignored.
         """
         try:
             found = read_kept(file, self.desk, self.history.first)
@@ -388,11 +389,11 @@ class Session:
         except (OSError, ValueError, LookupError, TypeError, PlanflyError):
             return False
         if found[0] is not self.history.first:
-            self._note(found[0], "what was done before the studio ended")
+            self._add_to_history(found[0], "what was done before the studio ended")
         return True
 
 
 def open_session(target: str, world: World, kept: Path | None = None) -> tuple[Session, bool]:
-    """A session of what a command names, and whether edits of before were taken up.  Raises PlanflyError."""
+    """Start a session; return it and whether edits were restored.  Raises PlanflyError."""
     session = Session.of(open_document(target, world), world)
     return session, kept is not None and session.restore(kept)

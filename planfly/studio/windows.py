@@ -1,7 +1,7 @@
-"""The geometric verdict on the legs and corners about a moved item: the same as the whole one's, at any length.
+"""Geometric verdict on the legs and corners near a moved item, identical to the whole verdict.
 
-A part of the route is judged that reaches beyond what a move can change, with the threats and zones that it enters.
-What is asked of the whole flight, energy, stall and bounds, waits for the whole verdict.
+The judged part of the route covers everything that a move can change, with the threats and zones that it enters.
+Requirements of the whole flight, such as energy, stall and bounds, wait for the whole verdict.
 """
 
 from collections.abc import Iterator
@@ -20,13 +20,15 @@ from planfly.studio.desk import Desk
 from planfly.studio.moved_route import moved_route
 from world.geometry import leg_runs
 
-# What a move can change reaches so far along the legs, m, and over so many of them; as much again is judged around it
-# and left out, because its end is not the route's.
-REACH, LEGS = 450.0, 4
-# A route that passes an item more often is judged as a whole.
-_MOST_PASSES = 6
-# Between the places beyond a part's end, m.
-_APART = 3_000.0
+# Distance along the legs within which a move can change the verdict, m.  As much again is judged around it and left
+# out, because the end of the part is not the end of the route.
+REACH = 450.0
+# Least number of legs within which a move can change the verdict.
+LEGS = 4
+# Greatest number of times that a route may pass an item; beyond it the whole route is judged.
+_MAX_PASSES = 6
+# Distance between the places appended beyond the end of a part, m.
+_APPENDED_LEG_LENGTH_M = 3_000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +36,8 @@ class Window:
     """Judged legs and corners of a route.
 
     first, last: waypoints of the route between which legs and corners are judged, both included.
-    begin: the waypoint of the whole route that the part's first has the number of.
-    requirements, findings: of the part, which counts from ``begin``.
+    begin: the waypoint of the whole route at which the part begins.
+    requirements, findings: results for the part, whose numbers begin at ``begin``.
     """
 
     first: int
@@ -48,9 +50,9 @@ class Window:
 def judge_windows(
     desk: Desk, mission: Mission, index: int, before: FlightSetup | None = None
 ) -> tuple[Route, tuple[Window, ...]]:
-    """The windows about an item of a mission, and the route; one of all where that is as quick, or has to be judged.
+    """Judge windows around an item, or the whole route if that is as quick or necessary.
 
-    index: of the item in the mission's list.  before: of the mission in which it was not moved yet, if that is known.
+    Returns the route and the windows.  index: item in the mission's list.  before: setup before the move, if known.
     Raises MissionError for a mission that cannot be laid out.
     """
     route = None
@@ -58,32 +60,32 @@ def judge_windows(
         route = moved_route(before.route, before.mission, mission, desk.scenario, desk.airframe)
     if route is None:
         route = desk.route(mission)
-    spans = None if _may_survey(desk, mission, route) else _spans(route, mission.items[index].seq)
+    spans = None if _may_survey(desk, mission, route) else _affected_spans(route, mission.items[index].seq)
     if spans is None:
-        return route, (_judged(desk.part(mission, route), 0, route.legs, 0),)
+        return route, (_judge_window(desk.part(mission, route), 0, route.legs, 0),)
     windows = []
     for first, last in spans:
-        begin, end = _grown(route, first, last)
+        begin, end = _grown_span(route, first, last)
         part = part_of_route(route, begin, end)
         ahead = end == route.legs
         if begin or not ahead:
-            part, added = _with_fastest(desk, route, part, ahead=ahead)
+            part, added = _with_extreme_legs(desk, route, part, ahead=ahead)
             begin -= added
-        windows.append(_judged(desk.part(mission, part), first, last, begin))
+        windows.append(_judge_window(desk.part(mission, part), first, last, begin))
     return route, tuple(windows)
 
 
 def _may_survey(desk: Desk, mission: Mission, route: Route) -> bool:
-    """Whether there may be surveys, whose lines are found from all of the route."""
+    """Return True if there may be surveys, whose lines are found from the whole route."""
     return desk.scenario.limits.surveys == "lines" or bool(camera_spacing(mission, route).any())
 
 
-def _with_fastest(desk: Desk, route: Route, part: Route, *, ahead: bool) -> tuple[Route, int]:
-    """A part of a route with what is fastest of the whole beyond its end, and how many waypoints that adds before it.
+def _with_extreme_legs(desk: Desk, route: Route, part: Route, *, ahead: bool) -> tuple[Route, int]:
+    """Append the fastest legs of the whole route to a part of it; return how many precede the part, too.
 
-    How long a change of slope takes is reckoned all along a route by its highest airspeeds and its strongest wind: legs
-    at these, straight on beyond the end that is not the route's own, have them counted in the part.
-    ahead: whether they come before the part, whose end is the route's.
+    The time of a change of slope is computed for a whole route from its highest airspeeds and its strongest wind: legs
+    with these values, straight on beyond the end that is not the end of the route, include them in the part.
+    ahead: true to put them before the part, whose end is the end of the route.
     """
     up, wind = route.waypoints[:, 2], desk.scenario.wind
     middle = 0.5 * (up[1:] + up[:-1])
@@ -93,13 +95,14 @@ def _with_fastest(desk: Desk, route: Route, part: Route, *, ahead: bool) -> tupl
     heights = np.array([windy, *(middle[leg] for leg in legs for _ in range(2))])
     speeds = np.array([speed for leg in legs for speed in (route.airspeed[leg], route.airspeed[leg])])
     count = len(heights)
-    end, beside = (0, 1) if ahead else (-1, -2)
-    way = part.waypoints[end, :2] - part.waypoints[beside, :2]
-    if not way.any():
-        way = np.array([0.0, 1.0])
-    steps = _APART * np.arange(1.0, count + 1.0)[:, None] * way / float(np.hypot(*way))
+    end, neighbour = (0, 1) if ahead else (-1, -2)
+    direction = part.waypoints[end, :2] - part.waypoints[neighbour, :2]
+    if not direction.any():
+        direction = np.array([0.0, 1.0])
+    steps = _APPENDED_LEG_LENGTH_M * np.arange(1.0, count + 1.0)[:, None] * direction / float(np.hypot(*direction))
     points = np.column_stack([part.waypoints[end, :2] + steps, heights])
-    # The first of them joins the part at the airspeed there; each pair of heights has its leg's airspeed between.
+    # The first appended leg keeps the airspeed at the end of the part; each pair of altitudes has its leg's airspeed
+    # between.
     onward = np.concatenate([part.airspeed[end : end + 1 or None], speeds])
     order = slice(None, None, -1) if ahead else slice(None)
 
@@ -122,21 +125,21 @@ def _with_fastest(desk: Desk, route: Route, part: Route, *, ahead: bool) -> tupl
 
 
 def _speed_factor(desk: Desk, amsl: float) -> float:
-    """True airspeed by the airspeed that is commanded at a height."""
+    """Return the ratio of true airspeed to commanded airspeed at an altitude."""
     autopilot = desk.airframe.autopilot
     return autopilot.airspeed_factor(amsl) if autopilot.equivalent_airspeeds else 1.0
 
 
-def _judged(setup: FlightSetup, first: int, last: int, begin: int) -> Window:
+def _judge_window(setup: FlightSetup, first: int, last: int, begin: int) -> Window:
     requirements = replace(route_requirements(setup), zones_on=(first - begin, last - begin - 1))
-    findings = tuple(item for item in place_findings(requirements) if _within(item, first - begin, last - begin))
+    findings = tuple(item for item in place_findings(requirements) if _is_within(item, first - begin, last - begin))
     return Window(first, last, begin, requirements, findings)
 
 
-def _within(item: Finding, first: int, last: int) -> bool:
-    """Whether a finding is of a leg or a corner between two waypoints, or of a threat or zone that is violated.
+def _is_within(item: Finding, first: int, last: int) -> bool:
+    """Return True for findings on legs or corners between two waypoints, or on violated threats or zones.
 
-    A corner at either end counts.
+    Corners at both ends are included.
     """
     place = item.place
     if item.ok is False and place.kind in ("missile", "exclusion", "inclusion"):
@@ -146,32 +149,32 @@ def _within(item: Finding, first: int, last: int) -> bool:
     return first <= place.index < last + (place.kind == "waypoint")
 
 
-def _spans(route: Route, seq: int) -> list[tuple[int, int]] | None:
-    """First and last waypoint of what a move of an item may change, merged where they meet; None for the whole.
+def _affected_spans(route: Route, seq: int) -> list[tuple[int, int]] | None:
+    """Return first and last waypoints that a move of an item may change, merged; None for the whole route.
 
-    Landing sequences and returns are found from where the route is.
+    Landing sequences and returns depend on the whole route.
     """
     own = np.flatnonzero(route.items == seq)
     if not len(own) or route.return_from >= 0 or route.straight_to >= 0:
         return None
     spans: list[tuple[int, int]] = []
-    for first, last in _runs(own):
-        span = _grown(route, first, last)
+    for first, last in _consecutive_runs(own):
+        span = _grown_span(route, first, last)
         if spans and span[0] <= spans[-1][1] + 2 * LEGS:
             span = spans.pop()[0], span[1]
         spans.append(span)
     judged = sum(last - first + 2 * LEGS for first, last in spans)
-    return None if len(spans) > _MOST_PASSES or judged >= route.legs else spans
+    return None if len(spans) > _MAX_PASSES or judged >= route.legs else spans
 
 
-def _runs(own: np.ndarray) -> Iterator[tuple[int, int]]:
-    """First and last of each row of numbers without a gap."""
+def _consecutive_runs(own: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Yield first and last number of each consecutive run."""
     for run in np.split(own, np.flatnonzero(np.diff(own) > 1) + 1):
         yield int(run[0]), int(run[-1])
 
 
-def _grown(route: Route, first: int, last: int) -> tuple[int, int]:
-    """Waypoints at least `REACH` and `LEGS` further on either side; no circle is cut."""
+def _grown_span(route: Route, first: int, last: int) -> tuple[int, int]:
+    """Extend a span by at least `REACH` and `LEGS` on either side, without cutting a loiter."""
     along = np.concatenate([[0.0], np.cumsum(leg_runs(route.waypoints))])
     begin = min(first - LEGS, int(np.searchsorted(along, along[first] - REACH, side="right")) - 1)
     end = max(last + LEGS, int(np.searchsorted(along, along[last] + REACH)))
