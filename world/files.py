@@ -93,7 +93,9 @@ def whole_path(path: Path) -> str:
 
 
 def read_toml(path: Path, kind: str, most: int = 2**20) -> dict[str, Any]:
-    """Read the table of a TOML file.  Raises OSError, and ValueError as `read_at_most` and `toml_table` do.
+    """Read the table of a TOML file.
+
+    Raises OSError, and ValueError as `read_at_most` and `toml_table` do.
 
     >>> read_toml(Path("/dev/null"), "gains")
     Traceback (most recent call last):
@@ -120,7 +122,9 @@ def toml_table(text: str) -> dict[str, Any]:
 
 
 def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
-    r"""Decode a file's bytes to text without a byte order mark; raise ``error`` with line and byte if not UTF-8.
+    r"""Decode a file's bytes to text without a byte order mark.
+
+    Raise ``error`` with line and byte if not UTF-8.
 
     >>> from world.errors import MissionError
     >>> utf8_text("\ufeffWind 3 m/s".encode(), Path("a.txt"), MissionError)
@@ -229,7 +233,9 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
 
 
 def remove_temporary_folders(process: int) -> bool:
-    """Remove the folders of `temporary_folder` that a killed process has left; return True if there were none.
+    """Remove the folders of `temporary_folder` that a killed process has left.
+
+    Return True if there were none.
 
     >>> with temporary_folder("planfly-") as folder:
     ...     remove_temporary_folders(os.getpid()), folder.exists()
@@ -245,8 +251,9 @@ def remove_temporary_folders(process: int) -> bool:
 
 @contextlib.contextmanager
 def hold(path: Path) -> Iterator[None]:
-    """Lock an existing file or folder for this process; another process that tries to lock it is refused meanwhile.
+    """Lock an existing file or folder for this process.
 
+    Another process that tries to lock it is refused meanwhile.
     The system releases the lock when the process ends, in any way.  Raises PlanflyError if another process holds the
     lock, and OSError if the file cannot be opened.
 

@@ -40,7 +40,9 @@ class HeightDatum:
 
 
 def counts_from_ellipsoid(crs: str) -> bool:
-    """Return True if a reference system's heights are above an ellipsoid; False for a system without heights.
+    """Return True if a reference system's heights are above an ellipsoid.
+
+    False for a system without heights.
 
     >>> counts_from_ellipsoid("EPSG:4979"), counts_from_ellipsoid("EPSG:4326+5773"), counts_from_ellipsoid("EPSG:4326")
     (True, False, False)

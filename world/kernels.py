@@ -143,7 +143,10 @@ class _InnerType(numba.types.Dispatcher):  # type: ignore[misc]  # numba states 
     """Numba's type of an inner function, which has one compiled form for all literal numbers of a type."""
 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
-        """Return numba's call type without literals; numba alone compiles a function again for each literal number."""
+        """Return numba's call type without literals.
+
+        Numba alone compiles a function again for each literal number.
+        """
         plain = tuple(numba.types.unliteral(given) for given in args)
         return super().get_call_type(context, plain, {name: numba.types.unliteral(kws[name]) for name in kws})
 

@@ -445,7 +445,10 @@ class FlightTable(ScenarioTable):
 
     @property
     def steering(self) -> Steering:
-        """Autopilot, guidance law and navigation; by default "perfect" for planfly's guidance, "gnss" for others."""
+        """Autopilot, guidance law and navigation.
+
+        By default "perfect" for planfly's guidance, "gnss" for others.
+        """
         implied = DEFAULT_AUTOPILOT
         if self.guidance is not None:
             implied = OWN_GUIDANCE
@@ -579,7 +582,10 @@ class RallyTable(PointTable):
 
 
 def _autoland(value: Any) -> Any:
-    """Return a value of RTL_AUTOLAND; raise ValueError for any other, also for true and 1.0, which equal 1."""
+    """Return a value of RTL_AUTOLAND.
+
+    Raise ValueError for any other, also for true and 1.0, which equal 1.
+    """
     if type(value) is not int or value not in (1, 2, 3):
         raise ValueError("allowed 1, 2 or 3")
     return value

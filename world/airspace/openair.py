@@ -295,7 +295,10 @@ def _polar(centre: _Place, place: _Place) -> tuple[float, float]:
 
 
 def _arc(centre: _Place, radii: Sequence[float], first: float, last: float, clockwise: bool) -> list[_Place]:
-    """Return places along an arc, including its ends; the radius changes linearly from the first to the second, m."""
+    """Return places along an arc, including its ends.
+
+    The radius changes linearly from the first to the second, m.
+    """
     turn = (last - first) % 360.0 if clockwise else -((first - last) % 360.0)
     turn = turn or (360.0 if clockwise else -360.0)
     largest = max(*radii, ARC_BEND)

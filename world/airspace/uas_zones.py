@@ -97,7 +97,7 @@ def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
     if kind == "POLYGON":
         return entries | {"rings_deg": _rings(shape.get("coordinates"), source)}
     if kind == "CIRCLE":
-        return entries | _circle(shape.get("centre"), shape.get("radius"), source)
+        return entries | _circle(shape.get("center"), shape.get("radius"), source)
     raise _refused(source, "", "horizontalProjection.type", "allowed Polygon, Circle")
 
 
@@ -254,7 +254,10 @@ def _moment(value: Any, unknown: timedelta) -> datetime | None:
 
 
 def _daily(start: datetime | None, end: datetime | None, daily: Mapping[str, Any]) -> Period:
-    """Convert one entry of a schedule.  Sunrise and sunset, and hours without a UTC offset, give the whole day."""
+    """Convert one entry of a schedule.
+
+    Sunrise and sunset, and hours without a UTC offset, give the whole day.
+    """
     stated_days = daily.get("day") or []
     named = [_word(day) for day in ([stated_days] if isinstance(stated_days, str) else stated_days)]
     days = frozenset() if "ANY" in named else frozenset(WEEKDAYS.index(day) for day in named)

@@ -371,7 +371,10 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
 
 
 def _mend(entries: dict[str, Any]) -> list[str]:
-    """Repair the outline of an authority's zone and return the notes about it; leave other zones as they are."""
+    """Repair the outline of an authority's zone and return the notes about it.
+
+    Leave other zones as they are.
+    """
     published = entries.pop(PUBLISHED, False)
     words = [said for mark, said in ((UPSIDE_DOWN, _TURNED), (NO_BAND, _NO_BAND)) if entries.pop(mark, False)]
     if published and "rings_deg" in entries and (rings := mended_rings(entries["rings_deg"])) is not None:

@@ -205,8 +205,9 @@ def mended_rings(rings: Sequence[Sequence[Sequence[float]]]) -> list[list[list[f
 
 
 def _enclosed(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
-    """Return the area of rings, each repaired alone; a ring inside an odd number of others is a hole in them.
+    """Return the area of rings, each repaired alone.
 
+    A ring inside an odd number of others is a hole in them.
     A ring inside another one may extend beyond it by `MENDED_BY`; of two identical rings neither is inside the other.
     A ring that crosses another one, touches it from outside or is separate from it is a part of the area.
     """
