@@ -1,1 +1,1 @@
-"""The path planner: encodings, constraints and objectives, preference, and estimation of distribution algorithms."""
+"""Path planner: encodings, constraints and objectives, preference, and estimation of distribution algorithms."""

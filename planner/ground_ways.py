@@ -1,7 +1,8 @@
-"""The ways of a plan from the ground to its first waypoint, and from its last to the ground, and how a file holds them.
+"""Departure of a plan from the ground and approach to the ground, and their form in a file.
 
-A plan's path stays in the air between start and destination.  Where its scenario has `[launch]` or `[landing]`, these
-ways lead up to it from home and down from it to the landing strip; `planner.search.lay_ground_ways` lays them out.
+A plan's path stays in the air between start and destination.  If its scenario has `[launch]` or `[landing]`, the
+departure leads from home to the path and the approach from the path to the landing strip;
+`planner.search.lay_ground_ways` lays them out.
 """
 
 from dataclasses import dataclass
@@ -21,13 +22,13 @@ _Length = Annotated[float, Field(gt=0.0, le=100_000.0)]
 
 @dataclass(frozen=True, slots=True)
 class ClimbOut:
-    """The way up: launched at home on a course, straight ahead to the take-off's height, and by waypoints to the plan.
+    """Departure: a launch at home, a climb straight ahead to the take-off altitude, and waypoints to the plan.
 
     home: (3,) m, on the ground.
-    course: of the launch, rad clockwise from north.
-    up: height that the take-off climbs to, m AMSL.
+    course: launch course, rad clockwise from north.
+    up: altitude that the take-off climbs to, m AMSL.
     waypoints: (n, 3) m, between home and the plan's first waypoint.
-    gradient: m per m, the least climb that the way is laid out for.
+    gradient: smallest climb gradient that the departure is laid out for, m per m.
     """
 
     home: Floats
@@ -43,13 +44,13 @@ class ClimbOut:
 
 @dataclass(frozen=True, slots=True)
 class Descent:
-    """The way down: by waypoints from the plan's last one to the line-up, and along that to the landing point.
+    """Approach: waypoints from the plan's last one to the line-up, and along the line-up to the landing point.
 
     waypoints: (n, 3) m, before the line-up.
-    line_up: (2, 3) m, two points at one height on the landing course; the glide begins at the second.
+    line_up: (2, 3) m, two points at one altitude on the landing course; the glide begins at the second.
     point: (3,) m, the landing point on the ground.
-    course: of the landing, rad clockwise from north.
-    slope: of the straight line from the line-up's end to the landing point, m per m.
+    course: landing course, rad clockwise from north.
+    slope: slope of the straight line from the end of the line-up to the landing point, m per m.
     go_around: height over home that a go-around from there climbs to, m.
     """
 
@@ -67,7 +68,7 @@ class Descent:
 
 @dataclass(frozen=True, slots=True)
 class GroundWays:
-    """A plan's ways from and to the ground; None for what its scenario does not ask for, or where none is free."""
+    """Departure and approach of a plan; None if the scenario does not require it, or if none is free."""
 
     climb: ClimbOut | None = None
     descent: Descent | None = None
@@ -82,7 +83,7 @@ def _lock(made: ClimbOut | Descent, *names: str) -> None:
 
 
 # ----------------------------------------------------------------------
-# As a plan's file holds them.
+# Their form in a plan's file.
 
 
 class _Table(BaseModel):
@@ -107,13 +108,13 @@ class _DescentFile(_Table):
 
 
 class GroundWaysFile(_Table):
-    """A plan's ways from and to the ground as JSON: keys with units, None for what is not there."""
+    """Departure and approach of a plan as JSON: keys with units, None if missing."""
 
     climb: _ClimbFile | None = None
     descent: _DescentFile | None = None
 
     def ways(self) -> GroundWays:
-        """The ways that it holds."""
+        """Return the departure and the approach."""
         up, down = self.climb, self.descent
         climb = descent = None
         if up is not None:
@@ -137,7 +138,7 @@ class GroundWaysFile(_Table):
 
 
 def ground_ways_json(ways: GroundWays) -> dict[str, Any]:
-    """Ways as JSON data, which `GroundWaysFile` reads.
+    """Return departure and approach as JSON data, which `GroundWaysFile` reads.
 
     >>> climb = ClimbOut(np.zeros(3), 0.5, 80.0, np.array([[0.0, 600.0, 90.0]]), 0.15)
     >>> data = ground_ways_json(GroundWays(climb))

@@ -1,4 +1,4 @@
-"""A plan: the waypoints of a path, their scores and certificate, the scenario, and how the search found them.
+"""A plan: the waypoints of a path, their scores and certificate, the scenario, and the settings of the search.
 
 The file format is ``plan.json`` (schema planfly.plan/1): `plan_json` writes it, `read_plan` and `parse_plan` read it
 and check every field. `Certificate` is filled by `planner.evaluation.certify`.
@@ -29,7 +29,7 @@ Ints = NDArray[np.int64]
 
 
 PLAN_SCHEMA = "planfly.plan/1"
-# Ten thousand waypoints with as many threats take 4 MB.
+# Maximum size of a file, bytes; ten thousand waypoints with as many threats take 4 MB.
 MAX_BYTES = 64 * 2**20
 
 
@@ -55,17 +55,17 @@ class Objective(IntEnum):
 class Certificate:
     """Result of the continuous check along the whole path, not only at six points per leg.
 
-    Margins are the smallest limit minus value, negative where the path fails.
+    Margins are the smallest difference of limit and value, negative if the path fails.
 
     turn, slope: margins, rad.
-    available_length: smallest length of a leg between its two turns, m; inf where only the fixed turn limit applies.
+    available_length: smallest length of a leg between its two turns, m; inf if only the fixed turn limit applies.
     clearance: smallest height above ground minus the required clearance, m.
     bounds: margin to map, floor and ceiling, m.
     kill_distance: between the path and the surface of the nearest missile sphere, m; negative inside, inf without
     missiles.
-    zone_distance: outside exclusions and inside inclusions, horizontal or vertical, m; negative where one is violated,
+    zone_distance: outside exclusions and inside inclusions, horizontal or vertical, m; negative if a zone is violated,
     inf without zones.
-    headroom: maximum height above ground minus the path's, m; inf without a maximum.
+    headroom: maximum height above ground minus the path's height, m; inf without a maximum.
     problems: one line per failure, empty if the path is certified.
     """
 
@@ -81,25 +81,25 @@ class Certificate:
 
     @property
     def ok(self) -> bool:
-        """Whether no constraint is violated anywhere on the path."""
+        """True if no constraint is violated anywhere on the path."""
         return not self.problems
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Plan:
-    """A planned path.
+    """Planned path.
 
-    scenario: for which it was planned.
+    scenario: the scenario of the plan.
     waypoints: (w, 3) world m.
     violations, objectives: (4,) by `Violation` and (4,) by `Objective`, always at the paper's six points per leg.
-    certificate: of the whole path, or of the part after the flown legs.
-    seed, algorithm, evaluations: of the search.
-    history: (g, 3) per generation, of the best path so far: length ratio, kill exposure and violations (for graded
-    algorithms the number of kinds violated).
+    certificate: certificate of the whole path, or of the part after the flown legs.
+    seed, algorithm, evaluations: seed, algorithm and number of evaluations of the search.
+    history: (g, 3) length ratio, kill exposure and violations (for graded algorithms the number of kinds violated) of
+    the best path in each generation.
     ended: "completed", or why the search ended early: "budget", "interrupted".
     flown_legs: number of legs at the beginning that were already flown under an earlier plan.
-    ways: from the ground to the first waypoint and from the last to the ground; None for a plan that stays in the air.
-    Where one that the scenario asks for is not free, the certificate says so.
+    ways: departure from the ground to the first waypoint and approach from the last; None for a plan that stays in the
+    air. If one that the scenario requires is not free, the certificate reports it.
     """
 
     scenario: Scenario
@@ -129,17 +129,17 @@ class Plan:
 
     @property
     def feasible(self) -> bool:
-        """Whether the path meets all four constraints, at the paper's points and continuously."""
+        """True if the path meets all four constraints, at the paper's points and continuously."""
         return self.certificate.ok and not self.violations.any()
 
     @property
     def safe(self) -> bool:
-        """Whether the path is feasible and outside every missile sphere."""
+        """True if the path is feasible and outside every missile sphere."""
         return self.feasible and self.certificate.kill_distance > 0.0
 
     @property
     def state(self) -> str:
-        """Safe, feasible or neither, in words."""
+        """State of the plan in words: safe, feasible or neither."""
         return "safe" if self.safe else "feasible, but inside a missile's reach" if self.feasible else "not feasible"
 
     def __repr__(self) -> str:
@@ -147,7 +147,7 @@ class Plan:
         return f"<Plan {self.scenario.name}: {len(self.waypoints)} waypoints, {self.state}, {ratio:.4f} times straight>"
 
     def _repr_html_(self) -> str:
-        """HTML for notebooks."""
+        """Return HTML for notebooks."""
         return plan_html(self)
 
 
@@ -195,13 +195,13 @@ def _or_none(value: float) -> float | None:
 
 
 def _airspace_keys(certificate: Certificate) -> dict[str, float]:
-    """The certificate's entries for zones and maximum height; empty if the scenario has neither."""
+    """Return the certificate's entries for zones and maximum height; empty if the scenario has neither."""
     values = {"zone_distance_m": certificate.zone_distance, "headroom_m": certificate.headroom}
     return {key: float(value) for key, value in values.items() if np.isfinite(value)}
 
 
 def plan_json(plan: Plan) -> str:
-    """The plan as the text of a ``plan.json``; the same plan always gives the same bytes.
+    """Return the plan as the text of a ``plan.json``; the same plan always gives the same bytes.
 
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
@@ -246,7 +246,7 @@ def plan_json(plan: Plan) -> str:
 def parse_plan(
     text: str, source: str, *, base: Path | None = None, terrain: str | None = None, ground: Terrain | None = None
 ) -> Plan:
-    """The plan in the text of a ``plan.json``.
+    """Parse the plan in the text of a ``plan.json``.
 
     source: origin of the text, with which error messages begin.
     base: folder to which the scenario's paths are relative.
@@ -270,7 +270,7 @@ def parse_plan(
     _check_names(source, "violations", file.violations, [item.name.lower() for item in Violation])
     _check_names(source, "objectives", file.objectives, [item.name.lower() for item in Objective])
     waypoints = np.array(file.waypoints_east_north_amsl_m)
-    # With another terrain the ends stay where they were planned.
+    # With another terrain the ends keep their planned altitudes.
     given = file.scenario if terrain is None else fixed_ends(file.scenario, waypoints[0], waypoints[-1])
     scenario = from_spec(given, source, base=base, terrain=terrain, ground=ground)
     saved = file.certificate
@@ -303,7 +303,7 @@ def parse_plan(
 
 
 def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
-    """The plan in a ``plan.json`` file; terrain: file that replaces the scenario's terrain.
+    """Read the plan of a ``plan.json`` file; terrain: file that replaces the scenario's terrain.
 
     >>> read_plan(Path("missing.json"))
     Traceback (most recent call last):
@@ -332,7 +332,7 @@ def _check_names(source: str, field: str, given: dict[str, Any], wanted: Sequenc
 
 
 def plan_html(plan: Plan) -> str:
-    """HTML table of a plan for notebooks: its state, margins and failures."""
+    """Return an HTML table of a plan for notebooks: its state, margins and failures."""
     made = plan.certificate
     rows = [
         ("waypoints", len(plan.waypoints)),

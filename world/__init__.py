@@ -1,1 +1,1 @@
-"""What a plan and a flight are judged against: frames, path geometry, terrain, threats, scenario."""
+"""Environment of plans and flights: frames, path geometry, terrain, threats, scenario."""

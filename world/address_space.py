@@ -1,23 +1,23 @@
-"""A limit of address space (``ulimit -v``) ends a command in one line, before it meets a library that never returns.
+"""End a command with one line if a limit of address space (``ulimit -v``) is too low to import a library.
 
-OpenBLAS, which NumPy and SciPy bring along, asks for its buffers in a loop without end, holding the interpreter: where
-there is no room for them, neither Ctrl-C nor SIGTERM ends the process.  LLVM and others end it without a word.
+OpenBLAS, which NumPy and SciPy contain, requests its buffers in an endless loop while it holds the interpreter: without
+room for them, neither Ctrl-C nor SIGTERM ends the process.  LLVM and others end the process without a message.
 """
 
 import mmap
 
-# Bytes that have to be left when a module is imported: more than OpenBLAS takes with its buffers, 90 MB, and for LLVM
-# more than its library of 160 MB.
+# Address space that must be free to import a module, bytes: more than OpenBLAS with its buffers, 90 MB.
 ROOM = 112 * 2**20
+# Address space that must be free to import LLVM, bytes: more than its library of 160 MB.
 LLVM_ROOM = 192 * 2**20
 
 
 class AddressSpaceError(MemoryError):
-    """The limit leaves too little for a library: the machine's trouble, and no file's."""
+    """The limit leaves too little address space for a library: a fault of the machine, not of a file."""
 
 
 def has_room(size: int) -> bool:
-    """Whether so many bytes can be mapped; none are.
+    """Return True if ``size`` bytes can be mapped; the test mapping is released.
 
     >>> has_room(2**20)
     True
@@ -30,16 +30,16 @@ def has_room(size: int) -> bool:
 
 
 class RoomFinder:
-    """Finds no module, and has none imported where there is too little room: to stand first in ``sys.meta_path``.
+    """Import hook for the head of ``sys.meta_path`` that refuses imports if there is too little address space.
 
-    limit: of this process's address space, bytes.
+    limit: address space of this process, bytes.
     """
 
     def __init__(self, limit: int) -> None:
         self._limit = limit
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
-        """Nothing, whichever module is looked for.  Raises AddressSpaceError where too little is left."""
+        """Find no module.  Raise AddressSpaceError if too little address space is left."""
         room = LLVM_ROOM if name.startswith("llvmlite") else ROOM
         if not has_room(room):
             limit = f"{self._limit // 1024:,} kB of address space (ulimit -v)"

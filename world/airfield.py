@@ -1,7 +1,7 @@
-"""The ground ends of a scenario: home, how an aircraft is launched there, the strip that it lands on, and returns.
+"""Home, launch, landing strip and returns of a scenario.
 
-A scenario without these tables has none: its flight begins and ends in the air.  Places lie on the map (m east and
-north of its origin), courses are radians clockwise from north, and home stands on the scenario's ground.
+The flight of a scenario without these tables begins and ends in the air.  Places are m east and north of the map's
+origin, courses are radians clockwise from north, and home is on the scenario's ground.
 """
 
 import math
@@ -26,30 +26,34 @@ from world.wind import Wind
 
 Floats = NDArray[np.float64]
 
-# Where a scenario does not state them: the rail of a small catapult, the swing of an arm with two steps, m; and how
-# steep each goes up, rad.  A catapult of 6 m at 12 degrees launched the Aerosonde without loss of height.
-_LENGTH: dict[LaunchMethod, float] = {"catapult": 6.0, "hand": 2.0, "runway": 200.0}
-_INCLINE: dict[LaunchMethod, float] = {
+# Default launch length, m: the rail of a small catapult, the swing of an arm with two steps, a runway.  A catapult of
+# 6 m at 12 degrees launched the Aerosonde without loss of height.
+_LAUNCH_LENGTH_M: dict[LaunchMethod, float] = {"catapult": 6.0, "hand": 2.0, "runway": 200.0}
+# Default launch incline, rad.
+_LAUNCH_INCLINE_RAD: dict[LaunchMethod, float] = {
     "catapult": math.radians(12.0),
     "hand": math.radians(10.0),
     "runway": 0.0,
 }
-# Steepest ground (m per m) along and across a strip; and this much of it at least is looked at on either, m.
+# Steepest slope of a strip, along and across, m per m.
 STEEPEST_STRIP = 0.10
-_MIN_LOOKED_AT = 60.0
-# A catapult leaves so much of the slowest level flight, as catapults are set; an arm throws at this speed, m/s.
-_CATAPULT_SHARE, _THROW = 1.2, 10.0
+# Smallest width over which the slope across a strip is measured, m.
+_MIN_MEASURED_WIDTH_M = 60.0
+# Release speed of a catapult as a fraction of the slowest level flight, as catapults are usually set.
+_CATAPULT_SPEED_RATIO = 1.2
+# Speed of a hand launch, m/s.
+_THROW_SPEED_MPS = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Launch:
-    """How an aircraft leaves the ground at home.
+    """Launch of the aircraft at home.
 
     method: "catapult", "hand" or "runway".
     course: rad clockwise from north; None for along the mission's first leg.
-    speed: at the end of the launch, m/s against the ground; None for the method's default, see `release_speed`.
-    length: of the rail, the throw or the runway, m; None for the method's default, see `run`.
-    incline: of the launch above level, rad.
+    speed: ground speed at the end of the launch, m/s; None for the method's default, see `release_speed`.
+    length: length of the rail, the throw or the runway, m; None for the method's default, see `run`.
+    incline: angle of the launch above level, rad.
     """
 
     method: LaunchMethod
@@ -65,24 +69,24 @@ class Launch:
         >>> Launch("catapult").run, Launch("catapult", length=4.0).run
         (6.0, 4.0)
         """
-        return _LENGTH[self.method] if self.length is None else self.length
+        return _LAUNCH_LENGTH_M[self.method] if self.length is None else self.length
 
     def release_speed(self, slowest: float) -> float:
-        """Speed at the end of the launch, m/s; of a runway, where the aircraft's own motor gives it, 0.
+        """Return the speed at the end of the launch, m/s; 0 for a runway, where only the motor accelerates.
 
-        slowest: of level flight, m/s.
+        slowest: slowest level flight, m/s.
 
         >>> [Launch(method).release_speed(15.0) for method in ("catapult", "hand", "runway")]
         [18.0, 10.0, 0.0]
         """
         if self.speed is not None:
             return self.speed
-        return {"catapult": _CATAPULT_SHARE * slowest, "hand": _THROW, "runway": 0.0}[self.method]
+        return {"catapult": _CATAPULT_SPEED_RATIO * slowest, "hand": _THROW_SPEED_MPS, "runway": 0.0}[self.method]
 
     def acceleration(self, slowest: float) -> float:
-        """Mean acceleration along the launch, m/s2: v^2 / 2 L; 0 of a runway, where nothing but the motor pulls.
+        """Return the mean acceleration along the launch, m/s2: v^2 / 2 L; 0 for a runway.
 
-        slowest: of level flight, m/s.
+        slowest: slowest level flight, m/s.
 
         >>> Launch("catapult", speed=10.0, length=6.0).acceleration(15.0).__round__(2)
         8.33
@@ -94,14 +98,14 @@ class Launch:
 
 @dataclass(frozen=True, slots=True)
 class LandingStrip:
-    """Where a mission lands.
+    """Landing strip of a mission.
 
-    east, north: the landing point, the middle of the strip, m on the map.
-    course: of the landing, rad clockwise from north; None for into the wind, see `into`.
-    length, width: of the ground that can be landed on, m.
+    east, north: landing point, the centre of the strip, m on the map.
+    course: landing course, rad clockwise from north; None for into the wind, see `into`.
+    length, width: size of the ground that is suitable for landing, m.
     approach: length of the straight final before the landing point, m.
-    slope: of the glide there, rad below level.
-    Either is None for what a plan finds that the autopilot and the aircraft can fly.
+    slope: glide slope of the final, rad below level.
+    If approach or slope is None, a plan chooses a value that the autopilot and the aircraft can fly.
     """
 
     east: float
@@ -113,9 +117,9 @@ class LandingStrip:
     slope: float | None = None
 
     def into(self, wind: Wind, amsl: float) -> float | None:
-        """Course of the landing, rad: the stated one, or into the wind at a height (m AMSL).
+        """Return the landing course, rad: the stated one, or into the wind at ``amsl`` (m AMSL).
 
-        None where none is stated and there is no wind: then any will do.
+        Returns None if no course is stated and there is no wind: then any course is suitable.
 
         >>> LandingStrip(0.0, 0.0).into(Wind(5.0, 2.0, 0.0, "none", None, 100.0), 100.0)
         2.0
@@ -128,12 +132,12 @@ class LandingStrip:
 
 
 def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[float, float]:
-    """How the ground of a strip rises along a landing course (rad), and across it to the right: m per m, between ends.
+    """Return the ground slope of a strip along a landing course (rad) and across it to the right, m per m.
 
-    NaN where the ground is not known to the ends.
+    Each is the mean slope between the two ends; NaN if the ground height at an end is not known.
     """
     found = []
-    for heading, length in ((course, strip.length), (course + 0.5 * math.pi, max(_MIN_LOOKED_AT, strip.width))):
+    for heading, length in ((course, strip.length), (course + 0.5 * math.pi, max(_MIN_MEASURED_WIDTH_M, strip.width))):
         away = 0.5 * length * np.array([-1.0, 1.0])
         ends = ground.height(strip.east + away * math.sin(heading), strip.north + away * math.cos(heading))
         found.append(float(ends[1] - ends[0]) / length)
@@ -142,12 +146,13 @@ def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[f
 
 @dataclass(frozen=True, slots=True)
 class AskedReturns:
-    """What is asked of returns, and what a planned mission sets for them.
+    """Requirements on returns, and the return settings of a planned mission.
 
-    require: "rtl" among them where every return to launch has to be safe, "glide" where an engine may stop anywhere.
-    rtl_altitude: over home, m; None where the scenario sets none.
+    require: contains "rtl" if every return to launch must be safe, "glide" if the engine may fail anywhere, "go_around"
+        if a landing may be aborted anywhere on its glide.
+    rtl_altitude: height above home, m; None if the scenario sets none.
     rally: (n, 3) east, north, m AMSL.
-    rtl_autoland: ArduPlane's RTL_AUTOLAND; None where the scenario sets none.
+    rtl_autoland: ArduPlane's RTL_AUTOLAND; None if the scenario sets none.
     """
 
     require: tuple[ReturnDemand, ...]
@@ -163,16 +168,16 @@ class AskedReturns:
 
 
 # ----------------------------------------------------------------------
-# Made of a scenario file's tables.
+# Conversion from a scenario file's tables.
 
 
 def make_home(
     table: HomeTable | None, source: str, origin: GeoOrigin, ground: Terrain | None, bounds: Floats, start: Floats
 ) -> Floats | None:
-    """Home (3,), m on the map, on the ground; None without a table.
+    """Return home (3,), m, on the ground, or None without a table.
 
-    start: (3,) m, that place = "start" is below.  source: names the file in messages.
-    Raises ScenarioError where home is outside the area (2, 2), or the height of the ground there is not known.
+    start: (3,) m, above home if place = "start".  source: name of the file in messages.
+    Raises ScenarioError if home is outside the area (2, 2), or if the ground height there is not known.
     """
     if table is None:
         return None
@@ -181,10 +186,10 @@ def make_home(
 
 
 def make_launch(table: LaunchTable | None) -> Launch | None:
-    """The launch of a table; None without one."""
+    """Return the launch that a table states, or None without a table."""
     if table is None:
         return None
-    incline = _INCLINE[table.method] if table.incline_deg is None else math.radians(table.incline_deg)
+    incline = _LAUNCH_INCLINE_RAD[table.method] if table.incline_deg is None else math.radians(table.incline_deg)
     course = None if table.course_deg is None else math.radians(table.course_deg)
     return Launch(table.method, course, table.speed_mps, table.length_m, incline)
 
@@ -192,7 +197,7 @@ def make_launch(table: LaunchTable | None) -> Launch | None:
 def make_landing(
     table: LandingTable | None, source: str, origin: GeoOrigin, ground: Terrain | None, bounds: Floats
 ) -> LandingStrip | None:
-    """The strip of a table; None without one.
+    """Return the landing strip that a table states, or None without a table.
 
     Raises ScenarioError as `make_home` does.
     """
@@ -208,10 +213,10 @@ def make_landing(
 def make_returns(
     table: ReturnsTable | None, source: str, origin: GeoOrigin, ground: Terrain | None
 ) -> AskedReturns | None:
-    """What a table asks and sets of returns; None without one.
+    """Return the requirements and settings of returns that a table states, or None without a table.
 
-    Raises ScenarioError for a rally point that is not above the ground, and where a height above ground has none to
-    count from.
+    Raises ScenarioError for a rally point that is not above the ground, and for a height above ground where the ground
+    is not known.
     """
     if table is None:
         return None
@@ -224,7 +229,7 @@ def make_returns(
 
 
 def _on_ground(key: str, place: tuple[float, float], source: str, ground: Terrain | None, bounds: Floats) -> Floats:
-    """A place on the ground, (3,) m."""
+    """Return a place with the height of its ground, (3,) m."""
     check_in_area(key, np.array(place), source, bounds)
     under = float(ground.height(*place)) if ground is not None else math.nan
     if math.isnan(under):

@@ -1,11 +1,11 @@
-"""Named tuples that kernels take as one pointer.
+"""Named tuples that are passed to kernels as one pointer.
 
-To numba a named tuple is all of its numbers, and an array seven of them: a problem of the planner is 174, which every
-call hands on, every signature names and every inlined copy repeats.  A third of the compiling was for these.  A class
-marked `by_reference` lies in memory once, as its instance is first handed to a kernel, and kernels read the field that
-they ask for through a pointer.
+Numba passes a named tuple as all of its numbers, and an array as seven: a problem of the planner is 174 numbers, which
+every call passes, every signature names and every inlined copy repeats.  They took a third of the compile time.  An
+instance of a class marked `by_reference` is laid out in memory once, when it is first passed to a kernel, and kernels
+read the fields that they need through a pointer.
 
-They can only read it: they neither make such a tuple nor return it.  Its arrays are borrowed from the Python tuple,
+Kernels can only read such a tuple: they can neither make nor return it.  Its arrays are borrowed from the Python tuple,
 which outlives the call; they must not be returned either.
 """
 
@@ -32,19 +32,19 @@ class Reference(types.Type):
     """Numba's type of a pointer to a named tuple's fields as they lie in memory."""
 
     def __init__(self, held: Any) -> None:
-        """Point to this named tuple type; a short name for it keeps the names of compiled functions short."""
+        """Point to this named tuple type, under a short name that keeps the names of compiled functions short."""
         self.held = held
         digest = hashlib.sha256(held.name.encode()).hexdigest()[:16]
         super().__init__(f"{held.instance_class.__name__}_{digest}")
 
     @property
     def key(self) -> Any:
-        """What makes two of them equal."""
+        """Key by which numba compares two references."""
         return self.held
 
 
 class _Layout(NamedTuple):
-    """What is made of an instance once: its type, and its fields in memory."""
+    """Type of an instance, and its fields in memory; made once per instance."""
 
     reference: Reference
     memory: Any
@@ -53,7 +53,8 @@ class _Layout(NamedTuple):
 def by_reference(cls: _Class) -> _Class:
     """Let kernels take instances of a class of `typing.NamedTuple` as one pointer, and read its fields.
 
-    Its fields are numbers, arrays, records and named tuples of such.  Records are copied when it is first handed over.
+    Its fields are numbers, arrays, records and named tuples of these.  Records are copied when the instance is first
+    passed to a kernel.
 
     >>> import numba
     >>> from world.airspace.zone_kernels import zone_records
@@ -61,7 +62,7 @@ def by_reference(cls: _Class) -> _Class:
     ('zones', 'edges')
     """
     members = {name: getattr(cls, name) for name in ("__doc__", "__module__", "__qualname__")}
-    # The class itself has no place for the layout, which its subclass has.
+    # A named tuple has no __dict__ to store the layout; its subclass has one.
     made = type(cls.__name__, (cls,), members | {"_address": property(_address), "__getstate__": lambda _: None})
     typeof_impl.register(made)(lambda value, _: _layout(value).reference)
     return cast("_Class", made)
@@ -70,7 +71,7 @@ def by_reference(cls: _Class) -> _Class:
 def _layout(value: Any) -> _Layout:
     kept: dict[str, Any] = vars(value)
     if "_layout" not in kept:
-        held = _held(typeof_impl.dispatch(tuple)(value, None))
+        held = _by_value(typeof_impl.dispatch(tuple)(value, None))
         kept["_layout"] = _Layout(Reference(held), _in_memory(held, value))
     layout: _Layout = kept["_layout"]
     return layout
@@ -80,15 +81,15 @@ def _address(value: Any) -> int:
     return ctypes.addressof(_layout(value).memory)
 
 
-def _held(kind: Any) -> Any:
-    """A type whose named tuples stand in it by their values, as in memory."""
+def _by_value(kind: Any) -> Any:
+    """Return the type with references replaced by their named tuples, as they are laid out in memory."""
     if isinstance(kind, Reference):
         return kind.held
     if isinstance(kind, types.Array):
-        # Whether Python may write them, which another process's copies may be, makes no kernel another one.
+        # Writable and read-only arrays share a kernel; copies in another process may be writable.
         return kind.copy(readonly=True)
     if _is_named(kind):
-        return types.BaseTuple.from_types([_held(member) for member in kind.types], kind.instance_class)
+        return types.BaseTuple.from_types([_by_value(member) for member in kind.types], kind.instance_class)
     return kind
 
 
@@ -101,9 +102,9 @@ def _is_tuple(kind: Any) -> bool:
 
 
 def _in_memory(kind: Any, value: Any) -> Any:
-    """A value of a numba type as its data lies in memory, where its address is taken."""
+    """Lay out a value of a numba type in memory, as ctypes data with an address."""
     if isinstance(kind, types.Array):
-        # As numba's array structure: two owners, of which there is none, then these.
+        # Numba's array structure: two owner pointers, both null, then these fields.
         words = [0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
         return (ctypes.c_ssize_t * len(words))(*words)
     if isinstance(kind, types.Record):
@@ -117,7 +118,7 @@ def _in_memory(kind: Any, value: Any) -> Any:
 
 
 def _member(kind: Reference, name: str) -> tuple[int, Any]:
-    """Number and type of a field, a marked class's again as a pointer."""
+    """Return the index and type of a field; a field of a marked class is again a pointer."""
     number = kind.held.fields.index(name)
     member = kind.held.types[number]
     if _is_named(member) and hasattr(member.instance_class, "_address"):
@@ -149,7 +150,7 @@ def _read_field(context: Any, builder: Any, kind: Reference, pointer: Any, name:
 
 
 @unbox(Reference)
-def _take(kind: Reference, value: Any, c: Any) -> Any:
+def _unbox_reference(kind: Reference, value: Any, c: Any) -> Any:
     pointer_type = c.context.get_value_type(kind)
     pointer = cgutils.alloca_once_value(c.builder, ir.Constant(pointer_type, None))
     address = c.pyapi.object_getattr_string(value, "_address")

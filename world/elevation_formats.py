@@ -1,4 +1,4 @@
-"""The elevation files that are read, and those that we ship: lists that the command line's help reads, too.
+"""Formats of elevation files, and the files that planfly ships: lists that the command line's help reads, too.
 
 `world.raster.open_raster` opens them.
 """
@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 
 class ElevationFormat(NamedTuple):
-    """A kind of elevation file.
+    """Format of elevation files.
 
-    name: in messages.
-    suffix: of its files, in lower case.
-    begins: what its files begin with, one of these; none for a kind that is known by its suffix alone.
+    name: name in messages.
+    suffix: file suffix, in lower case.
+    begins: possible first bytes of a file; empty for a format that only the suffix identifies.
     """
 
     name: str
@@ -19,16 +19,16 @@ class ElevationFormat(NamedTuple):
     begins: tuple[bytes, ...]
 
 
-# All that are read: by what a file begins with (four bytes, for two may be a height), else by its suffix.
+# All formats: identified by the first four bytes of a file (two alone may be a height), or else by the suffix.
 FORMATS = (
     ElevationFormat("a GeoTIFF", ".tif", (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")),
     ElevationFormat("an SRTM .hgt", ".hgt", ()),
     ElevationFormat("an .npz with `elevation`", ".npz", (b"PK\x03\x04",)),
 )
 SUFFIXES = tuple(known.suffix for known in FORMATS)
-# A list of such files, of which only their names are read (`world.elevation_tiles`).
+# Suffix of a list of such files, of which only the names are read (`world.elevation_tiles`).
 VIRTUAL = ".vrt"
-# Tiles of one terrain at most.
+# Maximum number of tiles of one terrain.
 MAX_TILES = 100
-# Elevation that we ship, by name: files of `world/elevation`, whose README says where they are from.
+# Elevation files that planfly ships, by name; the README of `world/elevation` states their sources.
 EMBEDDED = {"jacksboro": "jacksboro.npz"}

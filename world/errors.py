@@ -1,20 +1,20 @@
-"""The error tree.
+"""Errors of planfly.
 
     PlanflyError
     ├── ScenarioError   a scenario file or a planner option
     ├── TerrainError    an elevation file
     ├── MissionError    a plan or mission file
     ├── FlightError     an aircraft model or a start condition
-    │   ├── StartError  a flight that cannot begin as its mission has it: `fly` makes a verdict of it
-    │   └── CrashError  a program that steered and failed in flight: the command line ends with 1
+    │   ├── StartError  a flight that cannot begin as its mission states: `fly` reports a verdict
+    │   └── CrashError  a failure of the controlling program in flight: the command line ends with 1
     ├── ParameterError  a file of an autopilot's parameters
     ├── LogError        a flight log
-    ├── ArgumentError   an argument of a call that is out of its range: a ValueError, too
-    └── MissingExtraError  what a feature needs is not installed: an ImportError, too
+    ├── ArgumentError   an argument of a call that is out of range, also a ValueError
+    └── MissingExtraError  an extra that a feature needs is not installed, also an ImportError
 
 Each message is one line: the file, the line or field, the value, and the allowed range.  The command
 line prints it and ends with exit code 2.  "Not flyable" and "no feasible path" are results, not errors.
-What of these is known apart stands in the attributes, too, so that a program need not take the line apart.
+The attributes contain the known parts of the message, so that a program need not parse it.
 """
 
 from pathlib import Path
@@ -24,11 +24,11 @@ from typing import Any, Self
 class PlanflyError(Exception):
     """Bad input: the message names file, field, value and range in one line.
 
-    file: what holds it: a file's path, a scenario's name, or what else the message begins with; "" where not known.
-    field: the key, column or option in it; "" where not known, or where it is the file as a whole.
-    value: what is there; None where not known, or where nothing is.
-    allowed: what is expected instead, in words; "" where the message alone says so.
-    argument: the keyword of the call that is wrong; "" where it is a file's content.
+    file: source of the input: a file's path, a scenario's name, or another beginning of the message; "" if unknown.
+    field: key, column or option; "" if unknown, or if the fault concerns the whole file.
+    value: the invalid value; None if unknown or missing.
+    allowed: the expected values, in words; "" if only the message states them.
+    argument: keyword of the wrong argument of a call; "" for the content of a file.
 
     >>> error = PlanflyError("a.toml: wind.speed_mps: 41.0: allowed 0..40", file="a.toml", field="wind.speed_mps")
     >>> str(error), error.file, error.field, error.value, error.allowed
@@ -44,9 +44,9 @@ class PlanflyError(Exception):
 
     @classmethod
     def at(cls, file: str | Path, field: str, value: Any, allowed: str, *, shown: str | None = None) -> Self:
-        """An error of one value in one place, its message made of the four.
+        """Make an error about one value in one place, with a message of these four parts.
 
-        shown: the value as the message has it; None for as it prints, "" for not at all.
+        shown: text of the value in the message; None for its str(), "" to omit it.
 
         >>> error = ScenarioError.at("a.toml", "wind.speed_mps", 41.0, "allowed 0..40", shown="41")
         >>> print(error, "|", error.value)
@@ -62,10 +62,11 @@ class PlanflyError(Exception):
     def of_argument(
         cls, argument: str, value: Any, allowed: str, *, shown: str | None = None, file: str | Path = ""
     ) -> Self:
-        """An error of an argument of a call, by its keyword; the command line names its option instead.
+        """Make an error about an argument of a call, by its keyword.
 
-        shown: the value as the message has it; None for as it prints, "" for not at all.
-        file: that the argument is about, if any.
+        The command line names its option instead.
+        shown: text of the value in the message; None for its str(), "" to omit it.
+        file: file that the argument refers to, if any.
 
         >>> error = FlightError.of_argument("bind", "127.0.0.1:70000", "a port 0..65535 is expected")
         >>> print(error, "|", error.field, "|", error.value)
@@ -79,10 +80,11 @@ class PlanflyError(Exception):
 
     @classmethod
     def from_error(cls, error: "PlanflyError", file: str | Path = "", field: str = "", value: Any = None) -> Self:
-        """The same error as one of this kind, told of another place: what is known apart goes with it.
+        """Convert an error to this class and to the place that led to it, and keep its attributes.
 
-        file, field, value: the place that led to it, which the message begins with; none leaves the message as it is.
-        They stand where the error itself names no field; else its own do, and its file if it has one.
+        file, field, value: the place that led to the error, added before the message; empty to keep the message.
+        They become the attributes if the error names no field; otherwise its own field and value are kept, and its
+        file if it has one.
 
         >>> inner = FlightError("mine.toml: mass_kg = -1", file="mine.toml", field="mass_kg", value=-1)
         >>> found = ScenarioError.from_error(inner, "tight", "flight.aircraft", "./mine")
@@ -100,7 +102,7 @@ class ScenarioError(PlanflyError):
 
 
 class TerrainError(PlanflyError):
-    """An elevation file cannot be read, or does not cover what it should."""
+    """An elevation file cannot be read, or does not cover the required area."""
 
 
 class MissionError(PlanflyError):
@@ -112,7 +114,7 @@ class FlightError(PlanflyError):
 
 
 class CrashError(FlightError):
-    """A program that steered failed in flight: the machine's failure, and no bad input."""
+    """The controlling program failed in flight: a failure of the machine, not bad input."""
 
 
 class ParameterError(PlanflyError):
@@ -120,9 +122,11 @@ class ParameterError(PlanflyError):
 
 
 class StartError(FlightError):
-    """A flight cannot begin as its mission has it: the aircraft and the place are known, and no flight begins there.
+    """A flight cannot begin as its mission states.
 
-    source: what asks for it.  reason: why not.  field, value, allowed: as of `PlanflyError`.
+    The aircraft and the place are known, but no flight is possible there.
+    source: mission or command that requires it.  reason: why it cannot begin.  field, value, allowed: as in
+    `PlanflyError`.
 
     >>> str(StartError("a.plan", "no way made"))
     'a.plan: no way made'
@@ -133,7 +137,7 @@ class StartError(FlightError):
         self.reason = reason
 
     def __reduce__(self) -> tuple[type["StartError"], tuple[str, str], dict[str, Any]]:
-        """What makes it again, in another process."""
+        """Pickle with the arguments of the constructor, for other processes."""
         return type(self), (self.file, self.reason), vars(self)
 
 

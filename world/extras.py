@@ -1,7 +1,7 @@
-"""Extras: what planfly does only where more is installed than its base, and which modules that takes.
+"""Extras: optional features of planfly and the modules that they need.
 
-One list, which the help, the documentation and `pyproject.toml` are tested against.  A feature calls `need_extra`, or
-is decorated with `needs_extra`, before it begins, so that an extra which is missing is said in one line.
+The help, the documentation and `pyproject.toml` are tested against this list.  A feature calls `need_extra`, or is
+decorated with `needs_extra`, before it begins, so that a missing extra is reported in one line.
 """
 
 import functools
@@ -16,12 +16,12 @@ Made = TypeVar("Made")
 
 
 class Extra(NamedTuple):
-    """An extra.
+    """Extra of planfly.
 
-    name: as pip takes it.
-    needs: who needs it, as a sentence begins.
-    purpose: what it adds, for the documentation.
-    modules: that are imported, one of each package that it installs.
+    name: name for pip.
+    needs: beginning of a sentence that names the feature.
+    purpose: features that it adds, for the documentation.
+    modules: imported modules, one of each package that it installs.
     """
 
     name: str
@@ -66,9 +66,9 @@ EXTRAS = {
 
 
 def need_extra(name: str, needs: str = "") -> None:
-    """Raise MissingExtraError, in one line, where a module of an extra is not installed.
+    """Raise MissingExtraError, in one line, if a module of an extra is not installed.
 
-    needs: who needs it, as the line begins; the extra's own words unless stated.
+    needs: beginning of the line, which names the feature; the extra's own `needs` by default.
 
     >>> need_extra("campaigns")
     >>> print(missing_extra(EXTRAS["tables"], "pandas", ".parquet needs"))
@@ -76,12 +76,12 @@ def need_extra(name: str, needs: str = "") -> None:
     """
     extra = EXTRAS[name]
     for module in extra.modules:
-        if not _is_there(module):
+        if not _is_installed(module):
             raise missing_extra(extra, module, needs)
 
 
-def _is_there(module: str) -> bool:
-    """Whether a module can be imported; it is not."""
+def _is_installed(module: str) -> bool:
+    """Return True if a module can be imported, without importing it."""
     try:
         return find_spec(module) is not None
     except (ImportError, ValueError):
@@ -89,7 +89,7 @@ def _is_there(module: str) -> bool:
 
 
 def missing_extra(extra: Extra, module: str, needs: str = "") -> MissingExtraError:
-    """The error of a module that is not there."""
+    """Make the error about a module that is not installed."""
     command = f"pip install 'planfly[{extra.name}]'"
     line = f"{needs or extra.needs} the extra '{extra.name}': {command}"
     error = MissingExtraError(line, field="extra", value=extra.name, allowed=command)
@@ -98,7 +98,7 @@ def missing_extra(extra: Extra, module: str, needs: str = "") -> MissingExtraErr
 
 
 def needs_extra(name: str, needs: str = "") -> Callable[[Callable[Given, Made]], Callable[Given, Made]]:
-    """Have a function call `need_extra` before it does anything else."""
+    """Decorate a function to call `need_extra` first."""
 
     def decorated(function: Callable[Given, Made]) -> Callable[Given, Made]:
         @functools.wraps(function)

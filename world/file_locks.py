@@ -1,4 +1,4 @@
-"""The system's locks on open files, which it lets go of when a process ends, however that is."""
+"""Operating-system locks on open files, which are released when the process ends in any way."""
 
 import contextlib
 from importlib import import_module
@@ -9,21 +9,23 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-# Windows locks bytes of files that are open to be written, for readers too, and opens no folder.
+# True if folders can be locked.  Windows cannot open folders, and locks bytes of files open for writing, also for
+# readers.
 LOCKS_FOLDERS = fcntl is not None
 
 
 def lock_now(handle: int) -> bool:
-    """Lock an open file, or on Linux and macOS a folder, until it is closed; False where another process has done so.
+    """Lock an open file, or on Linux and macOS a folder, until it is closed.
 
-    Raises OSError where the file system has no locks.
+    Return False if it is already locked.
+    Raises OSError if the file system does not support locks.
 
     >>> from tempfile import TemporaryFile
     >>> with TemporaryFile() as file:
     ...     lock_now(file.fileno())
     True
     """
-    # Windows says by PermissionError what others say by BlockingIOError.
+    # Windows raises PermissionError where other systems raise BlockingIOError.
     with contextlib.suppress(BlockingIOError if LOCKS_FOLDERS else PermissionError):
         if LOCKS_FOLDERS:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,4 +1,4 @@
-"""Files: small text files read with one-line errors, and outputs that appear complete or not at all."""
+"""Read small text files with one-line errors, and write outputs that appear complete or not at all."""
 
 import contextlib
 import errno
@@ -17,15 +17,16 @@ from world.errors import PlanflyError
 from world.interruption import unfinished, uninterrupted
 
 # ----------------------------------------------------------------------
-# Small text files that a person names: missions, parameters, scenarios.
+# Small text files that the user names: missions, parameters, scenarios.
 
-# Names with dots between them, as of tables within tables.
-_DOTTED = re.compile(r"""[\w"'-]+(?:[ \t]*\.[ \t]*[\w"'-]+)*""")
+# A dotted TOML name, as of nested tables.
+_DOTTED_NAME = re.compile(r"""[\w"'-]+(?:[ \t]*\.[ \t]*[\w"'-]+)*""")
+# Maximum number of dots in a name.
 _MAX_DOTS = 100
 
 
 class TextLine(NamedTuple):
-    """A line of a file, as messages name it.  number: from 1.
+    """Line of a file, as messages name it.  number: from 1.
 
     >>> print(TextLine("a.waypoints", 4))
     a.waypoints:4
@@ -39,9 +40,9 @@ class TextLine(NamedTuple):
 
 
 def read_small_file(path: Path, most: int, kind: str, error: type[PlanflyError]) -> bytes:
-    """Bytes of a file of this kind, of ``most`` bytes at most.
+    """Return the bytes of a file of this kind, which has at most ``most`` bytes.
 
-    Raises ``error``, in one line, for a file that is missing, larger, or not to be read.
+    Raises ``error``, in one line, for a file that is missing, larger or not readable.
 
     >>> from world.errors import MissionError
     >>> read_small_file(Path("missing.plan"), 100, "mission", MissionError)
@@ -57,10 +58,10 @@ def read_small_file(path: Path, most: int, kind: str, error: type[PlanflyError])
 
 
 def read_at_most(path: Path, most: int, kind: str) -> bytes:
-    """Bytes of a file of this kind, of ``most`` bytes at most.
+    """Return the bytes of a file of this kind, which has at most ``most`` bytes.
 
-    Raises OSError, and ValueError for a larger one and for what is none: a named pipe that nobody writes into would be
-    waited for, and a device has no end.  A pipe of the shell (``/dev/stdin``, ``/dev/fd/63``) is read to its end.
+    Raises OSError, and ValueError for a larger file and for anything but a plain file: a named pipe without a writer
+    would block, and a device has no end.  A pipe of the shell (``/dev/stdin``, ``/dev/fd/63``) is read to its end.
 
     >>> read_at_most(Path("/dev/zero"), 100, "mission")
     Traceback (most recent call last):
@@ -80,7 +81,7 @@ def read_at_most(path: Path, most: int, kind: str) -> bytes:
 
 
 def whole_path(path: Path) -> str:
-    """The absolute path of a file or folder, links followed as far as they lead: one that leads to itself stays.
+    """Return the absolute path of a file or folder with links resolved; a link that leads to itself stays.
 
     >>> whole_path(Path("/usr/../none/"))
     '/none'
@@ -92,7 +93,9 @@ def whole_path(path: Path) -> str:
 
 
 def read_toml(path: Path, kind: str, most: int = 2**20) -> dict[str, Any]:
-    """The table of a TOML file of this kind.  Raises OSError, and ValueError as `read_at_most` and `toml_table` do.
+    """Read the table of a TOML file.
+
+    Raises OSError, and ValueError as `read_at_most` and `toml_table` do.
 
     >>> read_toml(Path("/dev/null"), "gains")
     Traceback (most recent call last):
@@ -102,15 +105,15 @@ def read_toml(path: Path, kind: str, most: int = 2**20) -> dict[str, Any]:
 
 
 def toml_table(text: str) -> dict[str, Any]:
-    """The table of a TOML text.
+    """Parse the table of a TOML text.
 
-    Raises ValueError for what is none, and for brackets or names within one another without end: the parser takes
-    memory by the square of how many there are.
+    Raises ValueError for invalid TOML, and for too deeply nested brackets or names: the parser's memory grows with the
+    square of their number.
 
     >>> toml_table("a.b = 1")
     {'a': {'b': 1}}
     """
-    if any(name[0].count(".") > _MAX_DOTS for name in _DOTTED.finditer(text)):
+    if any(name[0].count(".") > _MAX_DOTS for name in _DOTTED_NAME.finditer(text)):
         raise ValueError(f"a name of more than {_MAX_DOTS} parts")
     try:
         return tomllib.loads(text)
@@ -119,7 +122,9 @@ def toml_table(text: str) -> dict[str, Any]:
 
 
 def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
-    r"""A file's bytes as text, without a byte order mark; raises ``error`` with line and byte where they are none.
+    r"""Decode a file's bytes to text without a byte order mark.
+
+    Raise ``error`` with line and byte if not UTF-8.
 
     >>> from world.errors import MissionError
     >>> utf8_text("\ufeffWind 3 m/s".encode(), Path("a.txt"), MissionError)
@@ -136,12 +141,12 @@ def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """What a message says after a name or key that is not known: the nearest that is, "" where none is near.
+    """Return the end of a message about an unknown name or key: the most similar known name, or "" without one.
 
     >>> did_you_mean("jaksboro", ["jacksboro", "tight"]), did_you_mean("valley", ["jacksboro", "tight"])
     (": did you mean 'jacksboro'?", '')
     """
-    # Imported here: most runs have no fault to tell.
+    # Imported here, as most runs report no fault.
     from difflib import get_close_matches
 
     by_folded = {one.casefold(): one for one in known}
@@ -150,14 +155,14 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 # ----------------------------------------------------------------------
-# Files that are written whole or not at all, folders that do not outlive their use, targets kept to one process.
+# Files that are written whole or not at all, temporary folders, and locks that keep a target to one process.
 
 
 def write_whole(path: Path, data: str | bytes) -> None:
-    """Write a file under a temporary name beside its target and rename it: whole, or not at all.
+    """Write a file under a temporary name next to its target and rename it, so that it is written whole or not at all.
 
-    Text is written in UTF-8.  A target that is a link stays one: the file that it leads to is replaced.  Raises
-    OSError, which names the target, and leaves what was there.
+    Text is written in UTF-8.  A target that is a link stays a link: the file that it leads to is replaced.  Raises
+    OSError, which names the target, and leaves the old file.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -167,8 +172,8 @@ def write_whole(path: Path, data: str | bytes) -> None:
     """
     content = data.encode("utf-8") if isinstance(data, str) else data
     try:
-        target = _led_to(path) if path.is_symlink() else path
-        # Cut by bytes, of which a name may have 255: letters may be up to four.
+        target = _resolve_link(path) if path.is_symlink() else path
+        # Cut by bytes, as a name may have 255 bytes and a letter may take up to four.
         name = target.name.encode()[:200].decode("utf-8", "ignore")
         temporary = target.with_name(f".{name}.{os.getpid()}-{os.urandom(4).hex()}")
         with uninterrupted(), unfinished(temporary):
@@ -183,7 +188,7 @@ def write_whole(path: Path, data: str | bytes) -> None:
 
 
 def write_folder(path: Path, files: Mapping[str, bytes]) -> None:
-    """Make a folder that is not there yet, with files by their paths within it: whole, or not at all.
+    """Make a new folder with files by their paths within it, whole or not at all.
 
     Raises OSError, which names the folder, and leaves nothing.
 
@@ -205,7 +210,7 @@ def write_folder(path: Path, files: Mapping[str, bytes]) -> None:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
-def _led_to(link: Path) -> Path:
+def _resolve_link(link: Path) -> Path:
     try:
         return link.resolve()
     except RuntimeError:
@@ -214,7 +219,7 @@ def _led_to(link: Path) -> Path:
 
 @contextlib.contextmanager
 def temporary_folder(prefix: str) -> Iterator[Path]:
-    """Make a folder among the system's temporary files, and remove it with all that is in it.
+    """Make a folder among the system's temporary files, and remove it with its contents at the end.
 
     >>> with temporary_folder("planfly-") as folder:
     ...     _ = (folder / "notes").write_text("gone soon")
@@ -228,13 +233,15 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
 
 
 def remove_temporary_folders(process: int) -> bool:
-    """Remove the folders that a process which was killed has left from `temporary_folder`; whether none was there.
+    """Remove the folders of `temporary_folder` that a killed process has left.
+
+    Return True if there were none.
 
     >>> with temporary_folder("planfly-") as folder:
     ...     remove_temporary_folders(os.getpid()), folder.exists()
     (False, False)
     """
-    # As `temporary_folder` names them.
+    # The name pattern of `temporary_folder`.
     there = Path(tempfile.gettempdir()).glob("planfly-*-*")
     left = [folder for folder in there if folder.name.split("-")[-2] == str(process)]
     for folder in left:
@@ -244,10 +251,11 @@ def remove_temporary_folders(process: int) -> bool:
 
 @contextlib.contextmanager
 def hold(path: Path) -> Iterator[None]:
-    """Keep a file or folder that is there to this process: another that would hold it is refused meanwhile.
+    """Lock an existing file or folder for this process.
 
-    The system lets go of it when the process ends, however that is.  Raises PlanflyError where another holds it, and
-    OSError where it cannot be opened.
+    Another process that tries to lock it is refused meanwhile.
+    The system releases the lock when the process ends, in any way.  Raises PlanflyError if another process holds the
+    lock, and OSError if the file cannot be opened.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder, hold(Path(folder)):
@@ -258,8 +266,8 @@ def hold(path: Path) -> Iterator[None]:
     ...         print("held")
     held
     """
-    beside = path if file_locks.LOCKS_FOLDERS else path.with_name(f".{path.name}.planfly-lock")
-    handle = os.open(beside, os.O_RDONLY if file_locks.LOCKS_FOLDERS else os.O_RDWR | os.O_CREAT)
+    lock_file = path if file_locks.LOCKS_FOLDERS else path.with_name(f".{path.name}.planfly-lock")
+    handle = os.open(lock_file, os.O_RDONLY if file_locks.LOCKS_FOLDERS else os.O_RDWR | os.O_CREAT)
     try:
         if not file_locks.lock_now(handle):
             raise PlanflyError(f"{path}: another planfly is writing there; name another target", file=path)
@@ -268,4 +276,4 @@ def hold(path: Path) -> Iterator[None]:
         os.close(handle)
         if not file_locks.LOCKS_FOLDERS:
             with contextlib.suppress(OSError):
-                beside.unlink()
+                lock_file.unlink()

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-# Terms along each axis of the largest polynomial of a `PolyMap`: of degree 9.
+# Number of terms along each axis of the largest polynomial of a `PolyMap`, of degree 9.
 MAX_TERMS = 10
-# A polynomial map of the plane: with a and b the position from the centre in half-widths of its rectangle, the sums of
-# u[i, j] * a**i * b**j and of v[i, j] * a**i * b**j over i + j < size.
+# A polynomial map of the plane.  With a and b the position relative to the centre in half-widths of the rectangle, its
+# components are the sums of u[i, j] * a**i * b**j and of v[i, j] * a**i * b**j over i + j < size.
 POLYMAP = np.dtype(
     [
         ("centre_x", np.float64),
@@ -37,7 +37,7 @@ POLYMAP = np.dtype(
     ],
     align=True,
 )
-# One record of that dtype.  Compiled code reads its fields as attributes, which numpy's own type does not know of.
+# One record of that dtype.  Compiled code reads its fields as attributes, which numpy's static type does not declare.
 PolyMapRecord = Any
 
 
@@ -51,14 +51,16 @@ class GeoOrigin:
 
 @lru_cache(maxsize=32)
 def _aeqd(origin: GeoOrigin) -> "Proj":
-    # Imported here, and below: it brings an HTTP client along, and a scenario in metres needs none of it.
+    # Imported here and below, as pyproj imports an HTTP client, and a scenario in metres needs neither.
     from pyproj import Proj
 
     return Proj(proj="aeqd", lat_0=origin.lat_deg, lon_0=origin.lon_deg, ellps="WGS84")
 
 
 def to_map(origin: GeoOrigin, lat_deg: ArrayLike, lon_deg: ArrayLike) -> tuple[Floats, Floats]:
-    """East and north in metres of geodetic positions in degrees; any shape, the same shape back.
+    """Convert geodetic positions in degrees to east and north in metres.
+
+    Any shape, which the result keeps.
 
     >>> east, north = to_map(GeoOrigin(46.0, 8.0), [46.0, 46.01], [8.01, 8.0])
     >>> east.round(1).tolist(), north.round(1).tolist()
@@ -68,7 +70,9 @@ def to_map(origin: GeoOrigin, lat_deg: ArrayLike, lon_deg: ArrayLike) -> tuple[F
 
 
 def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats, Floats]:
-    """Latitude and longitude in degrees of map positions in metres; any shape, the same shape back.
+    """Convert map positions in metres to latitude and longitude in degrees.
+
+    Any shape, which the result keeps.
 
     >>> lat, lon = to_geo(GeoOrigin(46.0, 8.0), 0.0, 10_000.0)
     >>> float(lat.round(6)), float(lon.round(6))
@@ -80,9 +84,9 @@ def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats
 
 
 def transform_points(transform: Callable[..., Any], x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Both coordinates of points, of the same shape, through a transformation of pyproj.
+    """Transform both coordinates of points with pyproj, and keep their shape.
 
-    pyproj takes an array of one point for a point, and loses its shape, with NumPy before 2.4, which warns of it.
+    With NumPy before 2.4, which warns of it, pyproj treats an array of one point as a scalar and loses its shape.
 
     >>> transform_points(lambda x, y: (x + 1.0, y), np.array([1.0]), np.array([2.0]))
     (array([2.]), array([2.]))
@@ -95,9 +99,9 @@ def transform_points(transform: Callable[..., Any], x: Floats, y: Floats) -> tup
 
 
 def crs_transformer(crs: str) -> "Transformer":
-    """The transformer from WGS84 (longitude, latitude in degrees) to the horizontal part of a CRS.
+    """Return the transformer from WGS84 (longitude, latitude in degrees) to the horizontal part of a CRS.
 
-    Heights are never passed through: without a geoid grid PROJ would return them unchanged, in silence.
+    Heights must not be transformed with it: without a geoid grid PROJ silently returns them unchanged.
     Raises ValueError for a CRS that PROJ does not know.
     """
     from pyproj import CRS, Transformer
@@ -110,7 +114,7 @@ def crs_transformer(crs: str) -> "Transformer":
 
 
 def height_unit(crs: str) -> tuple[str, float]:
-    """Name of a CRS' unit of height and its length in m; ("metre", 1) where it has none.
+    """Return the name of a CRS's unit of height and its length in m; ("metre", 1) without one.
 
     Raises ValueError for a CRS that PROJ does not know.
     """
@@ -138,7 +142,7 @@ def wkt_of(crs: str, *, with_height: bool = False) -> str:
 
 
 def is_geographic(crs: str) -> bool:
-    """Whether a CRS counts in degrees of longitude and latitude.
+    """Return True if a CRS uses degrees of longitude and latitude.
 
     >>> is_geographic("EPSG:4326+5773"), is_geographic("EPSG:32632")
     (True, False)
@@ -150,10 +154,10 @@ def is_geographic(crs: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class PolyMap:
-    """A smooth map of the plane, as a polynomial fitted to it over a rectangle.
+    """Polynomial approximation of a smooth map of the plane over a rectangle.
 
     record: the polynomial, of dtype `POLYMAP`, in the form that compiled functions take.
-    residual: the largest error seen at check points between the nodes, in the unit of the result.
+    residual: the largest error at check points between the nodes, in the unit of the result.
     """
 
     record: PolyMapRecord = field(repr=False)
@@ -166,15 +170,15 @@ class PolyMap:
         object.__setattr__(self, "record", locked[0])
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
-        """Both components at arrays of positions."""
+        """Return both components at arrays of positions."""
         xs, ys = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
         out = _polymap_many(self.record, xs.ravel(), ys.ravel())
         return out[0].reshape(xs.shape), out[1].reshape(xs.shape)
 
     def rows(self) -> Floats:
-        """The polynomial as rows of numbers, (2 + 2n, n), as a log holds it; `from_rows` reads them.
+        """Return the polynomial as rows of numbers, (2 + 2n, n), as stored in a log; `from_rows` reads them.
 
-        Row 0 starts with the centre, row 1 with the half-widths; then come the coefficients of u and of v.
+        Row 0 starts with the centre, row 1 with the half-widths; the coefficients of u and of v follow.
         """
         one, size = self.record, int(self.record["size"])
         rows = np.zeros((2 + 2 * size, size))
@@ -185,13 +189,13 @@ class PolyMap:
 
     @staticmethod
     def from_rows(rows: Floats, residual: float) -> "PolyMap":
-        """Make a map of the rows that `rows` gave; n is at most `MAX_TERMS`."""
+        """Make a map from the rows of `rows`; n is at most `MAX_TERMS`."""
         size = rows.shape[1]
         return PolyMap(_record(rows[0, :2], rows[1, :2], rows[2 : 2 + size], rows[2 + size :]), residual)
 
 
 def _record(centre: Floats, half: Floats, u: Floats, v: Floats) -> PolyMapRecord:
-    """A record of `POLYMAP` with these (n, n) coefficients."""
+    """Make a record of `POLYMAP` with these (n, n) coefficients."""
     size = len(u)
     record = np.zeros(1, dtype=POLYMAP)[0]
     record["centre_x"], record["centre_y"] = centre
@@ -204,10 +208,10 @@ def _record(centre: Floats, half: Floats, u: Floats, v: Floats) -> PolyMapRecord
 def fit_polymap(
     function: Callable[[Floats, Floats], tuple[Floats, Floats]], bounds: ArrayLike, tolerance: float
 ) -> PolyMap:
-    """Polynomial copy of ``function`` over ``bounds`` [[x0, x1], [y0, y1]], exact to ``tolerance``.
+    """Fit a polynomial to ``function`` over ``bounds`` [[x0, x1], [y0, y1]] to within ``tolerance``.
 
-    The degree grows from 1 to 9 until the largest error at points between the fitted nodes is within the
-    tolerance; the best one is returned in any case, with its residual.
+    The degree increases from 1 to 9 until the largest error at points between the fitted nodes is within the tolerance.
+    The best polynomial is returned even if its error is larger; see its residual.
 
     >>> copy = fit_polymap(lambda x, y: (x * y, x + y), [[0.0, 2.0], [0.0, 4.0]], 1e-9)
     >>> u, v = copy(1.0, 3.0)
@@ -252,7 +256,7 @@ def fit_polymap(
 
 @inlined
 def polymap(record: PolyMapRecord, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Both components of a `PolyMap`'s record at one point, by Horner's scheme."""
+    """Evaluate both components of the record of a `PolyMap` at one point, by Horner's scheme."""
     a = (x - record.centre_x) / record.half_x
     b = (y - record.centre_y) / record.half_y
     u = 0.0

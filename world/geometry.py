@@ -1,7 +1,7 @@
-"""Path geometry, the same for plans and for flown tracks: turning angles, slopes, fly-by arcs, spheres, exposure.
+"""Path geometry for plans and flown tracks: turning angles, slopes, fly-by arcs, spheres, exposure.
 
-Scalar kernels are compiled and take bare numbers, so that the planner's evaluation, the certificate and the
-check of a flown track call the same code.
+Scalar kernels are compiled and take plain numbers, so that the planner's evaluation, the certificate and the check of
+a flown track call the same code.
 """
 
 import math
@@ -13,28 +13,28 @@ from world.kernels import compiled_inline, inlined
 
 Floats = NDArray[np.float64]
 
-# Exposure grows as 1/d^4: closer than this, the distance counts as this (m).
+# Lower limit of the distance in the exposure, which grows as 1/d^4, m.
 CLOSEST = 1.0
 
 
 def turning_angles(waypoints: ArrayLike) -> Floats:
-    """Course change at each inner waypoint, ignoring height (paper eq. 1).
+    """Return the course change at each inner waypoint, ignoring height (paper eq. 1).
 
     waypoints: (..., w, 3) metres.  Returns (..., w - 2) radians in [0, pi].
-    A leg with no horizontal length has no course and counts as straight.
+    A leg with no horizontal length has no course and gives no turn.
 
     >>> turning_angles([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
     [1.5708]
     """
-    # atan2, not the paper's arccos: rounding takes arccos' argument past 1 on exact U-turns, and the NaN
-    # that follows compares as "within the limit".
+    # atan2 instead of the paper's arccos: rounding can push the argument of arccos beyond 1 on exact U-turns, and the
+    # resulting NaN compares as "within the limit".
     return np.abs(signed_turns(waypoints))
 
 
 def signed_turns(waypoints: ArrayLike) -> Floats:
-    """Course change at each inner waypoint, (..., w - 2) rad in (-pi, pi], positive to the right.
+    """Return the course change at each inner waypoint, (..., w - 2) rad in (-pi, pi], positive to the right.
 
-    waypoints: (..., w, 3) metres; heights do not count.
+    waypoints: (..., w, 3) metres; heights are ignored.
 
     >>> signed_turns([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
     [-1.5708]
@@ -43,12 +43,12 @@ def signed_turns(waypoints: ArrayLike) -> Floats:
     before, after = legs[..., :-1, :], legs[..., 1:, :]
     cross = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
     dot = before[..., 0] * after[..., 0] + before[..., 1] * after[..., 1]
-    # + 0.0 turns -0.0 into 0.0: atan2(0, -0.0) is pi, and a leg without length would count as a U-turn.
+    # + 0.0 turns -0.0 into 0.0: atan2(0, -0.0) is pi, which would make a U-turn of a leg without length.
     return np.asarray(np.arctan2(0.0 - cross, dot + 0.0))
 
 
 def leg_courses(waypoints: ArrayLike) -> Floats:
-    """Course of each leg of waypoints (..., w, 3), (..., w - 1) rad clockwise from north in (-pi, pi].
+    """Return the course of each leg of waypoints (..., w, 3), (..., w - 1) rad clockwise from north in (-pi, pi].
 
     >>> leg_courses([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
     [1.5708, 0.0]
@@ -58,7 +58,7 @@ def leg_courses(waypoints: ArrayLike) -> Floats:
 
 
 def leg_runs(waypoints: ArrayLike) -> Floats:
-    """Horizontal length of each leg of waypoints (..., w, 3), (..., w - 1) m.
+    """Return the horizontal length of each leg of waypoints (..., w, 3), (..., w - 1) m.
 
     >>> leg_runs([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).tolist()
     [1000.0, 1000.0]
@@ -68,7 +68,7 @@ def leg_runs(waypoints: ArrayLike) -> Floats:
 
 
 def leg_slopes(waypoints: ArrayLike) -> Floats:
-    """Slope angle of each leg of waypoints (..., w, 3), (..., w - 1) rad, climbing positive (paper eq. 3).
+    """Return the slope angle of each leg of waypoints (..., w, 3), (..., w - 1) rad, climb positive (paper eq. 3).
 
     >>> leg_slopes([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
     [0.0, 0.0997]
@@ -78,7 +78,7 @@ def leg_slopes(waypoints: ArrayLike) -> Floats:
 
 
 def path_length(waypoints: ArrayLike) -> Floats:
-    """Length in three dimensions of paths of waypoints (..., w, 3), (...,) m.
+    """Return the length in three dimensions of paths of waypoints (..., w, 3), (...,) m.
 
     >>> float(path_length([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(2))
     2004.99
@@ -88,7 +88,7 @@ def path_length(waypoints: ArrayLike) -> Floats:
 
 
 def tangent_length(turn: float, radius: float) -> float:
-    """Length of leg (m) that a fly-by arc takes on either side of its waypoint: R tan(turn / 2).
+    """Return the length of leg (m) on either side of a waypoint that its fly-by arc takes: R tan(turn / 2).
 
     turn: rad, from 0 to below pi.  radius: m.
 
@@ -99,7 +99,7 @@ def tangent_length(turn: float, radius: float) -> float:
 
 
 def fly_by_offset(turn: float, radius: float) -> float:
-    """Distance (m) at which a fly-by arc passes its waypoint: R (1 / cos(turn / 2) - 1).
+    """Return the distance (m) at which a fly-by arc passes its waypoint: R (1 / cos(turn / 2) - 1).
 
     turn: rad, from 0 to below pi.  radius: m.
 
@@ -111,7 +111,7 @@ def fly_by_offset(turn: float, radius: float) -> float:
 
 @compiled_inline
 def wrap(angle: float) -> float:  # pragma: no cover - compiled
-    """Bring an angle into [-pi, pi), rad."""
+    """Wrap an angle to [-pi, pi), rad."""
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
 
 
@@ -119,7 +119,7 @@ def wrap(angle: float) -> float:  # pragma: no cover - compiled
 def turning_angle(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float
 ) -> float:  # pragma: no cover - compiled
-    """Course change at b on the way a, b, c: rad in [0, pi] (paper eq. 1, by atan2)."""
+    """Return the course change at b on the path a, b, c: rad in [0, pi] (paper eq. 1, by atan2)."""
     ux, uy, vx, vy = bx - ax, by - ay, cx - bx, cy - by
     # + 0.0 for a leg without length: see `signed_turns`.
     return math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy + 0.0)
@@ -129,10 +129,10 @@ def turning_angle(
 def sphere_window(
     a: Floats, b: Floats, centre: Floats, radius: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """How the segment a-b meets a sphere: closest distance (m), and the fractions where it enters and leaves.
+    """Intersect the segment a-b with a sphere: closest distance to its centre (m), fractions of entry and exit.
 
-    a, b, centre: (3,).  Enter and leave lie in [0, 1]; both are 0 where the segment stays outside.  A point
-    on the surface is inside (paper eq. 9: d <= R).
+    a, b, centre: (3,).  Both fractions are in [0, 1], and 0 if the segment stays outside.  A point on the surface is
+    inside (paper eq. 9: d <= R).
     """
     length2 = 0.0
     along = 0.0
@@ -159,11 +159,11 @@ def sphere_window(
 def segment_exposure(
     a: Floats, b: Floats, centre: Floats, radius: float, scale: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Share of the segment a-b inside a sphere, and the mean over the whole segment of (scale/d)^4 inside it.
+    """Return the fraction of the segment a-b inside a sphere, and the mean over the segment of (scale/d)^4 inside it.
 
-    Exact: with perpendicular distance h (at least `CLOSEST`) and path coordinate s from the closest point,
-    the integral of ds/(h^2+s^2)^2 is s/(2h^2(h^2+s^2)) + atan(s/h)/(2h^3).  The law is the paper's eq. 9 and
-    10, as a density along the path instead of a sum over six points.
+    Exact: with perpendicular distance h (at least `CLOSEST`) and path coordinate s from the closest point, the integral
+    of ds/(h^2+s^2)^2 is s/(2h^2(h^2+s^2)) + atan(s/h)/(2h^3).  The exposure follows the paper's eq. 9 and 10, as a
+    density along the path instead of a sum over six points.
     """
     _, enter, leave = sphere_window(a, b, centre, radius)
     if leave <= enter:
@@ -184,7 +184,7 @@ def segment_exposure(
 def window_exposure(
     enter: float, leave: float, length2: float, along: float, start2: float, scale: float
 ) -> float:  # pragma: no cover - compiled
-    """Mean over a whole segment of (scale/d)^4 between two fractions of it: the integral of `segment_exposure`.
+    """Return the mean over a segment of (scale/d)^4 between two fractions of it: the integral of `segment_exposure`.
 
     length2: squared length.  along: step times (start - centre).  start2: squared distance of the start.
     """
@@ -194,7 +194,7 @@ def window_exposure(
     middle = -along / length2
     h = math.sqrt(max(CLOSEST * CLOSEST, start2 - middle * middle * length2))
     s1, s2 = (enter - middle) * length, (leave - middle) * length
-    # Differences in closed form: of a short segment far off, the two ends' values agree in all but the last digits.
+    # Closed form of the difference, as on a short, distant segment the values at the ends agree in nearly all digits.
     piece = s2 - s1
     first = piece * (h * h - s1 * s2) / ((h * h + s1 * s1) * (h * h + s2 * s2))
     total = (first + math.atan2(h * piece, h * h + s1 * s2) / h) / (2.0 * h * h)

@@ -1,6 +1,6 @@
-"""The highest ground in each cell of a map, exactly: of the bilinear surface between a raster's pixels.
+"""Exact highest ground in each cell of a map, for the bilinear surface between a raster's pixels.
 
-Between four pixels the surface has no summit of its own.  Its highest place in a square is at a pixel in the square, or
+Between four pixels the surface has no summit of its own.  Its highest point in a square is at a pixel in the square, or
 on the square's sides.
 """
 
@@ -17,9 +17,10 @@ Floats = NDArray[np.float64]
 
 
 def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, rows: int, columns: int) -> Floats:
-    """Highest ground (rows, columns) in square cells, sides included, m; NaN where a part of one has no data.
+    """Return the highest ground (rows, columns) in square cells with their sides, m.
 
-    west, south: m, of the outer corner of the first cell.  cell: the side of one, m.  Rows go north, columns east.
+    NaN if part of a cell has no data.
+    west, south: outer corner of the first cell, m.  cell: side of a cell, m.  Rows go north, columns east.
 
     >>> from world.terrain import gridded
     >>> line = np.arange(-100.0, 101.0, 50.0)
@@ -60,7 +61,7 @@ def _fill_cells(
 
 @inner
 def _raise(out: Floats, i: int, j: int, height: float) -> None:  # pragma: no cover - compiled
-    """Raise a cell, if it is one, to a height; NaN stays."""
+    """Raise a cell to a height if it is lower; a cell outside the array is ignored, and NaN stays."""
     if 0 <= i < out.shape[0] and 0 <= j < out.shape[1] and (height > out[i, j] or math.isnan(height)):
         out[i, j] = height
 
@@ -69,7 +70,10 @@ def _raise(out: Floats, i: int, j: int, height: float) -> None:  # pragma: no co
 def _highest_pixel(
     heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float
 ) -> float:  # pragma: no cover - compiled
-    """Highest pixel in a cell, -inf for none; NaN where one has no data.  The cell is straight in pixels."""
+    """Return the highest pixel in a cell that is straight in pixels, -inf without a pixel.
+
+    NaN if one has no data.
+    """
     col, row = polymap(to_pixel, west, south)
     east_col, east_row = polymap(to_pixel, west + cell, south)
     north_col, north_row = polymap(to_pixel, west, south + cell)

@@ -1,13 +1,13 @@
-"""A small table in HTML: how notebooks show what planfly gives."""
+"""Small HTML table that displays planfly's results in notebooks."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
 
 
 def html_table(title: str, rows: Iterable[Sequence[object]], head: Sequence[str] = ()) -> str:
-    """A title above a table; all text is escaped, so that names of files and missions are only text.
+    """Make a table under a title; all text is escaped, so that names of files and missions are only text.
 
-    head: of the columns; none by default.
+    head: names of the columns, if any.
 
     >>> html_table("a<b", [("length", 1.5)])
     '<div><strong>a&lt;b</strong><table><tbody><tr><td>length</td><td>1.5</td></tr></tbody></table></div>'

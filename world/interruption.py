@@ -1,6 +1,6 @@
-"""Interruption: where a signal may end the work, what must be done whole, and what ends or is removed with it.
+"""Interruption by signals: blocks that must complete, temporary files to remove, and child processes to end.
 
-The application turns a signal into a call of `interrupt`; what may not be cut in half stands in `uninterrupted`.
+The application turns a signal into a call of `interrupt`; work that must complete is done within `uninterrupted`.
 """
 
 import contextlib
@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from multiprocessing.process import BaseProcess
 
-# How long a process that is asked to end may take before it is killed, s.
+# Time between SIGTERM and SIGKILL for a child process, s.
 CHILD_PATIENCE = 0.5
 
 
 class Interrupted(KeyboardInterrupt):
-    """A signal has asked the work to end.  number: the signal's."""
+    """Raised when a signal asks the work to end.  number: number of the signal."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -30,10 +30,10 @@ class Interrupted(KeyboardInterrupt):
 
 
 class _State:
-    """What an interruption has to know.
+    """State of interruptions in this process.
 
-    depth: how many `uninterrupted` blocks are open.  waiting: the signal that waits for their end, 0 for none.
-    unfinished: temporary files and folders of this process that are there now.
+    depth: number of open `uninterrupted` blocks.  waiting: signal that is delayed until their end, 0 for no signal.
+    unfinished: existing temporary files and folders of this process.
     """
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ _state = _State()
 
 
 def interrupt(number: int, _frame: FrameType | None = None) -> None:
-    """Raise `Interrupted` for a signal, at once or at the end of what is `uninterrupted`: a signal handler.
+    """Raise `Interrupted` for a signal, at once or at the end of an `uninterrupted` block: a signal handler.
 
     >>> import signal
     >>> try:
@@ -61,7 +61,7 @@ def interrupt(number: int, _frame: FrameType | None = None) -> None:
 
 
 class uninterrupted:
-    """What stands inside is done whole; a signal that comes meanwhile is raised at its end.
+    """Context manager that completes its block; a signal that arrives meanwhile is raised at the end.
 
     >>> import signal
     >>> try:
@@ -75,11 +75,11 @@ class uninterrupted:
     """
 
     def __enter__(self) -> None:
-        """Hold signals back."""
+        """Delay signals."""
         _state.depth += 1
 
     def __exit__(self, *_: object) -> None:
-        """Let the signal in that came meanwhile."""
+        """Raise the signal that arrived meanwhile, if any."""
         _state.depth -= 1
         if _state.waiting and not _state.depth:
             number, _state.waiting = _state.waiting, 0
@@ -88,9 +88,9 @@ class uninterrupted:
 
 @contextlib.contextmanager
 def unfinished(path: Path) -> Iterator[None]:
-    """Note a temporary file or folder while it is there; it is removed at the end, and by `remove_unfinished`.
+    """Register a temporary file or folder, and remove it at the end; `remove_unfinished` removes it, too.
 
-    One that cannot be removed at the end, as another process still writes in it, is noted until it is gone.
+    A folder that cannot be removed at the end, because another process still writes in it, stays registered.
 
     >>> with unfinished(Path("never-made")):
     ...     pass
@@ -105,9 +105,9 @@ def unfinished(path: Path) -> Iterator[None]:
 
 
 def remove_unfinished() -> bool:
-    """Remove the temporary files and folders that are there now: for a process that has to end at once.
+    """Remove all registered temporary files and folders, for a process that must end at once.
 
-    Whether none is left.
+    Returns True if none is left.
 
     >>> remove_unfinished()
     True
@@ -117,7 +117,7 @@ def remove_unfinished() -> bool:
 
 
 def _remove(path: Path) -> bool:
-    """Remove a file or folder as far as it can be: whether it is gone."""
+    """Remove a file or folder as far as possible; return True if it is gone."""
     if path.is_dir():
         shutil.rmtree(path, ignore_errors=True)
     else:
@@ -128,23 +128,23 @@ def _remove(path: Path) -> bool:
 
 @contextlib.contextmanager
 def children_ignore_sigint() -> Iterator[None]:
-    """Processes that are started inside never hear Ctrl-C, which reaches all of a terminal's: their parent ends them.
+    """Block SIGINT in processes that are started inside: Ctrl-C reaches a whole terminal, and their parent ends them.
 
-    A signal that comes meanwhile is not lost: this process hears it at the end.  A start that another signal cuts short
-    leaves a child that waits for its task and ends with a traceback: `uninterrupted` goes beside it.
+    This process receives at the end a SIGINT that arrives meanwhile.  Use it with `uninterrupted`: if another signal
+    interrupts the start, the child waits for its task and ends with a traceback.
 
     >>> from multiprocessing import Process
     >>> with children_ignore_sigint():
     ...     child = Process(target=print)
     """
-    # Imported here: few commands have children, and --help answers at once.
+    # Imported here, as few commands have children and --help must answer at once.
     from multiprocessing import resource_tracker
 
     if not hasattr(signal, "pthread_sigmask"):
-        # Windows: a console's children hear it, whatever their parent does.
+        # On Windows the children of a console always receive Ctrl-C.
         yield
         return
-    # It unblocks the signal again where it is started later.
+    # Started now, because the resource tracker unblocks the signal when it starts.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -154,26 +154,26 @@ def children_ignore_sigint() -> Iterator[None]:
 
 
 def end_with_parent(in_service: threading.Event | None = None) -> None:
-    """Have SIGTERM, and the end of its parent, end this process at once; its unfinished files are removed.
+    """Make this child process end at once on SIGTERM and with its parent, and remove its unfinished files.
 
-    For a child process.  in_service: once it is set, the process notices its parent's end by itself.
+    in_service: once set, the process itself detects that its parent has ended.
 
     >>> import multiprocessing
     >>> child = multiprocessing.get_context("spawn").Process(target=end_with_parent)
     """
-    # Imported here: few processes are children, and --help answers at once.
+    # Imported here, as few processes are children and --help must answer at once.
     import multiprocessing
 
     signal.signal(signal.SIGTERM, _end)
     parent = multiprocessing.parent_process()
 
-    def follow() -> None:
+    def end_after_parent() -> None:
         if parent is not None:
             parent.join()
             if in_service is None or not in_service.is_set():
                 _end(signal.SIGTERM)
 
-    threading.Thread(target=follow, daemon=True).start()
+    threading.Thread(target=end_after_parent, daemon=True).start()
 
 
 def _end(number: int, _frame: FrameType | None = None) -> None:
@@ -182,7 +182,7 @@ def _end(number: int, _frame: FrameType | None = None) -> None:
 
 
 def end_children(children: Sequence["BaseProcess"], patience: float = CHILD_PATIENCE) -> None:
-    """End processes: SIGTERM to all, and SIGKILL after ``patience`` s to those that have not ended.
+    """End processes: SIGTERM to all, and after ``patience`` s SIGKILL to the remaining ones.
 
     >>> end_children([])
     """

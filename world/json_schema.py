@@ -1,13 +1,13 @@
-"""The rules by which the JSON schema of a data class is made, for plain data classes that stand in an answer."""
+"""Settings for the JSON schema of plain data classes in an answer."""
 
 from typing import Any, ClassVar
 
 
 class DocumentConfig:
-    """Base of a plain data class of which a JSON schema is made.
+    """Base of a plain data class with a JSON schema.
 
-    pydantic reads the settings where a schema is made or an answer written; the data class itself needs no pydantic.
-    The strings below its fields become the fields' descriptions, other fields are refused, and a field with a default
+    pydantic reads the settings to make a schema or write an answer; the data class itself does not need pydantic.
+    The strings below its fields become the fields' descriptions, unknown fields are refused, and a field with a default
     is always written.
     """
 

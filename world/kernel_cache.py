@@ -1,9 +1,9 @@
-"""Which sources compiled kernels are made of: their cache holds as long as none of these changes.
+"""Cache folder of compiled kernels, named by a digest of their sources.
 
-Numba's cache looks at the file that a kernel stands in, and misses the kernels and constants that it takes from other
-files.  So the cache folder carries a digest of every file that defines a kernel, and of every file of ours that these
-import, directly or not: a constant reaches a kernel only through an import.  Other files, reports among them, may
-change without a kernel being compiled anew.
+Numba's cache checks only the file that defines a kernel, and misses changes to kernels and constants from other files.
+So the cache folder's name contains a digest of every file that defines a kernel, and of every planfly file that these
+import, directly or not: a constant reaches a kernel only through an import.  Other files, such as reports, may change
+without recompiling a kernel.
 """
 
 import atexit
@@ -16,15 +16,16 @@ from pathlib import Path
 
 from world.interruption import unfinished
 
+# Packages that are searched for kernels.
 PACKAGES = ("aircraft", "flight", "logs", "planner", "world")
-# Of `world.kernels`: each has a function compiled.
+# Decorators of `world.kernels` that compile a function.
 DECORATORS = ("compiled", "compiled_inline", "inner", "inlined")
 _KERNEL = re.compile(rb"^@(?:" + "|".join(DECORATORS).encode() + rb")$", re.MULTILINE)
 _IMPORT = re.compile(rb"^from ((?:" + "|".join(PACKAGES).encode() + rb")[\w.]*) import (\(?[^\n]*)", re.MULTILINE)
 
 
 def kernel_sources(root: Path) -> dict[str, bytes]:
-    """The files that kernels are made of, with their contents, by their paths below a folder that holds the packages.
+    """Return the contents of all source files of kernels, by their paths below the folder of the packages.
 
     >>> files = kernel_sources(Path(__file__).parents[1])
     >>> "world/terrain.py" in files, "logs/views/report/page.py" in files
@@ -43,7 +44,7 @@ def kernel_sources(root: Path) -> dict[str, bytes]:
 
 
 def _imported(content: bytes) -> list[str]:
-    """Paths that a source may import from: of modules, and of names in packages, which may be modules."""
+    """Return paths that a source may import: of modules, and of names in packages, which may be modules."""
     paths = []
     for module, names in _IMPORT.findall(content):
         path = module.decode().replace(".", "/")
@@ -52,7 +53,7 @@ def _imported(content: bytes) -> list[str]:
 
 
 def sources_digest(root: Path) -> str:
-    """A digest of the files that kernels are made of, 16 hexadecimal digits.
+    """Return a digest of the source files of kernels, 16 hexadecimal digits.
 
     >>> len(sources_digest(Path(__file__).parents[1]))
     16
@@ -63,18 +64,18 @@ def sources_digest(root: Path) -> str:
     return digest.hexdigest()[:16]
 
 
-# Numba's own name for it, which processes that are started here inherit.
+# Numba's environment variable of the cache folder, which child processes inherit.
 VARIABLE = "NUMBA_CACHE_DIR"
 
 
-# What stands in the names of folders that hold the kernels of one version of the sources.
+# Prefix in the names of folders with the kernels of one version of the sources.
 _PREFIX = "kernels-"
 
 
 def wanted_folder(base: Path, root: Path) -> Path:
-    """The folder within a base where the kernels of the sources below a root are kept.
+    """Return the folder within a base where the kernels of the sources below a root are kept.
 
-    A base that is such a folder itself, or a temporary one of this process, is taken as it is.
+    A base that already is such a folder, or a temporary one of this process, is returned unchanged.
 
     >>> wanted_folder(Path("/tmp/kernels-mine"), Path(__file__).parents[1]).as_posix()
     '/tmp/kernels-mine'
@@ -83,7 +84,7 @@ def wanted_folder(base: Path, root: Path) -> Path:
 
 
 def can_write(folder: Path) -> bool:
-    """Whether files can be made in a folder, which is made where it is not there.
+    """Return True if files can be created in a folder; create the folder if it does not exist.
 
     >>> can_write(Path(__file__) / "kernels")
     False
@@ -97,9 +98,10 @@ def can_write(folder: Path) -> bool:
 
 
 def usable_folder(wanted: Path) -> Path | None:
-    """The folder where compiled kernels are kept, if it can be written, or else a temporary one.
+    """Return the wanted folder for compiled kernels if it can be written, or else a temporary folder.
 
-    A temporary one serves this process and those that it starts, and goes with it.  None where nothing can be written.
+    A temporary folder serves this process and its children, and is removed at exit.  Returns None if no folder can be
+    written.
     """
     if can_write(wanted):
         return wanted

@@ -1,8 +1,8 @@
-"""One process at a time saves compiled kernels in a cache folder.
+"""Lock that lets only one process at a time save compiled kernels in a cache folder.
 
-Numba numbers the files of a kernel's compiled forms by an index, which it reads, extends and writes back.  Two
-processes that save forms of one kernel for different types at the same moment give both the same number: from then on
-the index of one form leads to the other, and whoever loads it calls machine code that takes its numbers for others.
+Numba numbers the files of a kernel's compiled forms in an index, which it reads, extends and writes back.  Two
+processes that save forms of one kernel for different types at the same moment use the same number for both: from then
+on the index entry of one form leads to the other, and a process that loads it runs machine code for other types.
 """
 
 import contextlib
@@ -16,39 +16,40 @@ from numba.core import event
 
 from world.file_locks import lock_now
 
-# How long a save waits for others, s: one takes milliseconds, and a process may be stopped while it saves.
+# Timeout of the lock, s: a save takes milliseconds, but a process may be suspended while it saves.
 PATIENCE = 10.0
+# Name of the lock file in the cache folder.
 LOCK = "saving.lock"
 
 
 class SavingTurns:
-    """Keeps the lock of a cache folder from the end of a compilation until its kernel is saved.
+    """Lock of a cache folder, held from the end of a compilation until its kernel is saved.
 
-    Numba says when it has compiled a kernel, and when it lets go of the compiler, between which it saves.  It compiles
-    in one thread at a time, and a kernel within another: what another lets go of meanwhile does not count.
+    Numba reports when it has compiled a kernel and when it releases the compiler, and saves in between.  It compiles
+    in one thread at a time, and compiles one kernel within another: releases by inner compilations are ignored.
     """
 
     def __init__(self, folder: Path) -> None:
         self._lock = folder / LOCK
-        self._of_thread = threading.local()
+        self._thread_state = threading.local()
 
     def register(self) -> None:
-        """Listen to numba from now on, as long as this process lives."""
+        """Listen to numba's events until this process ends."""
         listen: Any = event.register
-        listen("numba:compile", _Around(lambda: None, self._take))
-        listen("numba:compiler_lock", _Around(lambda: self._count(1), lambda: self._count(-1)))
+        listen("numba:compile", _BeginEndListener(lambda: None, self._take))
+        listen("numba:compiler_lock", _BeginEndListener(lambda: self._count(1), lambda: self._count(-1)))
 
     def _count(self, step: int) -> None:
-        """Count how often this thread has asked for the compiler, and end its turn where it lets go of it."""
-        here = self._of_thread
+        """Track how often this thread has acquired the compiler, and release the lock when it releases the compiler."""
+        here = self._thread_state
         here.depth = getattr(here, "depth", 0) + step
         if step < 0 and here.depth < getattr(here, "taken_at", 0):
             here.taken_at = 0
             os.close(here.handle)
 
     def _take(self) -> None:
-        """Wait for this process's turn; go on without it where the folder has no locks, or after `PATIENCE`."""
-        here = self._of_thread
+        """Acquire the lock; continue without it if the folder has no locks, or after `PATIENCE`."""
+        here = self._thread_state
         if getattr(here, "taken_at", 0):
             return
         with contextlib.suppress(OSError):
@@ -59,8 +60,8 @@ class SavingTurns:
                 time.sleep(0.002)
 
 
-class _Around(event.Listener):
-    """Calls one function at the beginning and another at the end of what it listens to."""
+class _BeginEndListener(event.Listener):
+    """Listener that calls one function at the beginning and another at the end of an event."""
 
     def __init__(self, begin: Any, end: Any) -> None:
         self._begin, self._end = begin, end

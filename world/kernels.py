@@ -1,6 +1,6 @@
-"""Numba kernels, compiled once per version of what they are made of, and the records that they work on.
+"""Numba kernels, compiled once per version of their sources, and the records that they work on.
 
-Compiled code lies in the user's cache folder; `world.kernel_cache` says for which sources.
+Compiled code is kept in the user's cache folder; `world.kernel_cache` lists the sources of each version.
 """
 
 import functools
@@ -21,29 +21,29 @@ from world.kernel_saves import SavingTurns
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 _Array = TypeVar("_Array", bound=NDArray[Any])
-# A record of named fields, as `record_dtype` makes: mypy cannot know which.
+# A record with the named fields of `record_dtype`, which mypy cannot know.
 Record: TypeAlias = Any
-# An array of them.
+# An array of records.
 Records: TypeAlias = NDArray[Any]
-# Numba fills its settings in when it is imported, and states no types for them.  The folder is read when a kernel is
-# decorated; within one that the user has set, each version of the sources has its own.
+# Numba's settings, which have no types.  Numba reads the cache folder when a kernel is decorated.
 _settings: Any = numba.config
+# Cache folder of this version of the sources, within the folder that the user has set or the user's cache folder.
 WANTED = wanted_folder(Path(_settings.CACHE_DIR or user_cache_dir("planfly")), Path(__file__).parents[1])
 _usable = usable_folder(WANTED)
 _settings.CACHE_DIR = str(_usable or WANTED)
-# Whether kernels are kept for this process alone.
+# True if compiled kernels are kept for this process only.
 TEMPORARY = _usable not in (WANTED, None)
 
 
 class _Compiling(event.Listener):
-    """Passes on that numba compiles, which it does only what its cache does not have."""
+    """Listener that reports when numba compiles a kernel, which it does only for kernels not in its cache."""
 
     def on_start(self, event: Any) -> None:
-        """Before a kernel is compiled."""
+        """Report a kernel before it is compiled."""
         kernel_is_compiled()
 
     def on_end(self, event: Any) -> None:
-        """After it."""
+        """Ignore the end of a compilation."""
 
 
 cast("Any", event).register("numba:compile", _Compiling())
@@ -52,7 +52,7 @@ if _usable is not None:
 
 
 def cache_folder() -> Path:
-    """Where compiled kernels are kept: in `WANTED`, or in a temporary folder where that cannot be written.
+    """Return the folder of compiled kernels: `WANTED`, or a temporary folder if `WANTED` cannot be written.
 
     >>> cache_folder().is_absolute() or bool(_settings.CACHE_DIR)
     True
@@ -63,9 +63,9 @@ def cache_folder() -> Path:
 def compiled(kernel: _Kernel) -> _Kernel:
     """Compile a function of numbers, arrays and records to machine code on first use, and keep it.
 
-    A division by zero gives infinity or NaN, as in numpy: looking for it costs a tenth of the guidance's time.
+    A division by zero gives infinity or NaN, as in numpy: checking for it takes a tenth of the guidance's time.
 
-    A function has to stand in a file, as `world.terrain.steepest_slopes` does:
+    The function must be defined in a file, as `world.terrain.steepest_slopes` is:
 
     >>> from world.terrain import steepest_slopes
     >>> steepest_slopes(np.array([[0.0, 3.0], [0.0, 3.0]], dtype=np.float32), 1.0).round(3)
@@ -75,7 +75,7 @@ def compiled(kernel: _Kernel) -> _Kernel:
 
 
 def compiled_inline(kernel: _Kernel) -> _Kernel:
-    """As `compiled`, and LLVM copies the function into the kernels that call it, as with `inlined`.
+    """Compile a function as `compiled` does, and let LLVM inline it into the kernels that call it, as with `inlined`.
 
     >>> from world.geometry import wrap
     >>> round(wrap(4.0), 6)
@@ -87,8 +87,8 @@ def compiled_inline(kernel: _Kernel) -> _Kernel:
 def inner(kernel: _Kernel) -> _Kernel:
     """Compile a function that other kernels call, without the wrapper that Python would call it by.
 
-    The wrapper is a seventh of what it takes to compile a kernel.  Tests may still call the function: a wrapper is then
-    compiled, and kept apart.
+    The wrapper takes a seventh of the time to compile a kernel.  Tests may still call the function: a wrapper is then
+    compiled and kept separately.
 
     >>> from world.airspace.zone_kernels import box_distance
     >>> callable(box_distance)
@@ -98,23 +98,23 @@ def inner(kernel: _Kernel) -> _Kernel:
 
 
 def inlined(kernel: _Kernel) -> _Kernel:
-    """As `inner`, and LLVM copies the function into the kernels that call it, in their inner loops.
+    """Compile a function as `inner` does, and let LLVM inline it into the inner loops of the kernels that call it.
 
-    A call hands over seven numbers an array, and counts a reference to each: more than many a kernel's own work.  The
-    planner's graded scores take a quarter longer with calls alone.  Copied by numba (`inline="always"`) it would run no
-    faster, but each copy would be typed and translated again.
+    A call passes seven numbers per array and increments its reference count, which is more work than many kernels do
+    themselves.  The planner's graded scores take a quarter longer with calls alone.  Inlined by numba
+    (`inline="always"`) the function would run no faster, but each copy would be typed and translated again.
     """
     return cast("_Kernel", _InnerKernel(kernel, forceinline=True))
 
 
 def _compiled(kernel: Any, **options: bool) -> Any:
     njit: Any = numba.njit
-    # No kernel is handed to another as a value, which the wrapper for C is for.
+    # The wrapper for C is only needed to pass a kernel to another one as a value, which no kernel here does.
     return njit(cache=_usable is not None, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
 
 
 class _InnerKernel:
-    """A function that kernels call as it is compiled, and Python through a function around it."""
+    """Function that kernels call directly in its compiled form, and Python through a wrapper function."""
 
     def __init__(self, kernel: Callable[..., Any], **options: bool) -> None:
         functools.update_wrapper(self, kernel)
@@ -122,28 +122,31 @@ class _InnerKernel:
 
     @functools.cached_property
     def dispatcher(self) -> Any:
-        """Numba's, made when a kernel that calls it is compiled: kernels from the cache hold it already."""
+        """Numba's dispatcher, made when a kernel that calls it is compiled; cached kernels contain it already."""
         return _compiled(vars(self)["__wrapped__"], no_cpython_wrapper=True, **self._options)
 
     @functools.cached_property
-    def _around(self) -> Any:
+    def _python_wrapper(self) -> Any:
         kernel = self
         return _compiled(lambda *given: kernel(*given))
 
     def __reduce__(self) -> str:
-        """By its name, which tells the functions around others apart in the cache."""
+        """Return its name, which distinguishes the wrapper functions in the cache."""
         return str(vars(self)["__qualname__"])
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call it from Python, which would end the process without a wrapper."""
-        return self._around(*arguments)
+        """Call it from Python through the wrapper; without a wrapper the process would crash."""
+        return self._python_wrapper(*arguments)
 
 
 class _InnerType(numba.types.Dispatcher):  # type: ignore[misc]  # numba states no types
-    """Numba's type of a function that kernels call: one compiled form for a number, whatever literal stands there."""
+    """Numba's type of an inner function, which has one compiled form for all literal numbers of a type."""
 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
-        """As numba has it, which would compile a function anew for each literal number."""
+        """Return numba's call type without literals.
+
+        Numba alone compiles a function again for each literal number.
+        """
         plain = tuple(numba.types.unliteral(given) for given in args)
         return super().get_call_type(context, plain, {name: numba.types.unliteral(kws[name]) for name in kws})
 
@@ -158,9 +161,10 @@ def _type_of_inner_kernel(kernel: _InnerKernel, _: Any) -> _InnerType:
 
 @inlined
 def copy_into(out: NDArray[Any], values: NDArray[Any]) -> None:  # pragma: no cover - compiled
-    """Copy numbers (n,) into an array, or part of one, of the same length, which is not looked at.
+    """Copy numbers (n,) into an array, or part of one, of the same length, which is not checked.
 
-    Numba's ``out[:] = values`` looks at it, and compiles the text of its message, Unicode and all, into each kernel.
+    Numba's ``out[:] = values`` checks the length, and compiles its error message with Unicode handling into each
+    kernel.
 
     >>> out = np.zeros(2)
     >>> copy_into(out, np.array([3.0, 4.0]))
@@ -173,7 +177,7 @@ def copy_into(out: NDArray[Any], values: NDArray[Any]) -> None:  # pragma: no co
 
 @inner
 def sort_few(values: NDArray[Any]) -> None:  # pragma: no cover - compiled
-    """Sort numbers (n,) in place by insertion: a second of compiling less than numba's own sort, for a few numbers.
+    """Sort a few numbers (n,) in place by insertion, which compiles a second faster than numba's own sort.
 
     >>> some = np.array([3.0, 1.0, 2.0])
     >>> sort_few(some)
@@ -189,10 +193,10 @@ def sort_few(values: NDArray[Any]) -> None:  # pragma: no cover - compiled
 
 
 def read_only(array: _Array) -> _Array:
-    """The same numbers as an array that cannot be written.
+    """Return a view of the array that cannot be written.
 
-    Numba compiles a kernel anew for arrays that can be written and for those that cannot: one that is called with both
-    is called with this.
+    Numba compiles a kernel once for writable arrays and once for read-only arrays.  This function gives a kernel that
+    would be called with both only read-only arrays.
 
     >>> read_only(np.zeros(2)).flags.writeable
     False
@@ -203,9 +207,9 @@ def read_only(array: _Array) -> _Array:
 
 
 def record_dtype(*entries: str | tuple[Any, ...]) -> np.dtype[np.record]:
-    """Type of a record whose fields are read and set as attributes, in Python and in compiled code.
+    """Make the type of a record whose fields are read and set as attributes, in Python and in compiled code.
 
-    entries: in order: the name of a number (float64), or (name, type) or (name, type, shape) as numpy has them.
+    entries: in order: the name of a number (float64), or (name, type) or (name, type, shape) as in numpy.
 
     >>> POINT = record_dtype("east", "north", ("leg", np.int64), ("velocity", np.float64, (3,)))
     >>> points = np.zeros(2, POINT)
@@ -222,7 +226,7 @@ def record_dtype(*entries: str | tuple[Any, ...]) -> np.dtype[np.record]:
 
 
 def field_names(dtype: np.dtype[np.record]) -> tuple[str, ...]:
-    """Names of a record's fields, in order.
+    """Return the names of a record's fields, in order.
 
     >>> field_names(record_dtype("east", "north"))
     ('east', 'north')

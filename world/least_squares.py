@@ -1,7 +1,7 @@
-"""Least squares that round alike on every machine.
+"""Least squares with the same rounding on every machine.
 
-LAPACK and the BLAS below it choose their arithmetic by the processor: the last digits of a solution differ, and with
-them those of a track that starts from it.  Whatever a plan or a flight is computed from is solved here instead.
+LAPACK and its BLAS choose their arithmetic by the processor, so that the last digits of a solution differ, and with
+them the track that starts from it.  Least-squares problems behind a plan or a flight are solved here instead.
 """
 
 import numpy as np
@@ -11,16 +11,16 @@ from world.kernels import compiled, inner
 
 Floats = NDArray[np.float64]
 
-# Squared share of the longest column at which what a column has beside those before it is noise, not a direction.  The
-# finite differences of a trim leave up to 1e-8 of it in the column of a surface that an aircraft does not have.
-_DEPENDENT = 1e-12
+# A column is dependent if its squared orthogonal remainder is below this fraction of the longest squared column.  The
+# finite differences of a trim leave up to 1e-8 of its length in the column of a surface that an aircraft does not have.
+_DEPENDENT_NORM_RATIO = 1e-12
 
 
 def least_squares(basis: Floats, values: Floats) -> Floats:
-    """Coefficients (k,) that bring basis (n, k) closest to values (n,).
+    """Return the coefficients (k,) that bring basis (n, k) closest to values (n,).
 
     By modified Gram-Schmidt (Golub and Van Loan, Matrix Computations, 4th edition, algorithm 5.2.6).  The coefficient
-    of a column that depends on those before it, to 1e-6 of the longest, is 0.
+    of a column that depends on earlier columns, to 1e-6 of the longest column, is 0.
 
     >>> least_squares(np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]]), np.array([1.0, 3.0, 5.0])).round(9).tolist()
     [1.0, 2.0]
@@ -32,7 +32,7 @@ def least_squares(basis: Floats, values: Floats) -> Floats:
 @compiled
 def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover - compiled
     count, size = basis.shape
-    # Columns and values are made orthogonal together.
+    # Orthogonalise the columns and the values together.
     q, r = np.empty((count, size + 1)), np.zeros((size, size + 1))
     for n in range(count):
         for k in range(size):
@@ -44,7 +44,7 @@ def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover
         longest = max(longest, _dot(basis, k, k))
     for k in range(size):
         norm = _dot(q, k, k)
-        dependent[k] = norm <= _DEPENDENT * longest
+        dependent[k] = norm <= _DEPENDENT_NORM_RATIO * longest
         if dependent[k]:
             continue
         for j in range(k + 1, size + 1):
@@ -63,7 +63,7 @@ def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover
 
 @inner
 def _dot(columns: Floats, one: int, other: int) -> float:  # pragma: no cover - compiled
-    """The product of two columns."""
+    """Return the dot product of two columns."""
     total = 0.0
     for n in range(columns.shape[0]):
         total += columns[n, one] * columns[n, other]

@@ -1,4 +1,4 @@
-"""Positions of a scenario file on the map: its ends, its points on the ground, and its threats."""
+"""Place the positions of a scenario file on the map: its ends, its points on the ground, and its threats."""
 
 import math
 
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 def map_place(table: PositionTable, origin: GeoOrigin) -> tuple[float, float]:
-    """East and north of a position, m."""
+    """Return east and north of a position, m."""
     if table.east_m is not None and table.north_m is not None:
         return table.east_m, table.north_m
     east, north = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
@@ -23,9 +23,10 @@ def map_place(table: PositionTable, origin: GeoOrigin) -> tuple[float, float]:
 
 
 def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, ground: Terrain | None) -> Floats:
-    """East, north, up (3,) m of a position; a height above ground is counted from the terrain.
+    """Return east, north, up (3,) m of a position; a height above ground is added to the terrain.
 
-    key, source: of the table and its file, for messages.  Raises ScenarioError where there is no terrain to count from.
+    key, source: names of the table and its file in messages.  Raises ScenarioError for a height above ground without
+    terrain.
     """
     east, north = map_place(table, origin)
     if table.amsl_m is not None:
@@ -63,7 +64,7 @@ def check_inside(
 
 
 def check_above_ground(key: str, point: Floats, source: str, ground: Terrain | None) -> None:
-    """Raise ScenarioError for a point (3,) that is not above the terrain; none is where that is not known."""
+    """Raise ScenarioError for a point (3,) that is not above the terrain; unknown terrain raises no error."""
     under = float(ground.height(point[0], point[1])) if ground is not None else math.nan
     if point[2] <= under:
         allowed = f"not above the terrain, which is at {under:.0f} m"
@@ -73,7 +74,7 @@ def check_above_ground(key: str, point: Floats, source: str, ground: Terrain | N
 def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
     """Place the threats of a scenario file on the map, each on the ground unless it gives a height.
 
-    Raises ScenarioError for one that stands where there is no terrain, and gives no height above mean sea level.
+    Raises ScenarioError for a threat without an altitude AMSL at a place without terrain.
     """
     positions = np.zeros((len(tables), 3))
     for k, table in enumerate(tables):

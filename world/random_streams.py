@@ -1,17 +1,23 @@
-"""One seed, several independent streams of random numbers."""
+"""Several independent streams of random numbers from one seed."""
 
 import numpy as np
 
-PLANNER, TURBULENCE, NAVIGATION = 0, 1, 2
-_STREAMS = 3
+# Stream of the planner.
+PLANNER = 0
+# Stream of the turbulence.
+TURBULENCE = 1
+# Stream of the navigation errors.
+NAVIGATION = 2
+# Number of streams.
+_STREAM_COUNT = 3
 
 
 def stream(seed: int, number: int) -> np.random.Generator:
-    """Random numbers of one stream, `PLANNER`, `TURBULENCE` or `NAVIGATION`, all spawned from one seed.
+    """Return the generator of one stream, `PLANNER`, `TURBULENCE` or `NAVIGATION`, all spawned from one seed.
 
     >>> stream(1, PLANNER).integers(100, size=3).tolist()
     [1, 69, 82]
     >>> stream(1, TURBULENCE).integers(100, size=3).tolist()
     [94, 47, 14]
     """
-    return np.random.default_rng(np.random.SeedSequence(seed).spawn(_STREAMS)[number])
+    return np.random.default_rng(np.random.SeedSequence(seed).spawn(_STREAM_COUNT)[number])

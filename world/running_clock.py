@@ -1,16 +1,16 @@
-"""A clock that stands still while this process does: a laptop's sleep, Ctrl-Z and a debugger take no time of it."""
+"""Clock that stops while this process does not run: during a laptop's sleep, after Ctrl-Z, or in a debugger."""
 
 import time
 from collections.abc import Callable
 
-# A step longer than this (s) is one in which the process did not run, and counts as this.
+# Longest step between two readings, s; in a longer step the process did not run, and it is cut to this.
 LONGEST_STEP = 1.0
 
 
 class RunningClock:
-    """Seconds of real time that this process has run since the clock was made, as far as it is asked all the time.
+    """Seconds of real time that this process has run since the clock was made.
 
-    What is waited for and what is played goes on where it was.  Whoever waits asks it at least each `LONGEST_STEP` s.
+    The clock must be read at least every `LONGEST_STEP` s.  Timeouts and playback continue from where they stopped.
 
     >>> real = iter((100.0, 100.5, 4000.5, 4000.75))
     >>> clock = RunningClock(lambda: next(real))
@@ -19,7 +19,7 @@ class RunningClock:
     """
 
     def __init__(self, real: Callable[[], float] | None = None) -> None:
-        """real: gives seconds from anywhere; the system's monotonic clock unless told otherwise."""
+        """Start the clock.  real: returns seconds from any epoch; the system's monotonic clock by default."""
         self._real = real or time.monotonic
         self._last = self._real()
         self._seconds = 0.0

@@ -1,4 +1,4 @@
-"""A scenario: where to fly from and to, over which terrain, past which threats, within which limits."""
+"""A scenario: start and destination of a flight, terrain, threats, zones, wind and limits."""
 
 import math
 from collections.abc import Sequence
@@ -48,29 +48,28 @@ Floats = NDArray[np.float64]
 # ----------------------------------------------------------------------
 # The scenario itself, from an embedded name, a file, a plan or a log.
 
-# Ground beyond the area that is kept, m: a flight may overshoot a corner at the map's edge.
+# Width of terrain that is kept around the area, m: a flight may overshoot a corner at the map's edge.
 GROUND_BUFFER = 1000.0
 
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """One mission's world, in map axes (m) and radians.
+    """Environment of one mission, in map axes (m) and radians.
 
-    spec: the checked file it came from, with which `from_spec` makes it again.
-    origin: where east = north = 0.
+    spec: the checked file, from which `from_spec` makes the same scenario again.
+    origin: geographic position of east = north = 0.
     bounds: (2, 2) [[east0, east1], [north0, north1]].
     floor, ceiling: m AMSL.
     start, destination: (3,).
     start_course, destination_course: rad or None.
-    terrain: None where none was given (an external mission).
+    terrain: None if no terrain was given (an external mission).
     limits, planner, flight: the file's tables of these names.
-    zones: of airspace, to keep out of or to stay in.
-    external: made around a mission file that came without a scenario: its bounds are no limit and its empty
-    threats say nothing.
-    home: (3,) where the aircraft stands on the ground before the flight; None where none is stated.
-    launch, landing: how it leaves the ground at home and where it lands; None for a flight that begins, or ends, in
-    the air.
-    returns: what is asked and set of returns; None for nothing.
+    zones: airspace zones to keep out of or to stay in.
+    external: True if made around a mission file without a scenario: the bounds are then not a limit, and the empty
+    threats mean unknown threats.
+    home: (3,) place of the aircraft on the ground before the flight; None if not stated.
+    launch, landing: launch at home and landing strip; None for a flight that begins, or ends, in the air.
+    returns: requirements and settings of returns; None without any.
     """
 
     name: str
@@ -105,7 +104,7 @@ class Scenario:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What its zones are not taken as they stand in their files, and which of them are left out for the time."""
+        """Notes on zones that were changed or left out on reading, and on zones that are not active at the time."""
         notes = list(self.spec.zone_notes or ())
         timed = [table for table in self.spec.zones or () if table.times]
         if timed and self.spec.at is None:
@@ -123,14 +122,14 @@ class Scenario:
         return tuple(notes)
 
     def to_json(self) -> dict[str, Any]:
-        """The scenario as plain JSON data; `from_spec` reads it back."""
+        """Return the scenario as plain JSON data; `from_spec` reads it back."""
         stated = self.spec.model_copy(update={"flight": self.spec.flight.stated()})
         return stated.model_dump(mode="json", exclude_none=True)
 
 
 @cache
 def embedded_scenarios() -> dict[str, ScenarioFile]:
-    """The checked files of the scenarios that ship with planfly, by name, in a fixed order.
+    """Return the checked files of the scenarios that ship with planfly, by name, in a fixed order.
 
     >>> embedded_scenarios()["tight"].limits.min_clearance_m
     60.0
@@ -170,7 +169,7 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
 
 
 def _files_beside(path: Path) -> list[str]:
-    """Scenario files where one was looked for, as it was named."""
+    """Return the scenario files in the folder of a missing file, named as the missing file was."""
     try:
         return [str(file) for file in sorted(path.parent.glob("*.toml"))]
     except OSError:
@@ -178,7 +177,7 @@ def _files_beside(path: Path) -> list[str]:
 
 
 def embedded_names() -> list[str]:
-    """Names of the scenarios that ship with planfly, the default first.
+    """Return the names of the scenarios that ship with planfly, the default first.
 
     >>> embedded_names()[0]
     'jacksboro'
@@ -197,12 +196,12 @@ def from_spec(
     ground: Terrain | None = None,
     external: bool = False,
 ) -> Scenario:
-    """Make a scenario of a checked file, or of what `Scenario.to_json` gave.
+    """Make a scenario from a checked file, or from the data of `Scenario.to_json`.
 
-    source: names the file in messages.
-    base: folder that relative paths count from.
+    source: name of the file in messages.
+    base: folder of relative paths.
     terrain: an elevation file that replaces the scenario's own.
-    ground: terrain already at hand (from a log).
+    ground: terrain that is already loaded (from a log).
     external: see `Scenario`.
     Raises ScenarioError and TerrainError as `load_scenario` does.
 
@@ -212,7 +211,7 @@ def from_spec(
     """
     spec = spec if isinstance(spec, ScenarioFile) else check_scenario(spec, source)
     if spec.zones_file is not None:
-        # Written down with the scenario's own, so that a log without the files makes the same scenario.
+        # Stored with the scenario's own zones, so that a log without the files makes the same scenario.
         found = read_zone_files(spec.zones_file, source, base)
         spec = spec.model_copy(update={"zones_file": None})
     else:
@@ -241,7 +240,7 @@ def from_spec(
     if ground is not None and spec.terrain.vertical_error_m is not None:
         ground = replace(ground, vertical_error=spec.terrain.vertical_error_m)
     spec = spec.model_copy(update={"flight": _with_whole_paths(spec.flight, base)})
-    # What was taken from the tile is written down, so that a log without the tile makes the same scenario.
+    # Values taken from the tile are stored, so that a log without the tile makes the same scenario.
     place = checked_table(lambda: OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg), f"{source}: origin")
     area = spec.area or checked_table(
         lambda: AreaTable(east_m=bounds[0].tolist(), north_m=bounds[1].tolist()), f"{source}: area"
@@ -251,7 +250,7 @@ def from_spec(
 
 
 def _with_whole_paths(flight: FlightTable, base: Path | None) -> FlightTable:
-    """The table with the folder of its aircraft and its file of parameters as absolute paths."""
+    """Return the table with absolute paths of the aircraft's folder and the parameter file."""
     changes = {}
     if names_folder(flight.aircraft):
         changes["aircraft"] = whole_path(Path(base or "", flight.aircraft))
@@ -261,7 +260,7 @@ def _with_whole_paths(flight: FlightTable, base: Path | None) -> FlightTable:
 
 
 def _with_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:
-    """Replace the terrain by a file, and keep the map where it is: its origin may be the old tile's centre."""
+    """Replace the terrain by a file and keep the map's origin, which may be the centre of the old tile."""
     changes: dict[str, Any] = {
         "terrain": checked_table(lambda: TerrainTable(kind="dem", path=terrain), "terrain"),
     }
@@ -276,7 +275,7 @@ def _with_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | No
 def _with_file_zones(
     spec: ScenarioFile, found: FileZones, source: str, origin: GeoOrigin, bounds: Floats
 ) -> ScenarioFile:
-    """A scenario's file with the zones of other files beside its own, those that are near."""
+    """Add the zones of other files to a scenario's own zones, if they are near."""
     if not found.zones and not found.notes:
         return spec
     near = near_zones(found.zones, source, origin, bounds)
@@ -290,7 +289,7 @@ def _with_file_zones(
 
 
 def _active_zones(spec: ScenarioFile) -> list[ZoneTable]:
-    """The zones that may be active when the scenario is flown."""
+    """Return the zones that may be active during the flight."""
     if spec.at is None:
         return list(spec.zones or ())
     span = parse_span(spec.at)
@@ -298,7 +297,7 @@ def _active_zones(spec: ScenarioFile) -> list[ZoneTable]:
 
 
 def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[RasterFile, TerrainTable]:
-    """Open a scenario's elevation file, and say where it was found and what its hash is."""
+    """Open a scenario's elevation file, and return it with a table of its path and hash."""
     paths = [str(table.path)] if not isinstance(table.path, list) else table.path
     shown = ", ".join(paths)
     try:
@@ -328,12 +327,12 @@ def _assemble(
     ceiling = area.ceiling_amsl_m if area and area.ceiling_amsl_m is not None else top + 1000.0
     start = map_position(spec.start, "start", source, origin, ground)
     destination = map_position(spec.destination, "destination", source, origin, ground)
-    # Ends that another terrain buries are for the verdict to find.
+    # If the terrain was replaced, the verdict reports ends below the new ground.
     ends = () if replaced else (("start", start), ("destination", destination))
     for name, point in ends:
         check_inside(name, point, source, bounds, floor, ceiling, ground)
     zones = make_zones(_active_zones(spec), source, origin, ground)
-    # Of a mission that came without a scenario they are where it goes: for the verdict to find, too.
+    # The ends of an external mission are its own waypoints: the verdict reports zones that they violate.
     check_ends(zones, source, ends if zones and not external else (), ground)
     if not external and math.dist(start[:2], destination[:2]) < 10.0:
         raise ScenarioError(f"{source}: destination: less than 10 m from start", file=source, field="destination")
@@ -381,7 +380,7 @@ def _made_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:
 
 
 def geographic(scenario: Scenario, points: Floats) -> tuple[Floats, Floats]:
-    """Latitude and longitude in degrees of map positions (..., 3).
+    """Return latitude and longitude in degrees of map positions (..., 3).
 
     >>> scenario = load_scenario("tight")
     >>> lat, lon = geographic(scenario, scenario.destination)
@@ -396,9 +395,9 @@ def geographic(scenario: Scenario, points: Floats) -> tuple[Floats, Floats]:
 
 
 def over_terrain(scenario: Scenario, terrain: str) -> Scenario:
-    """A scenario over another elevation file.
+    """Return a scenario over another elevation file.
 
-    Its ends keep their heights above sea level; threats that stand on the ground stand on the new one.
+    Start and destination keep their altitudes AMSL; threats on the ground are placed on the new ground.
     Raises TerrainError for a file that cannot be read or does not cover the area.
 
     >>> over_terrain(load_scenario("jacksboro"), "jacksboro").terrain.source
@@ -409,9 +408,9 @@ def over_terrain(scenario: Scenario, terrain: str) -> Scenario:
 
 
 def fixed_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
-    """A scenario's JSON data with its ends at the heights of these points (m AMSL), whatever is below them.
+    """Return a scenario's JSON data with its ends at the altitudes of these points (m AMSL).
 
-    start, destination: (3,).  A height above ground (`height_m`) gives way to the one above mean sea level.
+    start, destination: (3,).  The altitude replaces a height above ground (`height_m`).
 
     >>> data = {"start": {"east_m": 0.0, "north_m": 0.0, "height_m": 50.0}, "destination": {"amsl_m": 300.0}}
     >>> fixed_ends(data, np.array([0.0, 0.0, 250.0]), np.array([900.0, 0.0, 300.0]))["start"]
@@ -426,10 +425,10 @@ def fixed_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict
 
 
 def with_wind(scenario: Scenario, speed: float | None, from_course: float | None, turbulence: str | None) -> Scenario:
-    """A scenario in another wind; None keeps what it has.
+    """Return a scenario in another wind; None keeps the present value.
 
-    speed: m/s, with from_course: rad, where it comes from.  turbulence: "none", "light" or "moderate".
-    Raises ScenarioError for a wind that a scenario file may not have either.
+    speed: m/s, with from_course: direction that the wind blows from, rad.  turbulence: "none", "light" or "moderate".
+    Raises ScenarioError for a wind that is not allowed in a scenario file.
 
     >>> with_wind(load_scenario("tight"), 5.0, math.radians(270.0), "light").wind.at(75.0)
     (5.0, ...)
@@ -452,10 +451,10 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
 
 
 def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
-    """A scenario with other entries of [flight]; None keeps what it has.
+    """Return a scenario with other entries of [flight]; None keeps the present value.
 
-    A law of guidance takes the place of an autopilot and its parameters, and they take that of a law.
-    Raises ScenarioError for a value that a scenario file may not have either.
+    A guidance law replaces an autopilot and its parameters, and an autopilot or parameters replace a guidance law.
+    Raises ScenarioError for a value that is not allowed in a scenario file.
 
     >>> with_flight(load_scenario("tight"), airspeed_mps=28.0, nav=None).flight.airspeed_mps
     28.0
@@ -463,7 +462,7 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
     given = {key: value for key, value in changes.items() if value is not None}
     kept = scenario.flight.model_dump() | ({"aircraft_by_default": None} if "aircraft" in given else {})
     if "guidance" in given or "params" in given or "autopilot" in given:
-        # Parameters alone are of the autopilot that the scenario names, where that takes any.
+        # Parameters alone belong to the autopilot that the scenario names, if it has parameters.
         taken = kept["autopilot_from"] is not None or kept["autopilot"] in (None, OWN_GUIDANCE)
         named = bool(set(given) & {"guidance", "autopilot"}) or taken
         kept |= {"guidance": None, "params": None, "autopilot_from": None}
@@ -473,7 +472,7 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
 
 
 def in_the_air(scenario: Scenario) -> Scenario:
-    """A scenario whose flights begin and end in the air, whatever launch and strip it has.
+    """Return a scenario without launch and landing: its flights begin and end in the air.
 
     >>> field = in_the_air(load_scenario("jacksboro-field"))
     >>> field.launch, field.landing, "landing" in field.to_json()
@@ -486,10 +485,11 @@ def in_the_air(scenario: Scenario) -> Scenario:
 
 
 def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, notes: Sequence[str] = ()) -> Scenario:
-    """A scenario with more zones, those that are near; source: names them in messages.  notes: on their file.
+    """Return a scenario with additional zones, if they are near.
 
-    Raises ScenarioError for a shape that is none, for a level above ground where there is no terrain, and for more
-    zones than a scenario may have; and, but in a scenario made around a mission, for a zone that an end violates.
+    source: name of the zones in messages.  notes: notes on reading their file.
+    Raises ScenarioError for an invalid shape, for a level above ground without terrain, and for more zones than a
+    scenario may have; also for a zone that an end violates, except in an external scenario.
 
     >>> mast = ZoneTable(name="mast", kind="exclusion", east_m=1300.0, north_m=400.0, radius_m=200.0)
     >>> [zone.name for zone in with_zones(load_scenario("tight"), [mast], "masts.geojson").zones]
@@ -509,9 +509,10 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, not
 
 
 def at_time(scenario: Scenario, at: str | None) -> Scenario:
-    """A scenario flown at a time, as `world.airspace.zone_times.parse_span` reads it; None keeps its own.
+    """Return a scenario flown at a time, as `world.airspace.zone_times.parse_span` reads it.
 
-    Raises ScenarioError for what is no such time.
+    None keeps its own.
+    Raises ScenarioError for an invalid time.
 
     >>> at_time(load_scenario("tight"), "2026-05-01T10:00Z").spec.at
     '2026-05-01T10:00Z'
@@ -533,12 +534,12 @@ def with_threats(
     source: str,
     kept: Sequence[ThreatTable] = (),
 ) -> Scenario:
-    """A scenario with more threats on its ground.
+    """Return a scenario with additional threats on the ground.
 
-    added: east, north, kill radius and detection radius of each, m; a radius of 0 for none.  Their scales are the
-    median shares of the radius of those that the scenario has, or a quarter and a third.
-    source: names them in messages.  kept: tables that come before them.
-    Raises ScenarioError for a threat that a scenario file may not have either.
+    added: east, north, kill radius and detection radius of each, m; a radius of 0 for no missile or radar.  The ratio
+    of scale to radius is the median of the scenario's threats, or a quarter for kill and a third for detection.
+    source: name of the threats in messages.  kept: tables to insert before the added threats.
+    Raises ScenarioError for a threat that is not allowed in a scenario file.
 
     >>> more = with_threats(load_scenario("tight"), [(1300.0, 90.0, 20.0, 0.0)], "--threat")
     >>> more.threats.names[-1], float(more.threats.kill_radius[-1])
@@ -565,9 +566,9 @@ def with_threats(
 
 
 def with_planner(scenario: Scenario, source: str, **changes: Any) -> Scenario:
-    """A scenario with other keys of [planner]; ``source`` names them in messages.
+    """Return a scenario with other keys of [planner]; ``source`` names them in messages.
 
-    Raises ScenarioError for a value that a scenario file may not have either.
+    Raises ScenarioError for a value that is not allowed in a scenario file.
 
     >>> with_planner(load_scenario("tight"), "--seed", seed=7).planner.seed
     7

@@ -1,4 +1,4 @@
-"""A scenario file to begin with: from here to there over this ground, commented, and with examples to switch on."""
+"""Make a commented scenario file to begin with, from two places and their terrain, with examples to switch on."""
 
 import json
 import math
@@ -17,22 +17,34 @@ from world.raster_file import RasterFile
 
 Floats = NDArray[np.float64]
 
-# Terrain on either side of the straight line, for detours: as a share of the line's length, and its limits, m;
-# less of it where there is no data further away.
-_MARGIN_SHARE, _MIN_MARGIN, _MAX_MARGIN = 0.3, 1500.0, 15_000.0
-_SMALLER = (1.0, 0.5, 0.25, 0.12)
-# Least distance of an end from the edge of the elevation file, and least and greatest distance between the ends, m.
-_EDGE, _NEAREST, _FURTHEST = 100.0, 100.0, 300_000.0
-# Latitude of a map's origin at most, degrees.
-_HIGHEST = 89.0
-# Room above the highest ground and the ends, and the step that the ceiling is rounded up to, m.
-_HEADROOM, _CEILING_STEP = 300.0, 50.0
-# What paths keep above ground, m, and at most as a share of the height of the ends.
-_CLEARANCE, _CLEARANCE_SHARE = 60.0, 0.5
+# Width of terrain on either side of the straight line, for detours, as a fraction of the line's length.
+_MARGIN_FRACTION = 0.3
+# Smallest such width, m.
+_MIN_MARGIN_M = 1500.0
+# Largest such width, m.
+_MAX_MARGIN_M = 15_000.0
+# Fractions of the width that are tried in turn, as the elevation file may have no data further away.
+_MARGIN_REDUCTIONS = (1.0, 0.5, 0.25, 0.12)
+# Smallest distance of an end from the edge of the elevation file, m.
+_EDGE_M = 100.0
+# Smallest distance between the ends, m.
+_MIN_LENGTH_M = 100.0
+# Largest distance between the ends, m.
+_MAX_LENGTH_M = 300_000.0
+# Largest latitude of a map's origin, degrees.
+_MAX_LATITUDE_DEG = 89.0
+# Height of the ceiling above the highest ground and the ends, m.
+_HEADROOM_M = 300.0
+# The ceiling is rounded up to a multiple of this, m.
+_CEILING_STEP_M = 50.0
+# Clearance of paths above ground, m.
+_CLEARANCE_M = 60.0
+# Largest clearance as a fraction of the height of the ends.
+_CLEARANCE_FRACTION = 0.5
 
 
 class Place(NamedTuple):
-    """Degrees north and east."""
+    """Latitude and longitude, degrees."""
 
     lat: float
     lon: float
@@ -40,12 +52,12 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """What a scenario file to begin with states.
+    """Contents of a scenario file to begin with.
 
-    terrain: as its path is written there; None for flat ground at mean sea level.
-    start, destination: at `height` m above ground.
+    terrain: path as the file states it; None for flat ground at mean sea level.
+    start, destination: places at `height` m above ground.
     box: [[east0, east1], [north0, north1]] m about `origin`.  ceiling: m above mean sea level.
-    aircraft, autopilot, px4_version: as in [flight].  airspeed: the aircraft's cruise speed, m/s.
+    aircraft, autopilot, px4_version: as in [flight].  airspeed: cruise speed of the aircraft, m/s.
     """
 
     name: str
@@ -63,8 +75,8 @@ class Draft:
 
     @property
     def clearance(self) -> float:
-        """What a path keeps above the ground, m."""
-        return min(_CLEARANCE, _CLEARANCE_SHARE * self.height)
+        """Clearance of a path above the ground, m."""
+        return min(_CLEARANCE_M, _CLEARANCE_FRACTION * self.height)
 
 
 def make_draft(
@@ -82,28 +94,29 @@ def make_draft(
 ) -> Draft:
     """Lay out a scenario from one place to another.
 
-    height: of both above ground, m.  raster: its ground, None for flat ground; terrain: as its path is written down.
-    The area takes in the straight line and a third of its length about it, as far as the elevation file covers it, and
-    less where it has no data there.
-    Raises ArgumentError for places that are outside of the file, too near or too far from each other, and TerrainError
-    where there is no data even near the line.
+    height: height of both above ground, m.
+    raster: elevation file, None for flat ground.  terrain: its path as the scenario file states it.
+    The area extends about a third of the line's length to all sides of the straight line, within the elevation file,
+    and less if the file has no data there.
+    Raises ArgumentError for places that are outside the file, or too near to or too far from each other, and
+    TerrainError if there is no data even near the line.
     """
     east, north = (float(value) for value in to_map(GeoOrigin(*start), destination.lat, destination.lon))
     length = math.hypot(east, north)
-    if not _NEAREST <= length <= _FURTHEST:
-        allowed = f"{_NEAREST:g} m to {_FURTHEST / 1000.0:g} km from `start` are expected"
+    if not _MIN_LENGTH_M <= length <= _MAX_LENGTH_M:
+        allowed = f"{_MIN_LENGTH_M:g} m to {_MAX_LENGTH_M / 1000.0:g} km from `start` are expected"
         raise ArgumentError.of_argument("destination", destination, allowed, shown=_shown(destination, length))
     middle = to_geo(GeoOrigin(*start), east / 2.0, north / 2.0)
     origin = GeoOrigin(round(float(middle[0]), 5), round(float(middle[1]), 5))
-    if abs(origin.lat_deg) > _HIGHEST:
-        allowed = f"a way that stays within {_HIGHEST:g} degrees of latitude is expected"
+    if abs(origin.lat_deg) > _MAX_LATITUDE_DEG:
+        allowed = f"a way that stays within {_MAX_LATITUDE_DEG:g} degrees of latitude is expected"
         raise ArgumentError.of_argument("destination", destination, allowed, shown=_shown(destination))
     ends = np.array([to_map(origin, *place) for place in (start, destination)])
-    widest = min(max(_MARGIN_SHARE * length, _MIN_MARGIN), _MAX_MARGIN)
-    highest, box = 0.0, _about(ends, widest)
+    widest = min(max(_MARGIN_FRACTION * length, _MIN_MARGIN_M), _MAX_MARGIN_M)
+    highest, box = 0.0, _box_about(ends, widest)
     if raster is not None:
         box, highest = _ground_about(raster, origin, {"start": start, "destination": destination}, ends, widest)
-    ceiling = math.ceil((highest + height + _HEADROOM) / _CEILING_STEP) * _CEILING_STEP
+    ceiling = math.ceil((highest + height + _HEADROOM_M) / _CEILING_STEP_M) * _CEILING_STEP_M
     box = np.stack([np.ceil(box[:, 0] / 10.0), np.floor(box[:, 1] / 10.0)], axis=1) * 10.0
     return Draft(
         name, terrain, start, destination, height, origin, box, ceiling, aircraft, airspeed, autopilot, px4_version
@@ -113,27 +126,27 @@ def make_draft(
 def _ground_about(
     raster: RasterFile, origin: GeoOrigin, places: Mapping[str, Place], ends: Floats, widest: float
 ) -> tuple[Floats, float]:
-    """The area (2, 2) about two places that an elevation file has data of, and the highest ground in it, m.
+    """Return the area (2, 2) about two places for which an elevation file has data, and its highest ground, m.
 
-    places: by their keywords; ends: (2, 2) the same on the map, m.  widest: ground beside them, m.
-    Raises ArgumentError for a place that the file does not cover, and TerrainError.
+    places: the two places by their keywords; ends: (2, 2) the same on the map, m.  widest: width of ground on all
+    sides, m.  Raises ArgumentError for a place that the file does not cover, and TerrainError.
     """
-    for share in _SMALLER:
-        box = _within_file(_about(ends, share * widest), raster, origin)
+    for share in _MARGIN_REDUCTIONS:
+        box = _within_file(_box_about(ends, share * widest), raster, origin)
         for (keyword, place), end in zip(places.items(), ends, strict=True):
-            if not ((box[:, 0] + _EDGE <= end) & (end <= box[:, 1] - _EDGE)).all():
-                allowed = f"outside {raster.name} or within {_EDGE:g} m of its edge: it covers {cover_text(raster)}"
+            if not ((box[:, 0] + _EDGE_M <= end) & (end <= box[:, 1] - _EDGE_M)).all():
+                allowed = f"outside {raster.name} or within {_EDGE_M:g} m of its edge: it covers {cover_text(raster)}"
                 raise ArgumentError.of_argument(keyword, place, allowed, shown=_shown(place))
         try:
             return box, float(np.nanmax(read_terrain(raster, origin, box, 0.0).heights))
         except TerrainError:
-            if share == _SMALLER[-1]:
+            if share == _MARGIN_REDUCTIONS[-1]:
                 raise
     raise AssertionError
 
 
-def _about(ends: Floats, margin: float) -> Floats:
-    """The box (2, 2) about two places (2, 2), m."""
+def _box_about(ends: Floats, margin: float) -> Floats:
+    """Return the box (2, 2) about two places (2, 2) with a margin, m."""
     return np.stack([ends.min(axis=0) - margin, ends.max(axis=0) + margin], axis=1)
 
 
@@ -143,7 +156,7 @@ def _shown(place: Place, length: float | None = None) -> str:
 
 
 def _within_file(box: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats:
-    """A box (2, 2) cut to what the file covers."""
+    """Return a box (2, 2) cut to the area that the file covers."""
     if is_covered(raster, origin, box):
         return box
     bounds = tile_bounds(raster, origin)
@@ -151,11 +164,11 @@ def _within_file(box: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats:
 
 
 # ----------------------------------------------------------------------
-# The file.
+# Text of the file.
 
 
 def draft_text(draft: Draft) -> str:
-    """The scenario file of a draft, as text of TOML.
+    """Write the scenario file of a draft as TOML text.
 
     >>> place, there = Place(46.5, 8.0), Place(46.55, 8.05)
     >>> print(draft_text(make_draft("site", place, there, 120.0)).split("[area]")[0])
@@ -176,11 +189,13 @@ def draft_text(draft: Draft) -> str:
     <BLANKLINE>
     <BLANKLINE>
     """
-    return "\n".join((_head(draft), _terrain(draft), _way(draft), _limits(draft), _flown(draft), _examples(draft)))
+    return "\n".join(
+        (_head(draft), _terrain(draft), _area_and_ends(draft), _limits(draft), _flight_tables(draft), _examples(draft))
+    )
 
 
 def _text(value: str) -> str:
-    """A string of TOML: JSON's escapes are among TOML's."""
+    """Return a TOML string; JSON's escapes are valid in TOML."""
     return json.dumps(value, ensure_ascii=False)
 
 
@@ -224,7 +239,7 @@ kind = "dem"
 """
 
 
-def _way(draft: Draft) -> str:
+def _area_and_ends(draft: Draft) -> str:
     (east0, east1), (north0, north1) = (tuple(f"{value:.0f}" for value in side) for side in draft.box)
     ends = []
     for key, place, course in (
@@ -257,7 +272,7 @@ def _limits(draft: Draft) -> str:
 """
 
 
-def _flown(draft: Draft) -> str:
+def _flight_tables(draft: Draft) -> str:
     version = "" if draft.px4_version is None else f"\npx4_version = {_text(draft.px4_version)}"
     return f"""\
 [flight]
@@ -277,9 +292,11 @@ def _flown(draft: Draft) -> str:
 
 
 def _examples(draft: Draft) -> str:
-    """A threat and a zone beside the straight line, small enough to be gone round."""
+    """Return the commented examples: a threat and a zone near the straight line, small enough to fly around."""
     rounded = max(50.0, round(float(np.diff(draft.box, axis=1).min()) / 200.0) * 10.0)
-    threat, zone = (Place(*(float(x) for x in to_geo(draft.origin, *point))) for point in _beside(draft, rounded))
+    threat, zone = (
+        Place(*(float(x) for x in to_geo(draft.origin, *point))) for point in _example_places(draft, rounded)
+    )
     return f"""\
 # A threat: a missile, a radar, or both; on the ground unless a height is given.
 # [[threats]]
@@ -306,8 +323,8 @@ def _examples(draft: Draft) -> str:
 """
 
 
-def _beside(draft: Draft, radius: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """East and north of two places, one on either side of the straight line, a third of the way from its ends."""
+def _example_places(draft: Draft, radius: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return two places, one on either side of the straight line, a third of its length from each end, m."""
     ends = np.array([to_map(draft.origin, *place) for place in (draft.start, draft.destination)])
     along = ends[1] - ends[0]
     aside = np.array([-along[1], along[0]]) / (math.hypot(*along) or 1.0) * radius * 0.5

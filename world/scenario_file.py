@@ -1,4 +1,4 @@
-"""Scenario files read and checked, with errors of one line: file, key, value and what is allowed."""
+"""Read and check scenario files, with one-line errors: file, key, value and what is allowed."""
 
 import json
 import math
@@ -14,18 +14,20 @@ from world.scenario_tables import ScenarioFile
 
 Table = TypeVar("Table", bound=BaseModel)
 
-# Twenty thousand threats are 3 MB.
+# Maximum size of a file, bytes; twenty thousand threats are 3 MB.
 MAX_BYTES = 16 * 2**20
 
 
 def parse_scenario(text: str, source: str) -> ScenarioFile:
-    """Check the text of a TOML scenario file; ``source`` names it in messages.  One that names no aircraft says so.
+    """Check the text of a TOML scenario file; ``source`` names it in messages.
+
+    `aircraft_by_default` is set if the text names no aircraft.
 
     Raises ScenarioError with one line: file, key, value and what is allowed.
     """
     try:
         data = toml_table(text)
-    # Beside its own TOMLDecodeError: a number of thousands of digits, and brackets within brackets without end.
+    # Not only TOMLDecodeError: also for a number of thousands of digits, and for deeply nested brackets.
     except ValueError as error:
         raise ScenarioError(f"{source}: not valid TOML: {_line(error)}", file=source) from error
     terrain = data.get("terrain")
@@ -40,8 +42,9 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
 
 
 def check_scenario(data: Any, source: str) -> ScenarioFile:
-    """Check a scenario that is already a dictionary (from a plan or a log); ``source`` names it in messages.
+    """Check a scenario that is already a dictionary (from a plan or a log).
 
+    ``source`` names it in messages.
     Raises ScenarioError as `parse_scenario` does.
     """
     if not isinstance(data, dict):
@@ -55,7 +58,7 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
 
 
 def checked_table(make: Callable[[], Table], source: str) -> Table:
-    """Make a table of values that come from no checked file; raises ScenarioError that begins with ``source``."""
+    """Make a table of values from outside a checked file; a ScenarioError begins with ``source``."""
     try:
         return make()
     except ValidationError as error:
@@ -72,10 +75,10 @@ def read_scenario_text(path: Path) -> str:
 
 
 class Fault(NamedTuple):
-    """A value that a file may not have.
+    """Invalid value in a file.
 
-    field: its key.  value: as it is there; None where it is missing, or a table or a list.  allowed: what is expected.
-    text: all of it, as a message has it.
+    field: key of the value.  value: the value; None if it is missing, a table or a list.  allowed: the expected values.
+    text: the fault as it appears in a message.
     """
 
     field: str
@@ -84,17 +87,20 @@ class Fault(NamedTuple):
     text: str
 
     def at(self, source: str, part: str = "") -> dict[str, Any]:
-        """What makes a `PlanflyError` of it: source: the file.  part: what of the file it is in."""
+        """Return the arguments of a `PlanflyError`.  source: the file.
+
+        Part: the part of the file with the fault.
+        """
         begin = f"{source}: {part}" if part else source
         message = f"{begin}: {self.text}"
         return {"message": message, "file": source, "field": self.field, "value": self.value, "allowed": self.allowed}
 
 
 def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel] | None = None) -> Fault:
-    """First of the faults that pydantic found; its text is ``key: value: what is allowed``.
+    """Return the first fault that pydantic found; its text is ``key: value: what is allowed``.
 
-    data: what was checked; needed where a field takes more than one type, to tell its keys from pydantic's branches.
-    model: what it was checked as; needed to name the key that an unknown one may stand for.
+    data: the checked data; needed if a field takes several types, to separate its keys from pydantic's union branches.
+    model: the model of the data; needed to suggest a known key for an unknown one.
 
     >>> from pydantic import ValidationError
     >>> from world.scenario_tables import WindTable
@@ -105,11 +111,11 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
     Fault(field='speed_mps', value=41.0, allowed='allowed 0..40', text='speed_mps: 41.0: allowed 0..40')
     """
     found = error.errors(include_url=False)
-    # A key that is mistaken is missing, too: the mistake tells more.
+    # A misspelt key is reported as missing, too; the misspelling is the more useful message.
     mistaken = [item for item in found if item["type"] == "extra_forbidden" and _near(item["loc"], model)]
     first = (mistaken or found)[0]
     keys = [str(part) for part in (first["loc"] if data is None else _keys_found(first["loc"], data))]
-    # Of a check of ours the message is that of the error that it raised.
+    # A check of planfly raises its own error; use its message.
     message = str(first["ctx"]["error"]) if first["type"] == "value_error" else first["msg"]
     if first["type"] == "model_type":
         message = "a table is expected"
@@ -133,18 +139,18 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
 
 
 def _near(parts: Sequence[str | int], model: type[BaseModel] | None) -> str:
-    """Which key an unknown one may stand for, in words."""
+    """Return the suggestion of a known key for an unknown one, in words."""
     return "" if model is None else did_you_mean(str(parts[-1]), _keys_known(parts[:-1], model))
 
 
 def _keys_known(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]:
-    """Keys that a model knows in the table at a place, or in any below its first key."""
+    """Return the known keys of the tables at or below the first key of a place, or of the whole model."""
     table = model.model_fields.get(str(parts[0])) if parts else None
     if table is None:
         return list(model.model_fields)
     tables = [table.annotation]
     keys: list[str] = []
-    # Grows as it is walked: a table's fields may be tables, in lists and unions.
+    # The list grows during the loop, as a table's fields may be tables, in lists and unions.
     for kind in tables:
         tables += [arg for arg in get_args(kind) if arg not in tables]
         if isinstance(kind, type) and issubclass(kind, BaseModel):
@@ -155,7 +161,7 @@ def _keys_known(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]
 
 
 def _keys_found(parts: tuple[str | int, ...], data: Any) -> list[str | int]:
-    """The parts of a place that lead on in the data: of a union pydantic names the branch as well, which does not."""
+    """Return the parts of a place that are keys of the data, without the branches that pydantic names in unions."""
     found = []
     for part in parts:
         inside = range(len(data)) if isinstance(data, list) else data if isinstance(data, dict) else ()

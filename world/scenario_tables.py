@@ -1,4 +1,4 @@
-"""The tables of a scenario file as pydantic models: unknown keys, NaN and out-of-range values are refused.
+"""Tables of a scenario file as pydantic models: unknown keys, NaN and out-of-range values are refused.
 
 The models mirror the TOML key for key.  `world.scenario_file` reads a file into them, and `world.scenario` turns them
 into a `Scenario`.
@@ -13,27 +13,28 @@ from world.elevation_formats import MAX_TILES
 from world.height_datum import MAX_SEA_LEVEL, NamedDatum, StatedDatum
 
 # ----------------------------------------------------------------------
-# The numbers, names and choices that a scenario file holds, with their ranges, and what its tables share.
+# Numbers, names and choices of a scenario file with their allowed ranges, shared by its tables.
 
-# Positions lie within this distance of the map's origin, east or west and north or south, m.
+# Largest distance of a position from the map's origin along either axis, m.
 MAP_EXTENT = 500_000.0
 
 
 def no_line_break(text: str) -> str:
-    """The text, if it is one line."""
+    """Return the text; raise ValueError if it is not a single printable line."""
     if not text.isprintable():
         raise ValueError("control characters are not allowed")
     return text
 
 
 def within(low: float, high: float, *, above: bool = False, below: bool = False, also: str = "") -> AfterValidator:
-    """Allow ``low``..``high``, without ``low`` if ``above`` and without ``high`` if ``below``; the error says so.
+    """Make a validator that allows ``low``..``high`` and names this range in its error.
 
-    also: what else the field takes, for the message.
+    above, below: exclude ``low``, exclude ``high``.
+    also: text for the message about other values that the field takes.
     """
 
     def check(value: float) -> float:
-        # Written so that NaN fails.
+        # The comparisons are written so that NaN fails.
         if (low < value if above else low <= value) and (value < high if below else value <= high):
             return value
         first, last = ("above " if above else ""), ("below " if below else "")
@@ -54,7 +55,7 @@ Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(no_lin
 FilePath = Annotated[str, Field(min_length=1, max_length=4096), AfterValidator(no_line_break)]
 Guidance = Literal["path", "l1", "vector-field"]
 Navigation = Literal["perfect", "rtk", "gnss"]
-# Releases of PX4 whose laws differ.
+# PX4 releases with different control laws.
 Px4Version = Literal["1.16", "1.17"]
 NEWEST_PX4: Px4Version = "1.17"
 Seed = Annotated[int, within(0, 2**63 - 1)]
@@ -65,35 +66,37 @@ Angle = Annotated[float, within(0.0, 90.0, above=True, below=True, also=', or "a
 class ScenarioTable(BaseModel):
     """A table of a scenario file: unknown keys are refused."""
 
-    # Strict: pydantic would otherwise take true, "5" and "yes" for numbers and truths.  Each number states its own
-    # range, which NaN and the infinities are outside of.
+    # Strict mode: otherwise pydantic accepts true, "5" and "yes" as numbers and booleans.  Each number has its own
+    # range, which excludes NaN and the infinities.
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 # ----------------------------------------------------------------------
 # [[zones]] of a scenario file as a pydantic model.
 
-# Corners of a ring, and rings of a zone, at most.
-MAX_CORNERS, MAX_RINGS = 100_000, 1_000
-# Zones of a scenario at most, those of its files included.
+# Maximum number of corners of a ring.
+MAX_CORNERS = 100_000
+# Maximum number of rings of a zone.
+MAX_RINGS = 1_000
+# Maximum number of zones of a scenario, including the zones of its files.
 MAX_ZONES = 20_000
 
 
 def _latitude_first(corner: list[float]) -> list[float]:
-    """The corner, if its first number can be a latitude."""
+    """Return the corner; raise ValueError if its first number cannot be a latitude."""
     if not -89.0 <= corner[0] <= 89.0:
         raise ValueError(f"latitude {corner[0]:g}: allowed -89..89; a corner is [latitude, longitude]")
     return corner
 
 
 def _known_period(text: str) -> str:
-    """The text, if it states a period of time."""
+    """Return the text; raise ValueError if it does not state a period of time."""
     parse_period(text)
     return text
 
 
 def _known_span(text: str) -> str:
-    """The text, if it states when a flight begins, or from when to when it lasts."""
+    """Return the text; raise ValueError if it states neither a flight's start time nor its time span."""
     parse_span(text)
     return text
 
@@ -107,14 +110,14 @@ _DegreeRing = Annotated[list[_DegreeCorner], Field(max_length=MAX_CORNERS)]
 
 
 class ZoneTable(ScenarioTable):
-    """[[zones]]: a polygon, by its corners, or a cylinder, by its centre and radius; and its band of heights.
+    """[[zones]]: a polygon by its corners, or a cylinder by its centre and radius, with a vertical band.
 
     polygon_m: corners as [east, north]; polygon_deg: as [latitude, longitude].
-    rings_m, rings_deg: several such rings, for a zone with holes or of several parts: inside is what lies in an odd
-    number of them.
+    rings_m, rings_deg: several rings, for a zone with holes or several parts: a point is inside the zone if an odd
+    number of rings contain it.
     east_m, north_m or lat_deg, lon_deg, with radius_m: a cylinder.
-    floor, ceiling: above mean sea level or above ground; none where neither is given.
-    times: when it is active, as `world.airspace.zone_times` reads them; None for always.
+    floor, ceiling: above mean sea level or above ground; unbounded if neither is given.
+    times: periods in which the zone is active, as `world.airspace.zone_times` reads them; None for always.
     """
 
     name: Name
@@ -178,7 +181,7 @@ class PeakTable(ScenarioTable):
 
 
 def _known_datum(datum: StatedDatum) -> StatedDatum:
-    """A name of what heights count from, or a height of mean sea level that the file may have, m."""
+    """Return the datum; raise ValueError unless it is a known name or a plausible height of mean sea level, m."""
     names = get_args(NamedDatum)
     if datum in names or (not isinstance(datum, str) and abs(datum) <= MAX_SEA_LEVEL):
         return datum
@@ -187,7 +190,10 @@ def _known_datum(datum: StatedDatum) -> StatedDatum:
 
 
 def _file_or_tiles(path: object) -> object:
-    """A file's name, or a list of them; a union alone would say of either what the other is not."""
+    """Return the path; raise ValueError unless it is a file name or a list of file names.
+
+    A pydantic union alone would report one error for each of its members.
+    """
     listed = path if isinstance(path, list) else [path]
     if path is None or (1 <= len(listed) <= MAX_TILES and all(isinstance(one, str) and one for one in listed)):
         return path
@@ -195,11 +201,13 @@ def _file_or_tiles(path: object) -> object:
 
 
 class TerrainTable(ScenarioTable):
-    """[terrain]; kind "none" is made by planfly for a mission that came without terrain, never read from a file.
+    """[terrain].  Planfly sets kind "none" for a mission without terrain; a file cannot state it.
 
     path: an elevation file, a folder or .vrt of tiles, an embedded name, or a list of these on one grid.
-    vertical_error_m: of the heights, as their source states it; none where it is not stated, for no file says.
-    height_datum: what a file's heights count from, or the height of mean sea level in it, m; none takes what it says.
+    vertical_error_m: error of the heights as their source states it; None if not stated (elevation files do not
+    contain it).
+    height_datum: datum of the file's heights, or the height of mean sea level in the file, m; None for the datum that
+    the file states.
     """
 
     kind: Literal["dem", "peaks", "flat", "none"]
@@ -250,7 +258,7 @@ class AreaTable(ScenarioTable):
 
 
 def _one_position(table: "PositionTable") -> None:
-    """Refuse a position that is not given once, in metres or in degrees."""
+    """Raise ValueError unless the position is given exactly once, in metres or in degrees."""
     metres = (table.east_m is not None, table.north_m is not None)
     degrees = (table.lat_deg is not None, table.lon_deg is not None)
     if not ((all(metres) and not any(degrees)) or (all(degrees) and not any(metres))):
@@ -313,12 +321,12 @@ class ThreatTable(PointTable):
 
 
 class LimitsTable(ScenarioTable):
-    """[limits]: a number, or "aircraft" for what the envelope allows.
+    """[limits]: a number, or "aircraft" for the limit of the flight envelope.
 
-    corridor_m: half width of the corridor about the legs; where it is not given, what the autopilot needs.
-    surveys: whether parallel lines are judged as the photo "lines" of a survey, its turn-arounds left to the autopilot,
-    or as any "path"; where it is not given, as lines where the mission switches its camera on them.
-    max_height_m: above ground; none where it is not given.
+    corridor_m: half width of the corridor about the legs; None for the width that the autopilot needs.
+    surveys: "lines" to judge parallel lines as the photo lines of a survey and leave the turn-arounds to the autopilot,
+    "path" to judge them as any other path; None for "lines" where the mission triggers its camera on them.
+    max_height_m: above ground; None for no limit.
     """
 
     max_turn_deg: Annotated[float, within(0.0, 180.0, above=True, also=', or "aircraft"')] | Literal["aircraft"] = (
@@ -341,7 +349,7 @@ class LimitsTable(ScenarioTable):
 
 
 class GoalsTable(ScenarioTable):
-    """[planner] goals of the second level of preference."""
+    """[planner.goals]: goals of the second preference level."""
 
     length_ratio: Annotated[float, within(1.0, 100.0)] | None = None
     kill_exposure: Annotated[float, within(0.0, 1e9)] | None = None
@@ -350,8 +358,9 @@ class GoalsTable(ScenarioTable):
 class PlannerTable(ScenarioTable):
     """[planner].
 
-    zone_margin_m: what a plan keeps from zones, beside how far its autopilot strays; the planner's own where not given.
-    objective: what a plan makes small; its length where not given.
+    zone_margin_m: distance that a plan keeps from zones, in addition to the autopilot's tracking error; None for the
+    planner's default.
+    objective: quantity that a plan minimises; None for its length.
     """
 
     algorithm: Name | None = None
@@ -367,7 +376,7 @@ class PlannerTable(ScenarioTable):
 
 
 def names_folder(aircraft: str) -> bool:
-    """Whether an aircraft's name is that of a folder, not of an embedded aircraft: it has a slash.
+    """Return True if an aircraft's name is a folder (it has a slash), not an embedded aircraft.
 
     >>> names_folder("aerosonde"), names_folder("models/mine")
     (False, True)
@@ -375,21 +384,21 @@ def names_folder(aircraft: str) -> bool:
     return "/" in aircraft or "\\" in aircraft
 
 
-# Who flies where a scenario names neither an autopilot nor what belongs to one.
+# Autopilot of a scenario that names neither an autopilot nor an autopilot's settings.
 DEFAULT_AUTOPILOT = "ardupilot"
-# Planfly's own guidance, which alone has a choice of laws and takes no parameters.
+# Planfly's own guidance: the only one with a choice of laws, and the only one without parameters.
 OWN_GUIDANCE = "ideal"
-# The one whose releases can be told apart.
+# The only autopilot with a choice of release.
 _PX4 = "px4"
 
 
 class Steering(NamedTuple):
-    """Who flies.
+    """Autopilot, guidance law and navigation accuracy of a flight.
 
-    autopilot: "ardupilot" for ArduPlane's laws, "ideal" for planfly's guidance; the others that there are stand in
+    autopilot: "ardupilot" for ArduPlane's laws, "ideal" for planfly's guidance, or another one of
     `flight.autopilots.catalog`.
-    guidance: the law of "ideal", which no other autopilot asks for.
-    nav: how well it knows where it is, a key of `flight.guidance.navigation_error.ERRORS`.
+    guidance: the guidance law of "ideal"; other autopilots ignore it.
+    nav: navigation accuracy, a key of `flight.guidance.navigation_error.ERRORS`.
     """
 
     autopilot: str
@@ -398,22 +407,22 @@ class Steering(NamedTuple):
 
 
 class FlightTable(ScenarioTable):
-    """[flight]; what is None was not stated, and `steering` says what that comes to.
+    """[flight].  A None was not stated; `steering` replaces it with its default.
 
-    autopilot: who flies; guidance alone means "ideal", params alone "ardupilot".
-    autopilot_from: the file that names the autopilot where nobody did, see `planfly.file_autopilots`.
-    params: the autopilot's parameters, a file.
-    px4_version: of autopilot = "px4", whose releases fly differently; None for the newest.
-    guidance: the law of "ideal".
-    nav: how well the autopilot knows where it is, see `flight.guidance.navigation_error`.
+    autopilot: name of the autopilot; guidance alone means "ideal", params alone "ardupilot".
+    autopilot_from: file that the autopilot was inferred from, see `planfly.file_autopilots`.
+    params: file with the autopilot's parameters.
+    px4_version: release of autopilot = "px4", as releases fly differently; None for the newest.
+    guidance: guidance law of "ideal".
+    nav: navigation accuracy, see `flight.guidance.navigation_error`.
     """
 
-    aircraft: FilePath = "aerosonde"  # an embedded name, or a folder where there is a slash
-    aircraft_by_default: Literal[True] | None = None  # written for a mission of which nobody named the aircraft
+    aircraft: FilePath = "aerosonde"  # an embedded name, or a folder if it has a slash
+    aircraft_by_default: Literal[True] | None = None  # set if no aircraft was named for a mission
     airspeed_mps: Annotated[float, within(15.0, 60.0)] | None = None
     max_bank_deg: Annotated[float, within(5.0, 60.0)] = 30.0
     autopilot: Name | None = None
-    autopilot_from: FilePath | None = None  # written where the autopilot was taken from a file
+    autopilot_from: FilePath | None = None  # set if the autopilot was inferred from a file
     params: FilePath | None = None
     px4_version: Px4Version | None = None
     guidance: Guidance | None = None
@@ -436,7 +445,10 @@ class FlightTable(ScenarioTable):
 
     @property
     def steering(self) -> Steering:
-        """Who flies, and how well it knows where it is: planfly's guidance exactly, others by GNSS."""
+        """Autopilot, guidance law and navigation.
+
+        By default "perfect" for planfly's guidance, "gnss" for others.
+        """
         implied = DEFAULT_AUTOPILOT
         if self.guidance is not None:
             implied = OWN_GUIDANCE
@@ -447,7 +459,7 @@ class FlightTable(ScenarioTable):
         return Steering(autopilot, self.guidance or "path", self.nav or usual)
 
     def stated(self) -> "FlightTable":
-        """The same flight with nothing left to a default of who flies: as plans and logs hold it."""
+        """Return the same flight with autopilot, release and navigation stated, as plans and logs store it."""
         autopilot, guidance, nav = self.steering
         who: dict[str, str] = {"autopilot": autopilot} if autopilot != OWN_GUIDANCE else {"guidance": guidance}
         if autopilot == _PX4:
@@ -466,7 +478,7 @@ class WindTable(ScenarioTable):
 
 
 class HomeTable(PositionTable):
-    """[home]: where the mission begins on the ground: a position, or place = "start", below the start."""
+    """[home]: the place on the ground where the mission begins: a position, or place = "start" for below the start."""
 
     place: Literal["start"] | None = None
 
@@ -491,16 +503,17 @@ class HomeTable(PositionTable):
 
 
 LaunchMethod = Literal["catapult", "hand", "runway"]
-# Degrees above level: steeper ground than any strip that is landed on (`world.airfield.STEEPEST_STRIP`) is no runway.
+# Largest incline of a runway, degrees above level, as for a landing strip (`world.airfield.STEEPEST_STRIP`).
 STEEPEST_RUNWAY = 5.0
 
 
 class LaunchTable(ScenarioTable):
-    """[launch]: how the aircraft leaves the ground at home.
+    """[launch]: the launch of the aircraft at home.
 
-    course_deg: clockwise from north; along the mission's first leg where it is not given.
-    speed_mps: at the end of rail or throw.  length_m: of rail, throw or runway.  incline_deg: of it, above level.
-    What is not given is the method's default (`world.airfield`).
+    course_deg: clockwise from north; None for along the mission's first leg.
+    speed_mps: speed at the end of the rail or throw.
+    length_m, incline_deg: length of the rail, throw or runway, and its angle above level.
+    A value that is not given takes the method's default (`world.airfield`).
     """
 
     method: LaunchMethod
@@ -535,13 +548,13 @@ def _course_or_wind(value: Any) -> Any:
 
 
 class LandingTable(PositionTable):
-    """[landing]: the strip that the mission ends on.
+    """[landing]: the landing strip at the end of the mission.
 
-    course_deg: of the landing, clockwise from north, or "wind" for into the wind.
-    length_m, width_m: of the ground that can be landed on, its middle at the landing point.
-    approach_m: of the straight final before the landing point.
-    slope_deg: of the glide there, below level.
-    Where these two are not given, a plan takes what the autopilot and the aircraft can fly.
+    course_deg: landing course, clockwise from north, or "wind" for into the wind.
+    length_m, width_m: size of the strip, which is centred on the landing point.
+    approach_m: length of the straight final before the landing point.
+    slope_deg: glide slope of the final, below level.
+    If approach_m or slope_deg is not given, a plan chooses a value that the autopilot and the aircraft can fly.
     """
 
     course_deg: Annotated[
@@ -559,7 +572,7 @@ class LandingTable(PositionTable):
 
 
 class RallyTable(PointTable):
-    """[returns] rally: a point that a return may fly to, at a height above sea or above the ground there."""
+    """[returns] rally: a point that a return may fly to, at an altitude AMSL or a height above the ground there."""
 
     @model_validator(mode="after")
     def _has_height(self) -> "RallyTable":
@@ -569,25 +582,29 @@ class RallyTable(PointTable):
 
 
 def _autoland(value: Any) -> Any:
-    """A value of RTL_AUTOLAND: true and 1.0 are none, though either equals 1."""
+    """Return a value of RTL_AUTOLAND.
+
+    Raise ValueError for any other, also for true and 1.0, which equal 1.
+    """
     if type(value) is not int or value not in (1, 2, 3):
         raise ValueError("allowed 1, 2 or 3")
     return value
 
 
-# What a scenario may ask of the way home from everywhere: that RTL is safe; that a glide without the engine leads
-# somewhere; that a landing may be aborted.
+# Requirements on the return from every point of the mission: a safe RTL, an engine-off glide to a landing place, and a
+# landing that can be aborted.
 ReturnDemand = Literal["rtl", "glide", "go_around"]
 
 
 class ReturnsTable(ScenarioTable):
-    """[returns]: what a verdict asks of the way home from everywhere, and what a planned mission sets for it.
+    """[returns]: requirements of the verdict on returns from any point, and return settings of a planned mission.
 
-    require: "rtl" where every return to launch has to be safe, "glide" where an engine may stop anywhere, "go_around"
-        where a landing may be aborted anywhere on its glide.
-    rtl_altitude_m: over home, that a return climbs or descends to.
-    rtl_autoland: ArduPlane's: 1 for home and on to the landing, 2 for straight to the landing, 3 for a circle at home.
-    rally: points that are nearer than home.
+    require: "rtl" if every return to launch must be safe, "glide" if the engine may fail anywhere, "go_around" if a
+        landing may be aborted anywhere on its glide.
+    rtl_altitude_m: height above home that a return climbs or descends to.
+    rtl_autoland: ArduPlane's RTL_AUTOLAND: 1 for home and then the landing, 2 for straight to the landing, 3 for a
+        loiter at home.
+    rally: return points that are nearer than home.
     """
 
     require: list[ReturnDemand] | None = None
@@ -605,14 +622,14 @@ class ReturnsTable(ScenarioTable):
 
 
 class ScenarioFile(ScenarioTable):
-    """A whole scenario file.
+    """A complete scenario file.
 
-    zones: None where there are none, so that what is written of a scenario without them stays as it was.
-    zones_file: a file of zones or several; in a made scenario their zones stand among the others, and `zone_notes` says
-    what of the files is not taken as it stands.
-    at: when it is flown, as `world.airspace.zone_times` reads it: zones that are not active then are left out.
+    zones: None if there are no zones, so that the written form of a scenario without zones does not change.
+    zones_file: one or several files of zones; a made scenario has their zones in `zones`, and `zone_notes` lists what
+    was changed or left out on reading them.
+    at: time of the flight, as `world.airspace.zone_times` reads it; zones that are not active then are left out.
     home, launch, landing: None for a mission that begins and ends in the air.
-    returns: None where nothing is asked of them, as zones.
+    returns: None if there are no requirements on returns.
     """
 
     name: Name

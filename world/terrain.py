@@ -1,7 +1,7 @@
 """Terrain heights on a raster, at any point and exactly along a segment.
 
-The raster stays in its own grid at its source resolution; map positions are taken into pixel coordinates by a
-`PolyMap`, and heights are bilinear between pixel centres.
+The raster keeps its own grid and source resolution; a `PolyMap` converts map positions to pixel coordinates, and
+heights are bilinear between pixel centres.
 """
 
 import math
@@ -18,25 +18,25 @@ from world.kernels import compiled, inlined
 Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
 
-# Segments are cut into pieces no longer than this (m) before they count as straight in the raster's grid: at
-# 60 degrees latitude a 500 m piece bows by 9 mm.
+# Longest piece of a segment that is treated as straight in the raster's grid, m: at 60 degrees latitude a 500 m piece
+# bows by 9 mm.
 STRAIGHT_PIECE = 500.0
-# What the map of positions to pixels may be out by: a place on the edge is not outside for it (pixels).
+# Error tolerance of the map from positions to pixels, pixels: a place on the edge is not outside because of it.
 EDGE = 2e-3
-# Pixels along a side of the tiles whose steepest slope is noted.
+# Side of the tiles with a stored steepest slope, pixels.
 TILE = 16
 
 
 @dataclass(frozen=True, slots=True)
 class Terrain:
-    """Measured or made ground heights above mean sea level.
+    """Measured or synthetic ground heights above mean sea level.
 
     heights: (rows, cols) float32 m at pixel centres, NaN where there is no data.
     to_pixel: map (east, north) to fractional (col, row).
     spacing: the finer pixel pitch, m.
-    source, sha256: where it came from.
+    source, sha256: name and hash of the elevation file.
     datum: the vertical datum as stated.
-    vertical_error: stated error, m, or None where none is stated.
+    vertical_error: stated error, m, or None if not stated.
     """
 
     heights: Heights
@@ -56,18 +56,18 @@ class Terrain:
         object.__setattr__(self, "heights", heights)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """In another process its raster is locked, too: compiled code has other types for arrays that are not."""
+        """Pickle with a function that locks the raster again, as compiled code distinguishes writable arrays."""
         return _locked, tuple(getattr(self, field.name) for field in fields(self))
 
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
-        """Ground height in m at map positions, any shape; NaN outside the raster or on nodata."""
+        """Return the ground height in m at map positions, any shape; NaN outside the raster or on nodata."""
         es, ns = np.broadcast_arrays(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64))
         return _heights_many(self.heights, self.to_pixel.record, es.ravel(), ns.ravel()).reshape(es.shape)
 
     def clearance(self, a: ArrayLike, b: ArrayLike) -> tuple[float, float]:
-        """Smallest height above ground on the segment a-b, and the fraction of it where that is.
+        """Return the smallest height above ground on the segment a-b, and the fraction of the segment there.
 
-        a, b: (3,) m.  Exact for the bilinear surface.  NaN where the segment leaves the raster or its data.
+        a, b: (3,) m.  Exact for the bilinear surface.  NaN if the segment leaves the raster or its data.
         """
         start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
         low, at = segment_clearance(self.heights, self.to_pixel.record, start, end)
@@ -81,7 +81,10 @@ def _locked(heights: Heights, *others: Any) -> Terrain:
 
 @inlined
 def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: no cover - compiled
-    """Bilinear height at fractional pixel coordinates; NaN further than `EDGE` outside the outermost pixel centres."""
+    """Return the bilinear height at fractional pixel coordinates.
+
+    NaN over `EDGE` beyond the outer pixel centres.
+    """
     rows, cols = heights.shape
     if not (-EDGE <= col <= cols - 1 + EDGE and -EDGE <= row <= rows - 1 + EDGE):
         return math.nan
@@ -89,7 +92,7 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: 
     j = min(int(col), cols - 2)
     v = row - i
     u = col - j
-    # Unsigned: numba would look whether each index counts from the end.
+    # Unsigned, so that numba does not check each index for being negative.
     above, below, left, right = np.uintp(i), np.uintp(i + 1), np.uintp(j), np.uintp(j + 1)
     top = heights[above, left] * (1.0 - u) + heights[above, right] * u
     low = heights[below, left] * (1.0 - u) + heights[below, right] * u
@@ -99,9 +102,9 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: 
 
 @compiled
 def steepest_slopes(heights: Heights, pitch: float) -> Heights:  # pragma: no cover - compiled
-    """Steepest slope that the bilinear ground can have in each tile of `TILE` x `TILE` cells between pixels, m per m.
+    """Return the steepest possible slope of the bilinear ground in each tile of `TILE` x `TILE` cells, m per m.
 
-    From the steps between pixels and their pitch (m).  NaN adds nothing.
+    From the steps between pixels and their pitch (m).  NaN is ignored.
     """
     rows, cols = heights.shape
     out = np.zeros(((rows - 2) // TILE + 1, (cols - 2) // TILE + 1), dtype=np.float32)
@@ -110,12 +113,12 @@ def steepest_slopes(heights: Heights, pitch: float) -> Heights:  # pragma: no co
             across = max(abs(heights[i, j + 1] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i + 1, j]))
             down = max(abs(heights[i + 1, j] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i, j + 1]))
             steep = across * across + down * down
-            # NaN compares as less.
+            # False for NaN.
             if steep > out[i // TILE, j // TILE]:
                 out[i // TILE, j // TILE] = steep
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
-            # A hair more, for what single precision rounds.
+            # Slightly more, to cover the rounding of single precision.
             out[i, j] = math.sqrt(out[i, j]) / pitch * (1.0 + 1e-6)
     return out
 
@@ -124,7 +127,7 @@ def steepest_slopes(heights: Heights, pitch: float) -> Heights:  # pragma: no co
 def ground_height(
     heights: Heights, to_pixel: PolyMapRecord, east: float, north: float
 ) -> float:  # pragma: no cover - compiled
-    """Ground height at one map position; NaN outside the raster."""
+    """Return the ground height at one map position; NaN outside the raster."""
     col, row = polymap(to_pixel, east, north)
     return pixel_height(heights, col, row)
 
@@ -141,7 +144,10 @@ def _heights_many(heights: Heights, to_pixel: PolyMapRecord, east: Floats, north
 def segment_clearance(
     heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Smallest height above the bilinear ground on a-b and its fraction; (NaN, fraction) off the raster."""
+    """Return the smallest height above the bilinear ground on a-b and its fraction.
+
+    (NaN, fraction) off the raster.
+    """
     pieces = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE))
     best = math.inf
     best_at = 0.0
@@ -164,7 +170,7 @@ def segment_clearance(
 
 @inlined
 def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no cover - compiled
-    """Next fraction after t at which start + t * step is a whole number; inf if it never is."""
+    """Return the next fraction after t at which start + t * step is a whole number; inf if it never is."""
     if step == 0.0:
         return math.inf
     here = start + t * step
@@ -176,9 +182,10 @@ def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no 
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Smallest height above ground on a piece straight in pixels, and its fraction; (NaN, fraction) off the data.
+    """Return the smallest height above ground on a piece straight in pixels, and its fraction.
 
-    col, row, up: of its two ends.  Within a cell the height above the bilinear ground is a parabola.
+    Off the data it returns (NaN, fraction).
+    col, row, up: coordinates of the two ends.  Within a cell the height above the bilinear ground is a parabola.
     """
     dc, dr, du = col1 - col0, row1 - row0, up1 - up0
     t = 0.0
@@ -197,7 +204,7 @@ def _piece_clearance(
             return math.nan, mid
         if g1 < best:
             best, best_at = g1, end
-        # The parabola through the three values; its vertex counts if it lies between them.
+        # The parabola through the three values; its vertex is used if it lies between them.
         bend = 2.0 * (g0 - 2.0 * gm + g1)
         if bend > 0.0:
             x = (3.0 * g0 - 4.0 * gm + g1) / (2.0 * bend)
@@ -211,7 +218,7 @@ def _piece_clearance(
 
 
 def gridded(function_heights: Floats, east: Floats, north: Floats, *, source: str, sha256: str, datum: str) -> Terrain:
-    """Terrain on a regular map grid: heights (n, e) at north (n,) and east (e,), both increasing and even."""
+    """Make terrain on a regular map grid: heights (n, e) at north (n,) and east (e,), both increasing and even."""
     step_e, step_n = east[1] - east[0], north[1] - north[0]
     to_pixel = fit_polymap(
         lambda e, n: ((e - east[0]) / step_e, (n - north[0]) / step_n),
@@ -222,14 +229,14 @@ def gridded(function_heights: Floats, east: Floats, north: Floats, *, source: st
 
 
 def flat_terrain(bounds: Floats, amsl: float, buffer: float) -> Terrain:
-    """Level ground over bounds [[e0, e1], [n0, n1]] and a buffer about them, m."""
+    """Make level ground over bounds [[e0, e1], [n0, n1]] and a buffer around them, m."""
     east = np.linspace(bounds[0, 0] - buffer, bounds[0, 1] + buffer, 3)
     north = np.linspace(bounds[1, 0] - buffer, bounds[1, 1] + buffer, 3)
     return gridded(np.full((3, 3), amsl), east, north, source=f"flat at {amsl:g} m", sha256="", datum="mean sea level")
 
 
 class Peak(NamedTuple):
-    """A Gaussian hill: its summit's place and height, and its standard deviation, all m."""
+    """Gaussian hill: place and height of its summit, and its standard deviation, m."""
 
     east: float
     north: float
@@ -238,10 +245,10 @@ class Peak(NamedTuple):
 
 
 def peaks_terrain(bounds: Floats, peaks: Sequence[Peak], buffer: float) -> Terrain:
-    """Sum of Gaussian hills on level ground at sea level, over bounds [[e0, e1], [n0, n1]] and a buffer about them, m.
+    """Sum Gaussian hills on level ground at sea level, over bounds [[e0, e1], [n0, n1]] and a buffer around them, m.
 
-    Gridded at a sixteenth of the smallest sigma (at most 1,500
-    pixels a side), which holds each summit to 0.05 % of its height.
+    The grid pitch is a sixteenth of the smallest sigma (at most 1,500 pixels a side), which keeps each summit within
+    0.05 % of its height.
     """
     width = max(float(np.ptp(bounds[0])), float(np.ptp(bounds[1]))) + 2 * buffer
     pitch = max(min(peak.sigma for peak in peaks) / 16.0, width / 1500.0) if len(peaks) else width / 8.0

@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 class Threats:
     """m air-defence units; a radius of 0 means that the unit has no missile, or no radar.
 
-    names: m of them, as `threat_label` makes them.
+    names: m labels of `threat_label`.
     position: (m, 3) east, north, up in m.
     kill_radius, detection_radius: (m,) m, the paper's R_PKmax and R_PRDmax.
     kill_scale, detection_scale: (m,) m, the paper's gamma and delta (eq. 9 and 10).
@@ -33,12 +33,12 @@ class Threats:
             object.__setattr__(self, name, array)
 
     def __len__(self) -> int:
-        """How many units there are."""
+        """Return the number of units."""
         return len(self.names)
 
 
 def threat_label(name: str, index: int) -> str:
-    """What a threat is called: its own name, or its number from 1 where it has none ("").
+    """Return the label of a threat: its own name, or its number from 1 if the name is "".
 
     >>> threat_label("east valley", 0), threat_label("", 2)
     ('east valley', 'threat 3')

@@ -1,4 +1,4 @@
-"""Steady wind with a gradient in height, and the turbulence that goes with it."""
+"""Steady wind with a vertical gradient, and its turbulence level."""
 
 import math
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ W20 = {"none": 0.0, "light": 7.7, "moderate": 15.4}
 def mean_wind_speed(
     speed: float, gradient: float, reference_amsl: float, amsl: float
 ) -> float:  # pragma: no cover - compiled
-    """Mean wind speed (m/s) at a height (m): linear in height from the reference, and never below 0."""
+    """Return the mean wind speed (m/s) at an altitude (m): linear from the reference altitude, and never below 0."""
     return max(0.0, speed + gradient * (amsl - reference_amsl))
 
 
@@ -38,10 +38,10 @@ class Wind:
     """Mean wind and turbulence level.
 
     speed: m/s at `reference_amsl` (m).
-    from_course: rad clockwise from north, where the wind comes from.
-    gradient: m/s more per metre of height, 1/s; the speed is never below 0.
+    from_course: direction that the wind blows from, rad clockwise from north.
+    gradient: increase of the speed in m/s per metre of altitude, 1/s; the speed is never below 0.
     turbulence: level of MIL-F-8785C, see `W20`.
-    seed: of the turbulence; None to take the flight's.
+    seed: seed of the turbulence; None for the seed of the flight.
     """
 
     speed: float = 0.0
@@ -53,11 +53,11 @@ class Wind:
 
     @property
     def to_course(self) -> float:
-        """Direction that the wind blows towards, rad clockwise from north."""
+        """Return the direction that the wind blows towards, rad clockwise from north."""
         return self.from_course + math.pi
 
     def at(self, amsl: float) -> tuple[float, float]:
-        """East and north components of the mean wind at this height (m), m/s.
+        """Return the east and north components of the mean wind at an altitude (m AMSL), m/s.
 
         >>> Wind(6.0, from_course=0.0, gradient=0.01, reference_amsl=300.0).at(700.0)
         (-0.0, -10.0)
@@ -66,7 +66,7 @@ class Wind:
         return -speed * math.sin(self.from_course), -speed * math.cos(self.from_course)
 
     def at_each(self, amsl: Floats) -> Floats:
-        """East and north components of the mean wind at each of these heights (n,) m: (n, 2) m/s.
+        """Return the east and north components of the mean wind at altitudes (n,) m AMSL: (n, 2) m/s.
 
         >>> Wind(6.0, from_course=0.0, gradient=0.01, reference_amsl=300.0).at_each(np.array([300.0, 700.0]))
         array([[ -0.,  -6.],
@@ -76,11 +76,11 @@ class Wind:
         return np.column_stack([-speeds * math.sin(self.from_course), -speeds * math.cos(self.from_course)])
 
     def strongest(self, amsl: Floats) -> float:
-        """Highest mean wind speed at these heights (m), m/s."""
+        """Return the highest mean wind speed at these altitudes (m AMSL), m/s."""
         return max(math.hypot(*self.at(float(up))) for up in amsl)
 
     def along(self, course: float, amsl: float) -> tuple[float, float]:
-        """Tailwind and crosswind (from the left positive) on a course (rad), m/s."""
+        """Return tailwind and crosswind (from the left positive) on a course (rad), m/s."""
         east, north = self.at(amsl)
         return (
             east * math.sin(course) + north * math.cos(course),

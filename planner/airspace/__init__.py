@@ -1,1 +1,1 @@
-"""Zones as a planner keeps out of them: which are near a leg, how deep it is in them, and how far from them."""
+"""Zones of a planner: which are near a leg, how deeply it penetrates them, and its distance from them."""

@@ -1,8 +1,8 @@
 """Penetration of zones by legs, for the search, and margins of path pieces to zones, for the certificate.
 
-A search charges each leg for the depth of its penetration times the length of it, computed from a zone's extent across
-and along the leg; for levels above ground the terrain is sampled. A certificate cuts pieces near a zone short enough
-for heights and positions to belong together, and measures their distances exactly for straight edges and circles.
+A search charges each leg the depth of its penetration times its length, computed from a zone's extent across and along
+the leg; for levels above ground the terrain is sampled. A certificate cuts pieces near a zone so short that the heights
+apply to the positions, and measures their distances exactly for straight edges and circles.
 """
 
 import math
@@ -23,11 +23,13 @@ Heights = NDArray[np.float32]
 
 # --- Penetration of zones, for the search ---
 
-# The charge is 0 only if the leg violates no margin. An exclusion counts along the full part of the leg that is abreast
-# of its shape, so that a leg through a concave part of the outline may be charged although it stays outside.
+# The charge is 0 only if the leg violates no margin. An exclusion is charged along the full part of the leg that is
+# abreast of its shape, so that a leg through a concave part of the outline may be charged although it stays outside.
 
-# Spacing of samples on a leg that leaves an inclusion (m), and their maximum number.
-OUTSIDE_PITCH, MAX_SAMPLES = 100.0, 20
+# Spacing of samples on a leg that leaves an inclusion, m.
+OUTSIDE_PITCH = 100.0
+# Maximum number of these samples.
+MAX_SAMPLES = 20
 # Shortest length that is charged, m.
 MIN_CHARGED_LENGTH = 1.0
 # Bound on the height above unknown ground, m.
@@ -35,7 +37,7 @@ UNKNOWN = 9000.0
 
 
 class AltitudeBand(NamedTuple):
-    """Range of heights of a part of a path: above mean sea level, and above the ground below it, m."""
+    """Vertical range of a part of a path: above mean sea level, and above the ground below it, m."""
 
     lowest: float
     highest: float
@@ -55,15 +57,15 @@ def zone_excess(
     below: float,
     above: float,
 ) -> float:  # pragma: no cover - compiled
-    """Depth of the leg a-b in zones enlarged by their margins, integrated over its length: m x km.
+    """Return the depth of the leg a-b in zones enlarged by their margins, integrated over its length: m x km.
 
-    pitch: of terrain samples (m), for levels above ground. lateral, below, above: tracking error, m.
+    pitch: spacing of terrain samples (m), for levels above ground. lateral, below, above: tracking error, m.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
     total, required, records = 0.0, zones.required, zones.records
     for z in range(zones.inclusions):
         wanted = required[z].horizontal + lateral
-        total += _aside_excess(records, z, line, wanted)
+        total += _inclusion_excess(records, z, line, wanted)
         zone = records.zones[z]
         band = altitude_band(a[2], b[2], below, above)
         if zone.floor_above_ground or zone.ceiling_above_ground:
@@ -95,9 +97,9 @@ def zone_excess(
 def penetration_depth(
     records: ZoneRecords, z: int, line: MapSegment, wanted: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Lateral shift that brings a line `wanted` m away from exclusion z on the map, and the line's fractions abreast.
+    """Return the lateral shift that moves a line `wanted` m away from exclusion z, and its fractions abreast of z.
 
-    0 m if the line is that far away.
+    The shift is 0 m if the line already is that far away.
     """
     reach = view_shape(records, z, line, wanted)
     if not reach.inside and reach.distance >= wanted:
@@ -112,10 +114,10 @@ def penetration_depth(
 
 
 @inner
-def _aside_excess(
+def _inclusion_excess(
     records: ZoneRecords, z: int, line: MapSegment, wanted: float
 ) -> float:  # pragma: no cover - compiled
-    """Shortfall of a line's distance inside inclusion z from `wanted` (m), integrated over its length: m x km."""
+    """Return the shortfall from `wanted` (m) of a line's distance inside inclusion z, times its length: m x km."""
     reach = view_shape(records, z, line, wanted)
     if reach.inside and reach.distance >= wanted:
         return 0.0
@@ -133,7 +135,7 @@ def _aside_excess(
 
 @inlined
 def altitude_band(up: float, to_up: float, below: float, above: float) -> AltitudeBand:  # pragma: no cover - compiled
-    """Range of heights of a straight line with unknown ground; below, above: tracking error, m."""
+    """Return the vertical range of a straight line over unknown ground; below, above: tracking error, m."""
     lowest, highest = min(up, to_up) - below, max(up, to_up) + above
     return AltitudeBand(lowest, highest, -UNKNOWN, UNKNOWN)
 
@@ -150,7 +152,7 @@ def _sampled_band(
     below: float,
     above: float,
 ) -> AltitudeBand:  # pragma: no cover - compiled
-    """Range of heights of a-b between two fractions of it, above ground by samples."""
+    """Return the vertical range of a-b between two fractions of it, with sampled heights above ground."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     plain = altitude_band(a[2] + first * dz, a[2] + last * dz, below, above)
     column, row = polymap(to_pixel, a[0] + first * dx, a[1] + first * dy)
@@ -169,9 +171,10 @@ def _sampled_band(
 
 @inlined
 def vertical_distance(zone: Record, band: AltitudeBand) -> float:  # pragma: no cover - compiled
-    """Distance of heights below a zone's floor or above its ceiling, m; negative between them.
+    """Return the distance of a vertical range below a zone's floor or above its ceiling, m.
 
-    For an exclusion the smallest over the range of heights, for an inclusion the largest.
+    Negative between them.
+    For an exclusion the smallest distance over the range, for an inclusion the largest.
     """
     under_low, under_high = band.lowest, band.highest
     if zone.floor_above_ground:
@@ -187,11 +190,11 @@ def vertical_distance(zone: Record, band: AltitudeBand) -> float:  # pragma: no 
 
 # --- Margins to zones, for the certificate ---
 
-# Pieces near a zone are cut to this length (m), so that heights and positions belong together.
+# Length of pieces near a zone, m: short enough for the heights to apply to the positions.
 CUT = 25.0
 # Margin of a piece of a path. nearest: smallest distance outside an exclusion or inside an inclusion, horizontal or
-# vertical, m; negative where a zone is violated. satisfied: whether every zone's margin is satisfied. zone: the nearest
-# zone, preferring those whose margin is violated; -1 for none.
+# vertical, m; negative if a zone is violated. satisfied: True if every zone's margin is satisfied. zone: the nearest
+# zone, with preference for a violated margin; -1 without a zone.
 ZONE_MARGIN = np.dtype([("nearest", np.float64), ("satisfied", np.bool_), ("zone", np.int64)])
 
 
@@ -268,7 +271,7 @@ def _update_margin(
 
 @inner
 def _distance_to_violation(zone: Record, away: float, over: float) -> float:  # pragma: no cover - compiled
-    """Distance from violating a zone, given the horizontal and vertical distances, m."""
+    """Return the distance from violating a zone, given the horizontal and vertical distances, m."""
     return max(away, over) if zone.exclusion else min(away, -over)
 
 
@@ -276,8 +279,9 @@ def _distance_to_violation(zone: Record, away: float, over: float) -> float:  # 
 def _map_distance(
     records: ZoneRecords, z: int, a: Floats, b: Floats, within: float
 ) -> float:  # pragma: no cover - compiled
-    """Smallest horizontal distance of the line a-b outside an exclusion or inside an inclusion, m; else negative.
+    """Return the smallest horizontal distance of a-b outside an exclusion or inside an inclusion, m.
 
+    Else negative.
     Distances above `within` may be inf.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
@@ -302,7 +306,7 @@ def _exact_band(
     below: float,
     above: float,
 ) -> AltitudeBand:  # pragma: no cover - compiled
-    """Range of heights along a-b, and above the ground below it and `lateral` (2,) m to both sides."""
+    """Return the vertical range along a-b, also above the ground below it and `lateral` (2,) m to both sides."""
     plain = altitude_band(a[2], b[2], below, above)
     run = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
     ux, uy = (b[0] - a[0]) / run, (b[1] - a[1]) / run

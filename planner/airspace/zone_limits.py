@@ -25,8 +25,8 @@ Heights = NDArray[np.float32]
 
 # --- Zones with their margins ---
 
-# Margins of one zone, m: beside its outline, and below its floor or above its ceiling (for an inclusion, inside them).
-# number: of the zone in the scenario. furthest_east: of this exclusion and of all before it, m.
+# Margins of one zone, m: outside its outline, and below its floor or above its ceiling (for an inclusion, inside them).
+# number: index of the zone in the scenario. furthest_east: eastern end of this exclusion and all before it, m.
 REQUIRED_MARGINS = record_dtype(("number", np.int64), "horizontal", "vertical", "furthest_east")
 
 
@@ -48,7 +48,7 @@ class ZonesWithMargins(NamedTuple):
 class ZoneMargins(NamedTuple):
     """Margins of a path to zones, m: horizontal and vertical as in `REQUIRED_MARGINS`.
 
-    share: where a fixed end is within a margin, the share of its distance that becomes the margin.
+    share: fraction of a fixed end's distance that replaces the margin if the end is within the margin.
     """
 
     horizontal: float
@@ -57,7 +57,7 @@ class ZoneMargins(NamedTuple):
 
 
 def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, margins: ZoneMargins) -> ZonesWithMargins:
-    """Zones with these margins, reduced for zones within whose margin a fixed end is.
+    """Return zones with these margins, reduced for zones with a fixed end within the margin.
 
     ends: (k, 3) m. An end inside an exclusion, or outside an inclusion, makes its margin 0.
 
@@ -86,7 +86,10 @@ def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, ma
 def _reduce_margins(
     records: ZoneRecords, ends: Floats, grounds: Floats, share: float, required: Records
 ) -> None:  # pragma: no cover - compiled
-    """Reduce margins to a share of the distances of the ends (k, 3); grounds: (k,) ground heights there, m."""
+    """Reduce margins to a fraction of the distances of the ends (k, 3).
+
+    Grounds: (k,) ground heights there, m.
+    """
     for z in range(required.shape[0]):
         zone, need = records.zones[z], required[z]
         for k in range(ends.shape[0]):
@@ -105,7 +108,7 @@ def _reduce_margins(
 
 @inner
 def first_exclusion_near(zones: ZonesWithMargins, west: float) -> int:  # pragma: no cover - compiled
-    """Index of the first exclusion that may reach as far east as `west` (m)."""
+    """Return the index of the first exclusion that may extend as far east as `west` (m)."""
     low, high = zones.inclusions, zones.required.shape[0]
     while low < high:
         middle = (low + high) // 2
@@ -126,7 +129,7 @@ class PlannerAirspace(NamedTuple):
     zones: exclusions and inclusions with their margins.
     max_height: maximum height above ground, inf for none.
     buffer: margin below it, and start_buffer and destination_buffer at the ends.
-    depths: negated heights of the ground, for which staying below the maximum is a clearance like that above the
+    depths: negated heights of the ground, so that staying below the maximum height is a clearance problem as above the
     ground.
     """
 
@@ -139,9 +142,10 @@ class PlannerAirspace(NamedTuple):
 
 
 def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> PlannerAirspace:
-    """The airspace of a scenario with its margins.
+    """Make the airspace of a scenario with its margins.
 
-    buffer: margin below the maximum height, m; at a fixed end with less, a share (`ZoneMargins.share`) of what it has.
+    buffer: margin below the maximum height, m; at a fixed end with a smaller margin, a fraction (`ZoneMargins.share`)
+    of the end's own margin.
 
     >>> from world.scenario import load_scenario
     >>> space = make_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0)
@@ -152,7 +156,7 @@ def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> Pl
     ends = np.stack([scenario.start, scenario.destination])
     zones = add_margins(scenario.zones, ends, terrain, margins)
     asked = most is not None or any(zone.above_ground for zone in scenario.zones)
-    # Unused otherwise: a small array of the right type.
+    # If unused, a small array of the right type.
     depths = -terrain.heights if terrain is not None and asked else np.zeros((2, 2), dtype=np.float32)
     depths.setflags(write=False)
     buffers = [buffer, buffer]
@@ -163,7 +167,7 @@ def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> Pl
 
 
 def is_limited(airspace: PlannerAirspace) -> bool:
-    """Whether there is a zone or a maximum height above ground.
+    """Return True if there is a zone or a maximum height above ground.
 
     >>> from world.scenario import load_scenario
     >>> is_limited(make_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0))
@@ -176,7 +180,7 @@ def is_limited(airspace: PlannerAirspace) -> bool:
 
 
 class MapSegment(NamedTuple):
-    """A horizontal line: its beginning, its unit course (east, north) and its length, m."""
+    """Horizontal line: beginning, unit course (east, north) and length, m."""
 
     east: float
     north: float
@@ -186,10 +190,10 @@ class MapSegment(NamedTuple):
 
 
 class ShapeView(NamedTuple):
-    """A shape as seen from a line, m.
+    """Shape as seen from a line, m.
 
-    inside: whether the line begins in it.
-    distance: from the line to the shape's outline, 0 where they meet; inf if beyond the requested limit.
+    inside: True if the line begins in the shape.
+    distance: from the line to the shape's outline, 0 if they meet; inf if beyond the requested limit.
     right, left: extent of the shape across the line, negative to the right.
     first, last: extent of the shape along the line.
     """
@@ -204,7 +208,7 @@ class ShapeView(NamedTuple):
 
 @inlined
 def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:  # pragma: no cover - compiled
-    """The line from a to b; one without length points north."""
+    """Return the line from a to b; a line without length points north."""
     dx, dy = bx - ax, by - ay
     run = math.sqrt(dx * dx + dy * dy)
     if run < 1e-9:
@@ -216,7 +220,7 @@ def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:  
 def view_shape(
     records: ZoneRecords, z: int, line: MapSegment, within: float
 ) -> ShapeView:  # pragma: no cover - compiled
-    """Zone z's shape as seen from a line; distances above `within` (m) may be inf."""
+    """Return the shape of zone z as seen from a line; distances above `within` (m) may be inf."""
     zone = records.zones[z]
     if zone.round:
         off_e, off_n = zone.centre_east - line.east, zone.centre_north - line.north
@@ -250,7 +254,7 @@ def view_shape(
 
 @inlined
 def _view_circle(along: float, off: float, radius: float, run: float) -> ShapeView:  # pragma: no cover - compiled
-    """A circle as seen from a line, given its centre in the line's axes."""
+    """Return a circle as seen from a line, given its centre in the line's axes."""
     gap = along - min(run, max(0.0, along))
     nearest = math.sqrt(gap * gap + off * off) - radius
     furthest = math.sqrt(max(abs(along), abs(along - run)) ** 2 + off * off) - radius

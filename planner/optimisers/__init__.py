@@ -1,1 +1,1 @@
-"""General optimisers: they see a box, samples and a ranking, and nothing specific to paths."""
+"""General optimisers over a box, samples and a ranking, with nothing specific to paths."""

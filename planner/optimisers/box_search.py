@@ -11,14 +11,14 @@ Ints = NDArray[np.int64]
 
 
 class BoxSearch(ABC):
-    """A population in a box: `ask` returns samples to be scored, `tell` takes their scores and makes the next samples.
+    """Population-based search in a box: `ask` returns samples to score, `tell` takes their scores.
 
     lower, upper: (d,) box.
     rank: (n, c) scores -> (n,) ranks, smaller is better.
     population: even number of samples.
     initial: (population, d) first samples; None for uniform ones.
 
-    The first call asks for the whole population, later calls for half of it.
+    The first `ask` returns the whole population, later calls half of it.
     """
 
     def __init__(
@@ -42,9 +42,9 @@ class BoxSearch(ABC):
         self.scores: Floats = np.empty((0, 0))
 
     def ask(self) -> Floats:
-        """Samples (n, d) inside the box to be scored."""
+        """Return the samples (n, d) inside the box to score."""
         return self._asked
 
     @abstractmethod
     def tell(self, scores: Floats) -> None:
-        """Take the scores (n, c) of the samples last asked for, and make the next ones."""
+        """Take the scores (n, c) of the last samples of `ask`, and make the next samples."""

@@ -7,12 +7,14 @@ import numpy as np
 
 from planner.optimisers.box_search import BoxSearch, Floats, Ints
 
-# Differential weight F and crossover rate CR: within the ranges that Storn and Price recommend.
-WEIGHT, CROSSOVER = 0.5, 0.9
+# Differential weight F, within the range that Storn and Price recommend.
+WEIGHT = 0.5
+# Crossover rate CR, within the range that Storn and Price recommend.
+CROSSOVER = 0.9
 
 
 class DifferentialEvolution(BoxSearch):
-    """Each target vector competes with a trial vector and is replaced by one that ranks no worse.
+    """Differential evolution: a trial vector replaces its target vector if it ranks no worse.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -23,9 +25,9 @@ class DifferentialEvolution(BoxSearch):
     >>> bool(search.scores.min() < 1e-3)
     True
 
-    The arguments are those of `BoxSearch`. Half of the population is challenged at a time, so that a generation costs
-    as much as with the estimation of distribution algorithms. samples and scores are the population, (n, d) and (n, c);
-    empty before the first `tell`.
+    The arguments are the same as for `BoxSearch`. Half of the population is challenged at a time, so that a generation
+    costs as much as with the estimation of distribution algorithms. samples and scores are the population, (n, d) and
+    (n, c); empty before the first `tell`.
     """
 
     _turn = 0
@@ -44,12 +46,12 @@ class DifferentialEvolution(BoxSearch):
         self._asked = self._trial_vectors(self._targets())
 
     def _targets(self) -> Ints:
-        """Target rows of this generation: the halves of the population alternate."""
+        """Return the target rows of this generation: the halves of the population alternate."""
         count = len(self.samples)
         return np.arange(self._half) if self._turn % 2 == 0 else np.arange(count - self._half, count)
 
     def _trial_vectors(self, rows: Ints) -> Floats:
-        """Trial vectors of some targets: a + F (b - c) in most variables, the target's own value in the others."""
+        """Return trial vectors: a + F (b - c) in most variables, the target's own value in the others."""
         count, size = self.samples.shape
         picked = self._rng.integers(0, count, (3, rows.size))
         a, b, c = (self.samples[index] for index in picked)

@@ -10,13 +10,13 @@ from planner.optimisers.box_search import Floats
 from planner.optimisers.linear_algebra import cholesky, covariance, times_lower
 from planner.optimisers.umda import Umda
 
-# Regularisation added to each variance, as a share of their mean: with fewer samples than variables a covariance is
-# singular.
+# Regularisation added to each variance, as a fraction of their mean: with fewer samples than variables the covariance
+# is singular.
 COVARIANCE_RIDGE = 1e-9
 
 
 class Emna(Umda):
-    """Like `planner.optimisers.umda.Umda`, with a full covariance in place of independent marginals.
+    """Estimation of distribution like `planner.optimisers.umda.Umda`, with a full covariance.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -27,11 +27,11 @@ class Emna(Umda):
     >>> bool(search.scores.min() < 1e-6)
     True
 
-    The arguments are those of `Umda`; `basis` and `floor` are unused.
+    The arguments are the same as for `Umda`; `basis` and `floor` are unused.
     """
 
     def _sample(self, count: int) -> Floats:
-        """Samples of the maximum-likelihood Gaussian (1/N), redrawn and finally clipped to the box."""
+        """Draw samples of the maximum-likelihood Gaussian (1/N), redrawn and finally clipped to the box."""
         mean = self.samples.mean(axis=0)
         # Scaled to the box, so that the regularisation suits variables of different units.
         width = self.upper - self.lower

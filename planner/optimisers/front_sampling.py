@@ -1,20 +1,20 @@
-"""An estimation of distribution for several objectives: a mixture, one component about each solution of the front.
+"""Estimation of distribution for several objectives: a mixture with one component around each solution of the front.
 
 Thierens and Bosman ("Multi-objective mixture-based iterated density estimation evolutionary algorithms", GECCO 2001)
 spread a mixture along the front by clusters. Here every solution of the archive is the mean of a component, and a
-variable depends on others in one of three ways:
+sample departs from its mean in one of three ways:
 
-- on all of them, as in the covariance of the solutions nearest to the mean among the variables, so that solutions that
-  are not alike (routes past different sides of an obstacle) are not mixed;
-- on those of a block: the variables are those of points in a row, a few neighbouring points lie between where the mean
-  and any other solution have them, and what lies before and after them stays the mean's. A factorised distribution
-  (Muehlenbein and Mahnig, Evolutionary Computation 7, 1999), whose blocks are those of differential evolution's
-  exponential crossover (Storn and Price, Journal of Global Optimization 11, 1997);
-- along given directions, as noise whose scale follows how often it succeeds.
+- in all variables, with the covariance of the solutions nearest to the mean in the space of the variables, so that
+  unlike solutions (routes past different sides of an obstacle) are not mixed;
+- in a block of variables: the variables belong to points in a row; a few neighbouring points move towards their
+  positions in another solution, and the points before and after them stay at the mean. This is a factorised
+  distribution (Muehlenbein and Mahnig, Evolutionary Computation 7, 1999), with the blocks of the exponential crossover
+  of differential evolution (Storn and Price, Journal of Global Optimization 11, 1997);
+- along given directions, as noise whose scale adapts to its rate of success.
 
-The archive holds solutions that no other dominates, those first that cover most hypervolume, which is counted at new
-random points in each generation (Bader and Zitzler, "HypE", Evolutionary Computation 19, 2011), so that none is kept
-only for lying well to some of them.
+The archive contains non-dominated solutions, ordered by the hypervolume that they cover. The hypervolume is estimated
+at new random points in each generation (Bader and Zitzler, "HypE", Evolutionary Computation 19, 2011), so that no
+solution is kept only because it covers one particular set of points well.
 """
 
 from enum import IntEnum
@@ -28,20 +28,36 @@ from planner.optimisers.preference import NO_GOAL, Level, ranks
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Solutions nearest to the mean that its covariance is taken of, and the share of their differences that it has.
-NEIGHBOURS, REACH = 6, 0.7
-# How far a block goes to the other solution's: all the way in half of the samples, and up to this share of it in the
-# others; it takes half of its points' coordinates.
-FURTHEST, HALF = 1.2, 0.5
-# Scale of noise at first, as a share of each direction's length, its bounds, and its factors for a generation in which
-# more or less than this share of the samples succeed.
-FIRST_SCALE, MIN_SCALE, MAX_SCALE, GROW, SHRINK, SUCCESS = 0.1, 1e-4, 0.5, 1.15, 0.9, 0.02
-# Directions that a sample's noise uses, at most; its scale is the common one times 2^low to 2^high.
-USED_DIRECTIONS, LOW, HIGH = 4, -3, 2
+# Number of solutions nearest to a mean that give its covariance.
+NEIGHBOURS = 6
+# Factor on their differences from the mean.
+REACH = 0.7
+# Largest step of a block, as a fraction of the difference to the other solution.
+FURTHEST = 1.2
+# Fraction of the samples that take the whole step, and of the coordinates of a block's points that move.
+HALF = 0.5
+# Initial scale of the noise, as a fraction of each direction's length.
+FIRST_SCALE = 0.1
+# Smallest scale of the noise.
+MIN_SCALE = 1e-4
+# Largest scale of the noise.
+MAX_SCALE = 0.5
+# Factor on the scale after a generation with more successes than `SUCCESS`.
+GROW = 1.15
+# Factor on the scale after a generation with fewer successes.
+SHRINK = 0.9
+# Fraction of successful samples above which the scale grows.
+SUCCESS = 0.02
+# Maximum number of directions in the noise of a sample.
+USED_DIRECTIONS = 4
+# Exponent of 2 in the smallest factor of a sample on the common scale.
+LOW = -3
+# Exponent of 2 in the largest factor of a sample on the common scale.
+HIGH = 2
 
 
 class Kind(IntEnum):
-    """How a sample departs from its mean; equally many do in each way."""
+    """Kind of departure of a sample from its mean; each kind is equally frequent."""
 
     NEAR = 0
     NOISE = 1
@@ -53,10 +69,10 @@ class FrontSampling:
     """Ask-and-tell search for a front in a box.
 
     lower, upper: (d,) box.
-    directions: (k, d) of the noise, each as long as its largest deviation.
-    reference: (m,) objectives beyond which a solution does not count.
-    axes: variables of a point; those of neighbouring points are neighbours.
-    size: of the archive. population: samples of a generation.
+    directions: (k, d) directions of the noise, each as long as its largest deviation.
+    reference: (m,) reference point; solutions with objectives beyond it are ignored.
+    axes: number of variables of a point; the variables of neighbouring points are adjacent.
+    size: size of the archive. population: samples of a generation.
 
     >>> unit = np.eye(2)
     >>> search = FrontSampling(np.zeros(2), np.ones(2), unit, np.full(2, 2.0), 1, 20, 40, np.random.default_rng(1))
@@ -88,22 +104,22 @@ class FrontSampling:
         self.objectives: Floats = np.empty((0, reference.size))
 
     def ask(self) -> Floats:
-        """Samples (population, d) of the mixture."""
+        """Draw samples (population, d) of the mixture."""
         means = self._rng.integers(len(self.vectors), size=self._population)
         self._kinds = kinds = self._rng.integers(len(Kind), size=self._population)
         samples = self.vectors[means]
         near, in_block, noisy = kinds == Kind.NEAR, kinds >= Kind.BLOCK, kinds != Kind.BLOCK
-        samples[near] += self._near(means[near])
-        samples[in_block] += self._block(means[in_block])
+        samples[near] += self._nearest_departures(means[near])
+        samples[in_block] += self._block_departures(means[in_block])
         samples[noisy] += self._noise(self._scales[kinds[noisy], None])
         return np.clip(samples, self._lower, self._upper)
 
-    def _near(self, means: Ints) -> Floats:
-        """Departures (n, d) from means, with the covariance of those that are nearest to each in shares of the box."""
+    def _nearest_departures(self, means: Ints) -> Floats:
+        """Draw departures (n, d) from means, with the covariance of the nearest solutions, relative to the box."""
         number = min(NEIGHBOURS, len(self.vectors) - 1)
         out = np.zeros((len(means), self._lower.size))
         scaled = (self.vectors / (self._upper - self._lower).clip(1e-12)).T
-        # Summed over the first axis: one after another, on every machine.
+        # Summed over the first axis: in sequence, with the same rounding on every machine.
         away = ((scaled[:, means, None] - scaled[:, None, :]) ** 2).sum(axis=0)
         near = np.argsort(away, axis=1, kind="stable")[:, 1 : number + 1]
         weights = REACH * self._rng.standard_normal((len(means), number)) / np.sqrt(max(1, number))
@@ -111,12 +127,12 @@ class FrontSampling:
             out += weights[:, k, None] * (self.vectors[near[:, k]] - self.vectors[means])
         return out
 
-    def _block(self, means: Ints) -> Floats:
-        """Departures (n, d) from the means of a block of points, towards where another solution has them."""
+    def _block_departures(self, means: Ints) -> Floats:
+        """Draw departures (n, d) of a block of points towards their positions in another solution."""
         rng, count, points = self._rng, len(means), self._lower.size // self._axes
         others = rng.integers(len(self.vectors), size=count)
         lengths = rng.integers(1, points + 1, size=count)
-        # Blocks may begin before the first point and end behind the last, so that all points are equally often in one.
+        # Blocks may begin before the first point and end after the last, so that each point is equally often in one.
         begins, places = rng.integers(1 - lengths, points), np.arange(points)
         within = (places >= begins[:, None]) & (places < (begins + lengths)[:, None])
         taken = rng.random((count, 1, self._axes)) < HALF
@@ -126,7 +142,7 @@ class FrontSampling:
         return np.asarray(shares * moved * (self.vectors[others] - self.vectors[means]))
 
     def _noise(self, scales: Floats) -> Floats:
-        """Noise (n, d) along a few directions each, at scales (n, 1) times a factor of each sample's own."""
+        """Draw noise (n, d) along a few directions each, at scales (n, 1) times a random factor per sample."""
         rng, count, total = self._rng, len(scales), len(self._directions)
         used = min(USED_DIRECTIONS, total)
         picked = rng.integers(total, size=(count, used))
@@ -139,12 +155,12 @@ class FrontSampling:
         return out
 
     def tell(self, vectors: Floats, objectives: Floats, violations: Floats) -> None:
-        """Take samples (n, d) with objectives (n, m) and violations (n, c), all 0 where the constraints are met."""
+        """Take samples (n, d) with objectives (n, m) and violations (n, c), all 0 if the constraints are met."""
         met = np.flatnonzero((violations <= 0.0).all(axis=1) & (objectives < self.reference).all(axis=1))
         joined = np.zeros(len(vectors), dtype=bool)
         if met.size:
             values = np.concatenate([self.objectives, objectives[met]])
-            kept = self._chosen(values)
+            kept = self._archive_rows(values)
             joined[met[kept[kept >= len(self.vectors)] - len(self.vectors)]] = True
             self.vectors, self.objectives = np.concatenate([self.vectors, vectors[met]])[kept], values[kept]
         kinds, self._kinds = self._kinds, np.empty(0, dtype=np.int64)
@@ -152,8 +168,8 @@ class FrontSampling:
             grows = joined[kinds == kind].mean() > SUCCESS
             self._scales[kind] = np.clip(self._scales[kind] * (GROW if grows else SHRINK), MIN_SCALE, MAX_SCALE)
 
-    def _chosen(self, values: Floats) -> Ints:
-        """Rows of objectives (n, m) for the archive: what none dominates, each once, those that cover most."""
+    def _archive_rows(self, values: Floats) -> Ints:
+        """Return the rows of objectives (n, m) to archive: distinct, non-dominated, and covering most hypervolume."""
         level = Level(tuple(range(values.shape[1])), (NO_GOAL,) * values.shape[1])
         front = np.flatnonzero(ranks(values, (level,)) == 0)
         _, first = np.unique(values[front], axis=0, return_index=True)

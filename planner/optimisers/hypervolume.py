@@ -1,9 +1,9 @@
-"""Hypervolume of a front, and the few of its points that cover most of it.
+"""Hypervolume of a front, and selection of the few points that cover most of it.
 
 The hypervolume is the volume of objective space that some point dominates, up to a reference point (Zitzler and Thiele,
 "Multiobjective optimization using evolutionary algorithms - a comparative case study", PPSN V, 1998). All objectives
-are minimised. A greedy choice covers at least 1 - 1/e of what the best choice of as many points does (Nemhauser, Wolsey
-and Fisher, Mathematical Programming 14, 1978).
+are minimised. A greedy choice covers at least 1 - 1/e of the volume of the best choice of the same number of points
+(Nemhauser, Wolsey and Fisher, Mathematical Programming 14, 1978).
 """
 
 import numpy as np
@@ -15,12 +15,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Marks = NDArray[np.uint8]
 
-# Random points at which coverage is counted, and their seed where none is given: the same points, the same choice.
-PROBES, SEED = 4096, 20
+# Number of random points at which coverage is counted.
+PROBES = 4096
+# Their seed if no generator is given: the same points give the same choice.
+SEED = 20
 
 
 def hypervolume(points: Floats, reference: Floats) -> float:
-    """Volume that points (n, m) dominate below a reference point (m,), exactly, by slices along the last objective.
+    """Return the exact volume that points (n, m) dominate below a reference point (m,), by slices of the last objective.
 
     >>> hypervolume(np.array([[1.0, 3.0], [2.0, 1.0]]), np.array([4.0, 4.0]))  # 3 x 1 and 2 x 2 of it below
     7.0
@@ -36,25 +38,25 @@ def hypervolume(points: Floats, reference: Floats) -> float:
     for k in range(len(order)):
         if heights[k + 1] > heights[k]:
             slab = inside[order[: k + 1], :-1]
-            total += float(heights[k + 1] - heights[k]) * hypervolume(_lowest(slab), reference[:-1])
+            total += float(heights[k + 1] - heights[k]) * hypervolume(_non_dominated(slab), reference[:-1])
     return total
 
 
-def _lowest(points: Floats) -> Floats:
-    """Points (n, m) that no other dominates, each once."""
+def _non_dominated(points: Floats) -> Floats:
+    """Return the distinct non-dominated points (n, m)."""
     points = np.unique(points, axis=0)
     below = np.asarray((points[:, None, :] <= points[None, :, :]).all(axis=2))
-    # Each lies at or below itself.
+    # Each point is at or below itself.
     return np.asarray(points[below.sum(axis=0) == 1])
 
 
 def covering_order(points: Floats, reference: Floats, count: int, rng: np.random.Generator | None = None) -> Ints:
-    """Up to `count` rows of points (n, m) below a reference (m,): first the best of each objective, then greedily.
+    """Return up to `count` rows of points (n, m) below a reference (m,): the best of each objective, then greedily.
 
-    Each further point is the one that adds most to the volume that is covered, counted at random probes between the
-    points' best values and the reference. Points that add nothing come last, in their order.
+    Each further point adds most to the covered volume, counted at random probes between the points' best values and the
+    reference. Points that add nothing are last, in their order.
 
-    rng: draws the probes; None for the same ones in every call.
+    rng: draws the probes; None for the same probes in every call.
 
     >>> front = np.array([[0.0, 9.0], [9.0, 0.0], [4.0, 4.0], [4.1, 4.1]])
     >>> covering_order(front, np.array([10.0, 10.0]), 3).tolist()
@@ -73,7 +75,7 @@ def covering_order(points: Floats, reference: Floats, count: int, rng: np.random
 
 @compiled
 def _covered(points: Floats, probes: Floats) -> Marks:  # pragma: no cover - compiled
-    """Marks (n, p), 1 where points (n, m) lie at or below probes (m, p)."""
+    """Return marks (n, p), 1 if points (n, m) are at or below probes (m, p)."""
     out = np.ones((points.shape[0], probes.shape[1]), dtype=np.uint8)
     for n in range(points.shape[0]):
         for k in range(points.shape[1]):
@@ -84,10 +86,11 @@ def _covered(points: Floats, probes: Floats) -> Marks:  # pragma: no cover - com
 
 @compiled
 def _greedy(covered: Marks, firsts: Ints, count: int) -> Ints:  # pragma: no cover - compiled
-    """Rows (count,) of marks (n, p): `firsts`, then whichever covers most that is open; of equal ones the first.
+    """Return rows (count,) of marks (n, p): `firsts`, then the row that covers most uncovered probes.
 
-    What a row adds only falls as others are chosen, so that its last count bounds it, and few are counted anew
-    (Minoux, Optimization Techniques, Lecture Notes in Control and Information Sciences 7, 1978).
+    First of equals.
+    The gain of a row only decreases as others are chosen, so that its last count is an upper bound, and few rows are
+    counted again (Minoux, Optimization Techniques, Lecture Notes in Control and Information Sciences 7, 1978).
     """
     size, width = covered.shape
     left, counted, gains = np.ones(width, dtype=np.uint8), np.full(size, -1), np.full(size, width)
@@ -106,7 +109,7 @@ def _greedy(covered: Marks, firsts: Ints, count: int) -> Ints:  # pragma: no cov
 
 @inner
 def _overlap(some: Marks, others: Marks) -> int:  # pragma: no cover - compiled
-    """Number of places (p,) at which both have a mark."""
+    """Return the number of places (p,) at which both have a mark."""
     total = 0
     for p in range(some.size):
         total += some[p] & others[p]

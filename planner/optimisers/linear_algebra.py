@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 @compiled
 def covariance(rows: Floats, first: int, second: int, size: int) -> Floats:  # pragma: no cover - compiled
-    """Covariance (size, size) of two groups of columns of centred rows (n, d), given the first column of each."""
+    """Return the covariance (size, size) of two groups of columns of centred rows (n, d), by their first columns."""
     out = np.zeros((size, size))
     for n in range(rows.shape[0]):
         for i in range(size):
@@ -25,7 +25,7 @@ def covariance(rows: Floats, first: int, second: int, size: int) -> Floats:  # p
 
 @compiled
 def cholesky(matrix: Floats, ridge: float) -> Floats:  # pragma: no cover - compiled
-    """Lower Cholesky factor (d, d) of a covariance (d, d) with ridge x mean variance added to its diagonal."""
+    """Return the lower Cholesky factor (d, d) of a covariance (d, d) plus ridge x mean variance on its diagonal."""
     size = matrix.shape[0]
     trace = 0.0
     for i in range(size):
@@ -47,7 +47,7 @@ def cholesky(matrix: Floats, ridge: float) -> Floats:  # pragma: no cover - comp
 
 @compiled
 def times_lower(rows: Floats, factor: Floats) -> Floats:  # pragma: no cover - compiled
-    """Rows (n, d) times the transpose of a lower triangular matrix (d, d)."""
+    """Multiply rows (n, d) by the transpose of a lower triangular matrix (d, d)."""
     out = np.zeros(rows.shape)
     for n in range(rows.shape[0]):
         for i in range(factor.shape[0]):
@@ -58,7 +58,7 @@ def times_lower(rows: Floats, factor: Floats) -> Floats:  # pragma: no cover - c
 
 @compiled
 def times_sparse(rows: Floats, basis: Floats) -> Floats:  # pragma: no cover - compiled
-    """Rows (n, d) times a basis (d, k) of which most entries are 0."""
+    """Multiply rows (n, d) by a basis (d, k) of which most entries are 0."""
     turned = rows.T.copy()
     out = np.zeros((basis.shape[1], rows.shape[0]))
     for k in range(basis.shape[1]):
@@ -76,9 +76,9 @@ def _add_times(values: Floats, factor: float, out: Floats) -> None:  # pragma: n
 
 @inner
 def band_cholesky(matrix: Floats, out: Floats) -> None:  # pragma: no cover - compiled
-    """Fill the lower Cholesky factor (d, b) of a positive definite band matrix (d, b).
+    """Compute the lower Cholesky factor (d, b) of a positive definite band matrix (d, b) into `out`.
 
-    Entry [i, k] of both is that of row i and column i - k. Pivots are at least 1e-12 times their diagonal entry.
+    Entry [i, k] of both belongs to row i and column i - k. Pivots are at least 1e-12 times their diagonal entry.
     """
     size, wide = matrix.shape
     for i in range(size):
@@ -91,7 +91,7 @@ def band_cholesky(matrix: Floats, out: Floats) -> None:  # pragma: no cover - co
 
 @inner
 def solve_band(factor: Floats, right: Floats, out: Floats) -> None:  # pragma: no cover - compiled
-    """Fill the solution (d,) of a linear system given the band factor (d, b) of its matrix."""
+    """Solve a linear system, given the band factor (d, b) of its matrix, into `out` (d,)."""
     size, wide = factor.shape
     for i in range(size):
         total = right[i]

@@ -1,4 +1,4 @@
-"""An estimation of distribution algorithm with a Markov chain: each group of variables depends on the previous group.
+"""Estimation of distribution algorithm with a Markov chain: each group of variables depends on the previous group.
 
 The dependence is linear with Gaussian residuals. A waypoint passes an obstacle on the same side as the waypoint before
 it. Independent marginals lose this dependence; a chain keeps it with far fewer parameters than a full covariance, so
@@ -12,12 +12,12 @@ from planner.optimisers.linear_algebra import cholesky, covariance
 from planner.optimisers.umda import Umda
 from world.kernels import compiled, copy_into
 
-# Regularisation added to each variance of a group, as a share of their mean.
+# Regularisation added to each variance of a group, as a fraction of their mean.
 RIDGE = 1e-6
 
 
 class MarkovChain(Umda):
-    """Like `planner.optimisers.umda.Umda`, with a first-order Markov chain over groups of variables.
+    """Estimation of distribution like `planner.optimisers.umda.Umda`, with a first-order Markov chain over groups.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -28,14 +28,17 @@ class MarkovChain(Umda):
     >>> bool(search.scores.min() < 1e-4)
     True
 
-    The arguments are those of `Umda`; `basis` and `floor` are unused. The number of variables is a multiple of `GROUP`;
-    each group of consecutive variables depends on the previous one.
+    The arguments are the same as for `Umda`; `basis` and `floor` are unused. The number of variables is a multiple of
+    `GROUP`; each group of consecutive variables depends on the previous one.
     """
 
     GROUP = 3
 
     def _sample(self, count: int) -> Floats:
-        """Samples drawn group by group, each conditional on the previous; redrawn and finally clipped to the box."""
+        """Draw samples group by group, each conditional on the previous.
+
+        Redrawn and finally clipped to the box.
+        """
         mean = self.samples.mean(axis=0)
         width = self.upper - self.lower
         slope, spread = fit_chain(np.ascontiguousarray((self.samples - mean) / width), self.GROUP, RIDGE)
@@ -46,7 +49,7 @@ class MarkovChain(Umda):
 
 @compiled
 def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
-    """For each group (g, size, size): regression on the previous group, and Cholesky factor of the residuals."""
+    """Fit for each group (g, size, size) the regression on the previous one, and the residuals' Cholesky factor."""
     groups = rows.shape[1] // size
     slope, spread = np.zeros((groups, size, size)), np.zeros((groups, size, size))
     copy_into(spread[0].ravel(), cholesky(covariance(rows, 0, 0, size), ridge).ravel())
@@ -76,7 +79,7 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:  
 
 @compiled
 def draw_chain(free: Floats, slope: Floats, spread: Floats) -> Floats:  # pragma: no cover - compiled
-    """Samples (n, g size) of the chain from independent standard normal numbers."""
+    """Compute samples (n, g size) of the chain from independent standard normal numbers."""
     groups, size, _ = slope.shape
     out = np.zeros(free.shape)
     for n in range(free.shape[0]):

@@ -1,14 +1,15 @@
-"""Many searches by one Gaussian each, from starts of many widths and places, of which the promising go on.
+"""Many searches with one Gaussian each, from starts of many widths and places.
 
-A single Gaussian follows one valley.  Where a narrow gap leads to a better one, no widening of it finds the gap, but a
-start that is as wide as the gap does.  Nobody knows how wide that is, so that starts are drawn with widths of all
-orders of magnitude.  Each is searched for a slice of evaluations, and goes on while it is among the better half of
-those that became as narrow, by what they had found by then (after the median rule of Golovin et al., "Google Vizier",
-KDD 2017).  Half of the evaluations go to the best search that waits, so that it converges too.
+Only the promising ones continue.
+A single Gaussian follows one valley.  If a narrow gap leads to a better valley, a wider Gaussian does not find the gap,
+but a start as wide as the gap does.  The width of the gap is unknown, so that starts are drawn with widths of all
+orders of magnitude.  Each start is searched for a slice of evaluations, and continues as long as it is among the better
+half of the searches that became equally narrow, by their results at that width (after the median rule of Golovin et
+al., "Google Vizier", KDD 2017).  Half of the evaluations go to the best waiting search, so that it converges, too.
 
-The Gaussian is learned as by CMA-ES (Hansen and Ostermeier, "Completely derandomized self-adaptation in evolution
+The Gaussian is adapted as in CMA-ES (Hansen and Ostermeier, "Completely derandomized self-adaptation in evolution
 strategies", Evolutionary Computation 9, 2001; Hansen, "The CMA evolution strategy: a tutorial", arXiv:1604.00772), with
-a Cholesky factor in place of its eigenvectors (Krause, Arbones and Igel, NIPS 2016).  Only ranks count.
+a Cholesky factor in place of its eigenvectors (Krause, Arbones and Igel, NIPS 2016).  Only ranks are used.
 """
 
 import math
@@ -19,28 +20,34 @@ import numpy as np
 from planner.optimisers.box_search import BoxSearch, Floats, Ints
 from planner.optimisers.linear_algebra import cholesky, covariance, times_lower
 
-# Standard deviations with which searches start, as shares of the box: drawn uniformly by their logarithm.
+# Smallest and largest standard deviation of a start, as fractions of the box; drawn log-uniformly.
 WIDTHS = 0.003, 0.3
-# Standard deviation of the first start.
+# Standard deviation of the first start, as a fraction of the box.
 FIRST_WIDTH = 0.2
-# Evaluations of a slice, for each variable.
+# Evaluations of a slice per variable.
 SLICE = 25
-# Share of searches that start from the box's middle, where a person puts what he expects; the others start anywhere.
+# Fraction of the searches that start from the centre of the box, where users put expected values; the others start
+# anywhere.
 FROM_MIDDLE = 0.5
-# A search that is not the best waits once it has had this share of all evaluations.
+# Fraction of all evaluations after which a search waits unless it is the best.
 MAX_SHARE = 0.1
-# A start whose first so many evaluations are all worth the same is given up; and a search in which so many later ones
-# are, which narrows by this factor in each such generation.
-BLIND_START, BLIND, NARROWING = 100, 1000, 0.9
-# A search has converged at a standard deviation of this share of the box, or this ratio of widest to narrowest.
-CONVERGED, LONGEST = 1e-10, 1e7
+# Number of first evaluations of equal rank after which a start is abandoned.
+BLIND_START = 100
+# Number of later evaluations of equal rank after which a search is abandoned.
+BLIND = 1000
+# Factor on the width of a search in each generation of equal rank.
+NARROWING = 0.9
+# Standard deviation at which a search has converged, as a fraction of the box.
+CONVERGED = 1e-10
+# Ratio of the largest to the smallest standard deviation at which a search has converged.
+LONGEST = 1e7
 
 
 class Gaussian:
-    """One Gaussian in the unit box, reflected at its sides, and the best that it has found.
+    """Gaussian in the unit box, reflected at its sides, with the best point that it has found.
 
-    mean: (d,).  deviation: share of the box.  population: of a generation.
-    scale: (d,) standard deviations beside each other at the start; None for equal ones.
+    mean: (d,).  deviation: fraction of the box.  population: samples per generation.
+    scale: (d,) relative standard deviations of the variables at the start; None for equal ones.
     """
 
     def __init__(self, mean: Floats, deviation: float, population: int, scale: Floats | None = None) -> None:
@@ -50,7 +57,7 @@ class Gaussian:
         self.weights = weights / weights.sum()
         effective = 1.0 / float((self.weights**2).sum())
         self._effective = effective
-        # Rates as in the tutorial's table 1.
+        # Rates of table 1 of the tutorial.
         self._step_rate = (effective + 2.0) / (size + effective + 5.0)
         self._damping = 1.0 + 2.0 * max(0.0, math.sqrt((effective - 1.0) / (size + 1.0)) - 1.0) + self._step_rate
         self._path_rate = (4.0 + effective / size) / (size + 4.0 + 2.0 * effective / size)
@@ -66,23 +73,23 @@ class Gaussian:
         self._blind, self._since_better = 0, 0
         self.evaluations = 0
         self.done = False
-        # The best point (d,) in the unit box and its scores (c,), once a generation has told points apart.
+        # The best point (d,) in the unit box and its scores (c,), once a generation has points of different rank.
         self.best: tuple[Floats, Floats] | None = None
-        # Its width, and the scores of its best, after each slice.
+        # Width and best scores after each slice.
         self.curve: list[tuple[float, Floats]] = []
 
     @property
     def width(self) -> float:
-        """Standard deviation of a variable, as a share of the box: the mean of all, by their squares."""
+        """Root mean square of the variables' standard deviations, as a fraction of the box."""
         return self.deviation * math.sqrt(float(np.diag(self._matrix).mean()))
 
     def draw(self, rng: np.random.Generator) -> Floats:
-        """A generation (population, d) in the unit box."""
+        """Draw a generation (population, d) in the unit box."""
         self._draws = rng.standard_normal((self.population, self.mean.size))
         return reflected(self.mean + self.deviation * times_lower(self._draws, self._factor))
 
     def learn(self, points: Floats, scores: Floats, rank: Callable[[Floats], Ints], noise: Floats) -> None:
-        """Take the scores (n, c) of the generation last drawn, (n, d).  noise: (n,), what ties are broken by."""
+        """Take the scores (n, c) of the last generation (n, d).  noise: (n,) random numbers that break ties."""
         self.evaluations += len(points)
         ranks = rank(scores)
         if not ranks.any():
@@ -130,7 +137,7 @@ class Gaussian:
 
 
 class Multistart(BoxSearch):
-    """Searches by one Gaussian each, from starts of many widths; a slice of evaluations at a time.
+    """Searches with one Gaussian each, from starts of many widths, by slices of evaluations.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -141,11 +148,11 @@ class Multistart(BoxSearch):
     >>> bool(search.scores.min() < 1e-6)
     True
 
-    The arguments are those of `BoxSearch`; population is the most that a generation has, once there have been many
-    starts.  With first samples, these are asked for first, and the middle is that of their better half, with its
-    deviations.
+    The arguments are the same as for `BoxSearch`; population is the largest generation, reached after many starts.
+    First samples, if given, are evaluated first, and the mean and the deviations of their better half replace the
+    centre of the box and its scale.
 
-    samples and scores are the best of all and then the last generation's, (n, d) and (n, c), best first; empty before
+    samples and scores are the best sample of all and the last generation, (n, d) and (n, c), best first; empty before
     the first `tell`.
     """
 
@@ -163,8 +170,8 @@ class Multistart(BoxSearch):
         self._population = population
         self._middle, self._scale = np.full(lower.size, 0.5), None
         self._searches: list[Gaussian] = []
-        # Evaluations at which the slice began; spent on new starts, and on searches that waited.
-        self._sliced, self._continued = 0, False
+        # Evaluations at the beginning of the slice; evaluations spent on new starts and on continued searches.
+        self._slice_start, self._continued = 0, False
         self._spent = {False: 0, True: 0}
         self._search: Gaussian | None = None
         if initial is None:
@@ -172,7 +179,7 @@ class Multistart(BoxSearch):
             self._draw(self._search)
 
     def tell(self, scores: Floats) -> None:
-        """Take the scores (n, c) of the samples last asked for, and draw the next generation."""
+        """Take the scores (n, c) of the last samples of `ask`, and draw the next generation."""
         ranks, noise = self._rank(scores), self._rng.random(len(scores))
         order = np.lexsort((noise, ranks))
         self._keep(self._asked[order], scores[order])
@@ -182,13 +189,13 @@ class Multistart(BoxSearch):
             self._scale = spread / math.sqrt(float((spread**2).mean()))
             self._search = self._start()
         else:
-            self._search.learn(self._unit_asked, scores, self._rank, noise)
-            if self._search.done or self._search.evaluations - self._sliced >= SLICE * self.lower.size:
+            self._search.learn(self._asked_in_unit_box, scores, self._rank, noise)
+            if self._search.done or self._search.evaluations - self._slice_start >= SLICE * self.lower.size:
                 self._search = self._next(self._search)
         self._draw(self._search)
 
     def _keep(self, points: Floats, scores: Floats) -> None:
-        """Keep a generation, best first, and before it the best of all."""
+        """Store a generation, best first, after the best sample of all."""
         if len(self.scores) and self._rank(np.stack([self.scores[0], scores[0]]))[0] == 0:
             points, scores = np.concatenate([self.samples[:1], points]), np.concatenate([self.scores[:1], scores])
         self.samples, self.scores = points, scores
@@ -197,21 +204,21 @@ class Multistart(BoxSearch):
         return (points - self.lower) / (self.upper - self.lower)
 
     def _draw(self, search: Gaussian) -> None:
-        self._unit_asked = search.draw(self._rng)
-        self._asked = np.clip(self.lower + self._unit_asked * (self.upper - self.lower), self.lower, self.upper)
+        self._asked_in_unit_box = search.draw(self._rng)
+        self._asked = np.clip(self.lower + self._asked_in_unit_box * (self.upper - self.lower), self.lower, self.upper)
 
     def _next(self, search: Gaussian) -> Gaussian:
-        """The search that the next slice goes to, after a slice of this one."""
-        self._spent[self._continued] += search.evaluations - self._sliced
-        chosen = search if self._goes_on(search) else self._choose()
-        self._sliced = chosen.evaluations
+        """Return the search of the next slice, after a slice of this one."""
+        self._spent[self._continued] += search.evaluations - self._slice_start
+        chosen = search if self._may_continue(search) else self._choose()
+        self._slice_start = chosen.evaluations
         return chosen
 
-    def _goes_on(self, search: Gaussian) -> bool:
-        """Whether a search, at the end of a slice, is among the better half of those that became as narrow.
+    def _may_continue(self, search: Gaussian) -> bool:
+        """Return True if a search, at the end of a slice, is among the better half of the equally narrow searches.
 
-        Those are compared by what they had found when they were as wide.  The best of all waits for its turn, so that
-        half of the evaluations go to others.
+        The searches are compared by their results at the same width.  The best search of all waits for its turn, so
+        that half of the evaluations go to others.
         """
         if search.best is None:
             return False
@@ -227,7 +234,7 @@ class Multistart(BoxSearch):
         return 2 * int((ranks[1:] < ranks[0]).sum()) <= len(as_narrow)
 
     def _choose(self) -> Gaussian:
-        """The best search that waits, or a new start, whichever has had fewer evaluations."""
+        """Return the best waiting search or a new start, whichever kind has had fewer evaluations."""
         waiting = [search for search in self._searches if search.curve and not search.done]
         self._continued = bool(waiting) and self._spent[True] <= self._spent[False]
         if self._continued:
@@ -235,7 +242,7 @@ class Multistart(BoxSearch):
         return self._start()
 
     def _start(self) -> Gaussian:
-        """A new search: the first from the middle, as wide as most need, later ones of any width."""
+        """Start a new search: the first from the centre with a typical width, later ones of any width."""
         size = self.lower.size
         least = min(self._population, 4 + int(3.0 * math.log(size)))
         if not self._searches:
@@ -244,7 +251,7 @@ class Multistart(BoxSearch):
             low, high = (math.log(width) for width in WIDTHS)
             width = math.exp(self._rng.uniform(low, high))
             mean = self._middle if self._rng.random() < FROM_MIDDLE else self._rng.random(size)
-            # Generations grow with the number of starts.
+            # The size of generations grows with the number of starts.
             most = max(1.0, min(self._population / least, 1.0 + len(self._searches) / 4.0))
             search = Gaussian(mean, width, int(least * most ** self._rng.random()), self._scale)
         self._searches.append(search)
@@ -252,6 +259,6 @@ class Multistart(BoxSearch):
 
 
 def reflected(points: Floats) -> Floats:
-    """Points (n, d) or (d,) brought into the unit box by reflection at its sides."""
+    """Return points (n, d) or (d,) reflected into the unit box at its sides."""
     folded = np.mod(points, 2.0)
     return np.where(folded > 1.0, 2.0 - folded, folded)

@@ -1,4 +1,4 @@
-"""Sampling with niches: many groups of variables at once, each with a mixture of Gaussians around its best samples.
+"""Sampling with niches: many groups of variables, each with a mixture of Gaussians around its best samples.
 
 Where `planner.optimisers.umda` fits one Gaussian to each variable, the density of a group here is a sum of Gaussians
 around its selected samples (Bosman and Thierens, "IDEAs based on the normal kernels probability density function",
@@ -17,22 +17,24 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-# Redraws of an infeasible sample before it is accepted: of the first samples, and of later ones.
-FIRST_REDRAWS, REDRAWS = 8, 4
-# Clearing radius of niches, as a share of the sampling deviation.
+# Redraws of an infeasible first sample before it is accepted.
+FIRST_REDRAWS = 8
+# Redraws of an infeasible later sample before it is accepted.
+REDRAWS = 4
+# Clearing radius of niches, as a fraction of the sampling deviation.
 CLEARING = 0.5
-# Maximum share of a group's samples that are selected.
+# Largest fraction of a group's samples that is selected.
 MAX_SELECTED_SHARE = 0.5
-# Samples selected of each group whatever their cost.
+# Number of samples of each group that are selected regardless of their cost.
 MIN_SELECTED = 4
 
 
 class NicheSampling:
-    """Samples of groups of variables (g, n, d), from the whole box to the niches of the best.
+    """Sampling of groups of variables (g, n, d), from the whole box to the niches of the best samples.
 
     lower, upper: (g, d) boxes.
     allowed: samples (n, d) of groups (n,) -> feasibility (n,).
-    rng: of all draws.
+    rng: random generator of all samples.
 
     >>> lower, upper = np.full((3, 2), -2.0), np.full((3, 2), 6.0)
     >>> search = NicheSampling(lower, upper, lambda rows, groups: rows[:, 0] > -1.0, np.random.default_rng(1))
@@ -56,10 +58,10 @@ class NicheSampling:
         self._rng = rng
 
     def first(self, count: int, beyond: Floats | float = 0.0) -> Floats:
-        """Samples (g, count, d), uniform in the boxes.
+        """Draw samples (g, count, d), uniform in the boxes.
 
-        beyond: (d,) share of the box by which draws extend above it before they are clipped, for variables whose best
-        values are at the upper bound, which uniform draws would hardly ever reach.
+        beyond: (d,) fraction of the box by which samples extend above it before they are clipped, for variables with
+        their best values at the upper bound, which uniform samples would hardly ever reach.
         """
         size = (len(self._lower), count, self._lower.shape[1])
         top = self._upper + beyond * (self._upper - self._lower)
@@ -74,10 +76,10 @@ class NicheSampling:
     def next(
         self, rows: Floats, costs: Floats, count: int, deviation: Floats, max_cost: float, elite: Floats
     ) -> Floats:
-        """Samples (g, count, d): the elite, the best of each niche, and new samples around these.
+        """Return samples (g, count, d): the elite, the best of each niche, and new samples around these.
 
-        rows: (g, n, d) with costs (g, n). deviation: (d,) of new samples. max_cost: maximum cost of a selected sample.
-        elite: (g, d), always selected.
+        rows: (g, n, d) with costs (g, n). deviation: (d,) standard deviations of new samples. max_cost: maximum cost of
+        a selected sample. elite: (g, d), always selected.
         """
         selected, numbers = _select(
             rows, costs, elite, CLEARING * deviation, max_cost, max(1, int(MAX_SELECTED_SHARE * count))
@@ -95,7 +97,7 @@ class NicheSampling:
         return out
 
     def _draw(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], redraws: int) -> Floats:
-        """Samples of this shape, from a function that draws one for each group number; infeasible ones are redrawn."""
+        """Draw samples of this shape with a function of the group numbers, and redraw infeasible samples."""
         groups = np.repeat(np.arange(size[0]), size[1])
         out = draw(groups)
         bad = np.flatnonzero(~self._allowed(out, groups))
@@ -112,7 +114,7 @@ class NicheSampling:
 def _select(
     rows: Floats, costs: Floats, elite: Floats, clearing_radius: Floats, max_cost: float, number: int
 ) -> tuple[Floats, Ints]:  # pragma: no cover - compiled
-    """Selected samples (g, number, d) of each group, the elite first, and their numbers (g,)."""
+    """Select samples (g, number, d) of each group, the elite first, and return them with their numbers (g,)."""
     groups, _, size = rows.shape
     selected, numbers = np.zeros((groups, number, size)), np.ones(groups, dtype=np.int64)
     for g in range(groups):
@@ -129,7 +131,7 @@ def _select(
 
 @inner
 def _is_distinct(row: Floats, others: Floats, clearing_radius: Floats) -> bool:  # pragma: no cover - compiled
-    """Whether a sample (d,) differs from each of the others by at least `clearing_radius` in some variable."""
+    """Return True if a sample (d,) differs from each other one by at least `clearing_radius` in some variable."""
     for n in range(others.shape[0]):
         near = True
         for d in range(row.size):

@@ -4,8 +4,8 @@ Fonseca and Fleming, "Multiobjective optimization and multiple constraint handli
 Transactions on Systems, Man, and Cybernetics A 28, 1998. Levels are in order of priority. Let U be the components of a
 level in which u violates its goal. Then u is preferred to v if u dominates v on U; or if they are equal on U and either
 v violates a goal outside U, or u is preferred to v at the next level (at the lowest: u dominates v on the components
-that satisfy their goals). A component without a goal counts as violated (goal -inf), so for a level without goals U is
-all its components.
+that satisfy their goals). A component without a goal is treated as violated (goal -inf), so that for a level without
+goals U is all its components.
 """
 
 from collections.abc import Sequence
@@ -21,13 +21,15 @@ Ints = NDArray[np.int64]
 
 NO_GOAL = -np.inf
 
-# Run length of insertion sort; and number of rows of two columns above which a tree counts faster than a scan.
-INSERTION_RUN, TREE_THRESHOLD = 8, 4000
+# Run length of insertion sort.
+INSERTION_RUN = 8
+# Number of rows of two columns above which a tree is faster than a scan.
+TREE_THRESHOLD = 4000
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """One priority level: columns of the scores, all minimised, and a goal for each (`NO_GOAL` for none)."""
+    """Priority level: columns of the scores, all minimised, and a goal for each (`NO_GOAL` without a goal)."""
 
     columns: tuple[int, ...]
     goals: tuple[float, ...]
@@ -39,7 +41,7 @@ class Level:
 
 
 def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
-    """Number of rows of scores (n, c) that are preferred to each, (n,), counted level by level.
+    """Return for each row of scores (n, c) the number of rows preferred to it, (n,), counted level by level.
 
     With every component raised to its goal, "u dominates v on U, or is equal there and v violates a goal outside U" is
     Pareto dominance on the level, and only rows equal on it proceed to the next: a component outside U is at its goal,
@@ -60,7 +62,7 @@ def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
 
 @compiled
 def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compiled
-    """Ranks (n,) of a table (c, n) whose levels have these widths."""
+    """Return the ranks (n,) of a table (c, n) whose levels have these widths."""
     count = table.shape[1]
     total = np.zeros(count, dtype=np.int64)
     order, scratch = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
@@ -138,7 +140,7 @@ def _sort(
 
 @inner
 def _before(table: Floats, column: int, width: int, a: int, b: int) -> bool:  # pragma: no cover - compiled
-    """Whether row a precedes row b, column by column."""
+    """Return True if row a precedes row b, column by column."""
     for c in range(column, column + width):
         if table[c, a] != table[c, b]:
             return bool(table[c, a] < table[c, b])
@@ -175,7 +177,7 @@ def _count_any(
 
 @inner
 def _at_most(values: Floats, limit: float) -> int:  # pragma: no cover - compiled
-    """Number of values not above the limit. Without branches, so that the loop is vectorised."""
+    """Count the values not above the limit, without branches, so that the loop is vectorised."""
     count = 0
     for k in range(values.size):
         count += 1 if values[k] <= limit else 0
@@ -191,7 +193,7 @@ def _and_at_most(values: Floats, limit: float, marks: Ints) -> None:  # pragma: 
 
 @inner
 def _count_marks(marks: Ints) -> int:  # pragma: no cover - compiled
-    """Number of marks that are 1; the others are 0."""
+    """Count the marks that are 1; the others are 0."""
     count = 0
     for k in range(marks.size):
         count += marks[k]
@@ -200,7 +202,10 @@ def _count_marks(marks: Ints) -> int:  # pragma: no cover - compiled
 
 @inner
 def _places(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:  # pragma: no cover - compiled
-    """Places of a group's rows in the order of the second column, from 1, equal ones alike; and how many there are."""
+    """Return the places of a group's rows in the order of the second column, from 1, and the number of places.
+
+    Equal values have the same place.
+    """
     count = end - begin
     order, places = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
     for k in range(count):
@@ -216,9 +221,9 @@ def _places(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:  # pragma: 
 
 @inner
 def _count_pairs(rows: Floats, begin: int, end: int, order: Ints, total: Ints) -> None:  # pragma: no cover - compiled
-    """Add the number of dominators of each row of a group to total, with a Fenwick tree over the second of two columns.
+    """Add the number of dominators of each row of a group to total, in O(n log n), for many rows.
 
-    O(n log n), for many rows.
+    Uses a Fenwick tree over the second of two columns.
     """
     places, number = _places(rows, begin, end)
     tree = np.zeros(number + 1, dtype=np.int64)

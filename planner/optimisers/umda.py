@@ -16,7 +16,7 @@ REDRAWS = 10
 
 
 class Umda(BoxSearch):
-    """Keeps the better half of a population and replaces the other half by samples of its marginal distributions.
+    """UMDA: keeps the better half of a population and replaces the other half by samples of its marginals.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -27,7 +27,7 @@ class Umda(BoxSearch):
     >>> bool(search.scores.min() < 1e-6)
     True
 
-    The other arguments are those of `BoxSearch`.
+    The other arguments are the same as for `BoxSearch`.
 
     basis: (d, d) orthogonal matrix whose columns are the directions along which marginals are independent; None for the
     variables themselves.
@@ -53,7 +53,7 @@ class Umda(BoxSearch):
         self._floor = floor
 
     def tell(self, scores: Floats) -> None:
-        """Take the scores (n, c) of the samples last asked for, select the better half and sample the next ones."""
+        """Take the scores (n, c) of the last samples of `ask`, select the better half, and draw the next samples."""
         samples = np.concatenate([self.samples, self._asked])
         known = np.concatenate([self.scores, scores]) if len(self.scores) else scores
         # Ties are broken by a seeded draw, not by age.
@@ -62,7 +62,7 @@ class Umda(BoxSearch):
         self._asked = self._sample(len(samples) - self._half)
 
     def _sample(self, count: int) -> Floats:
-        """Samples of independent Gaussians (maximum likelihood, 1/N), redrawn and finally clipped to the box."""
+        """Draw samples of independent Gaussians (maximum likelihood, 1/N), redrawn and finally clipped to the box."""
         selected = self.samples if self._basis is None else _project(self.samples, self._basis)
         mean, deviation = selected.mean(axis=0), selected.std(axis=0)
         if self._floor is not None:
@@ -75,7 +75,7 @@ class Umda(BoxSearch):
         )
 
     def _redraw(self, draw: Callable[[int], Floats], count: int) -> Floats:
-        """Samples of `draw`; those outside the box are redrawn and finally clipped."""
+        """Draw samples with `draw`; samples outside the box are redrawn and finally clipped."""
         out = draw(count)
         rows = np.flatnonzero(((out < self.lower) | (out > self.upper)).any(axis=1))
         for _ in range(REDRAWS):
@@ -87,7 +87,7 @@ class Umda(BoxSearch):
         return np.clip(out, self.lower, self.upper)
 
     def _redraw_each(self, drawn: Floats, mean: Floats, deviation: Floats) -> Floats:
-        """Values drawn from independent Gaussians; those outside the box are redrawn and finally clipped."""
+        """Redraw the values outside the box from independent Gaussians, and finally clip them."""
         rows, columns = np.nonzero((drawn < self.lower) | (drawn > self.upper))
         for _ in range(REDRAWS):
             if rows.size == 0:

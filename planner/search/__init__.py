@@ -1,1 +1,1 @@
-"""Whole searches: from a scenario to a certified plan, again in flight, and why none was found."""
+"""Whole searches: from a scenario to a certified plan, replanning in flight, and explanations of failures."""

@@ -1,4 +1,4 @@
-"""The planning algorithms by name, and the limits within which each plans.
+"""Planning algorithms by name, and the limits that each of them plans within.
 
 An `Algorithm` combines an encoding, a kind of scores, seeding and an optimiser; `ALGORITHMS` lists all that a scenario
 or a command may name.
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 from world.errors import ScenarioError
 from world.files import did_you_mean
 
-# A command's help names the algorithms without what they run on.
+# The help of commands lists the algorithms without importing the aircraft's limits.
 if TYPE_CHECKING:
     from aircraft.path_limits import Limits
 
@@ -19,7 +19,7 @@ Optimiser = Literal["umda", "emna", "chain", "differential", "waypoints"]
 
 @dataclass(frozen=True, slots=True)
 class Algorithm:
-    """One search method: its encoding and its extensions of the planner of Yang, Tang and Lozano (CEC 2014).
+    """Search method: its encoding and its extensions of the planner of Yang, Tang and Lozano (CEC 2014).
 
     name, summary: as shown by commands and their help.
     encoding: a name of `planner.evaluation.encoding.ENCODINGS`.
@@ -137,7 +137,7 @@ DEFAULT = "fda-seeded"
 
 
 def algorithm_lines() -> str:
-    """The algorithms, one line each: name and summary.
+    """Return name and summary of the algorithms, one line each.
 
     >>> print(algorithm_lines().splitlines()[3])
       umda-smooth     UMDA in the rotated frame, graded violations, sampled in a smooth basis, no seeds
@@ -147,7 +147,7 @@ def algorithm_lines() -> str:
 
 
 def find_algorithm(name: str | None, source: str) -> Algorithm:
-    """The algorithm with this name; the default for None. Raises ScenarioError for an unknown name.
+    """Return the algorithm with this name, or the default for None. Raises ScenarioError for an unknown name.
 
     source: origin of the name, with which the error message begins.
 
@@ -162,5 +162,8 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
 
 
 def limits_for(algorithm: Algorithm, limits: "Limits") -> "Limits":
-    """Limits for an algorithm: those with the paper's violation counts ignore the autopilot's tracking error."""
+    """Return the limits for an algorithm.
+
+    With the paper's violation counts they ignore the tracking error.
+    """
     return limits if algorithm.graded else replace(limits, tracking=None)

@@ -1,12 +1,12 @@
-"""Proof that no path exists, whatever its waypoints: ground, ceiling and missiles close every way on the map.
+"""Prove that no path exists for any waypoints: ground, ceiling and missiles block every path on the map.
 
-In thin air an aircraft can be too slow to hold its height at its cruise speed; no leg may begin or end there, so that
-the height at which this begins closes like a ceiling.
+In thin air an aircraft may not be able to hold its altitude at its cruise speed; no leg may begin or end there, so that
+the lowest such altitude acts as a ceiling.
 
-The map is cut into square columns. A height is closed in a column if the whole square is inside one kill sphere there,
-or below the lowest ground of the square plus the clearance; everything else counts as open, and a path may go from a
-column to the next one, or to the one after, at any height that is open in both. So no safe path exists if the
-destination is not reached then. Other slopes, turns, zones and margins are ignored: they only close more.
+The map is divided into square columns. An altitude is closed in a column if the whole square is inside one kill sphere
+there, or below the lowest ground of the square plus the clearance; all other altitudes are open, and a path may go from
+a column to a neighbour, and on from there, at any altitude that is open in both. If the destination is not reached, no
+safe path exists. Other slopes, turns, zones and margins are ignored: they could only close more.
 """
 
 import math
@@ -24,23 +24,26 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-# Columns along the map's longer side; their smallest side, m; and closed stretches of height that a column may have:
-# what is above counts as open.
-COLUMNS, MIN_SIDE, STRETCHES = 500, 10.0, 6
-# Added to the height of the highest level flight, m: more than its interpolation can be off by.
+# Number of columns along the map's longer side.
+COLUMNS = 500
+# Smallest side of a column, m.
+MIN_SIDE = 10.0
+# Maximum number of closed altitude ranges of a column; further ranges stay open.
+STRETCHES = 6
+# Added to the altitude of the highest level flight, m: more than the error of its interpolation.
 ROUNDING = 1e-6
 
 
 def column_side(data: ProblemArrays) -> float:
-    """Side of the columns, m: gaps that are narrower than about this may count as open."""
+    """Return the side of the columns, m; closed areas narrower than about this may be treated as open."""
     return max(MIN_SIDE, max(data.east - data.west, data.north - data.south) / COLUMNS)
 
 
 def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float = 0.0) -> bool:
-    """Whether no path from start to destination stays above the clearance, below the ceiling and outside all missiles.
+    """Return True if no path stays above the clearance, below the ceiling and outside all missiles.
 
-    missiles: (m,) which of `data.threats` there are; None for all. margin: kept from their spheres, m. False where
-    nothing is proven.
+    missiles: (m,) True for the `data.threats` that are considered; None for all. margin: distance from their spheres,
+    m. False if nothing is proven.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -57,15 +60,15 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
 
 
 def highest_level_flight(data: ProblemArrays) -> float:
-    """Height that no waypoint may exceed, m: above it the aircraft sinks, and no leg may lead; inf where there is none.
+    """Return the altitude above which the aircraft sinks in level flight, so that no waypoint may exceed it, m.
 
-    As in `planner.evaluation.leg_constraints`, where both slopes are the aircraft's. Nothing is said of winds in which
-    a course cannot be held.
+    Returns inf without such an altitude, and in winds in which a course cannot be held. As in
+    `planner.evaluation.leg_constraints`, if both slope limits are the aircraft's own.
     """
     table = data.aircraft
     if not (math.isnan(data.max_climb) and math.isnan(data.max_dive) and table.equivalent > 0.0):
         return math.inf
-    # The entries on which slopes below the ceiling depend.
+    # The table entries that affect slopes below the ceiling.
     count = int(np.searchsorted(table.amsl, data.ceiling)) + 1
     climb, amsl = table.climb[:count], table.amsl[:count]
     level = np.flatnonzero(climb >= 0.0)
@@ -80,14 +83,14 @@ def highest_level_flight(data: ProblemArrays) -> float:
     slowest = true_airspeed(table, max(top, data.floor)) * math.cos(steepest)
     wind = table.wind_speed, table.wind_gradient, table.wind_reference_amsl
     strongest = max(mean_wind_speed(*wind, data.floor), mean_wind_speed(*wind, data.ceiling))
-    # False where a slope is not known.
+    # The comparison is False for an unknown slope (NaN).
     return top if strongest < slowest else math.inf
 
 
 def closing_missiles(data: ProblemArrays) -> list[int] | None:
-    """Indices of missiles that close every way together with ground and ceiling, none of which can be left out.
+    """Return the indices of a minimal set of missiles that block every path together with ground and ceiling.
 
-    None where `is_closed` proves nothing; empty where ground and ceiling suffice.
+    Returns None if `is_closed` proves nothing; empty if ground and ceiling suffice.
     """
     if not is_closed(data):
         return None
@@ -112,12 +115,12 @@ def _flags(indices: Ints, count: int) -> Flags:
 
 @compiled
 def _is_closed(data: ProblemArrays, missiles: Flags, side: float, margin: float) -> bool:  # pragma: no cover - compiled
-    """See `is_closed`; side: of a column, m."""
+    """Implement `is_closed`; side: side of a column, m."""
     columns, rows = (
         max(1, math.ceil((data.east - data.west) / side)),
         max(1, math.ceil((data.north - data.south) / side)),
     )
-    # Closed stretches of height of each column, in ascending order and apart: lower and upper ends, and their number.
+    # Closed altitude ranges of each column, ascending and disjoint: lower ends, upper ends, and their number.
     low, high = np.empty((columns, rows, STRETCHES)), np.empty((columns, rows, STRETCHES))
     count = np.zeros((columns, rows), dtype=np.int64)
     for i in range(columns):
@@ -134,7 +137,7 @@ def _is_closed(data: ProblemArrays, missiles: Flags, side: float, margin: float)
 
 @inner
 def _lowest_ground(data: ProblemArrays, i: int, j: int, side: float) -> float:  # pragma: no cover - compiled
-    """Lowest pixel under a column and next to it, m; -inf where any is missing."""
+    """Return the lowest pixel under a column and next to it, m; -inf if any is missing."""
     first_column, first_row, last_column, last_row = math.inf, math.inf, -math.inf, -math.inf
     for corner in range(4):
         east, north = data.west + (i + corner % 2) * side, data.south + (j + corner // 2) * side
@@ -158,7 +161,10 @@ def _lowest_ground(data: ProblemArrays, i: int, j: int, side: float) -> float:  
 def _close_sphere(
     east: float, north: float, up: float, radius: float, side: float, low: Floats, high: Floats, count: Ints
 ) -> None:  # pragma: no cover - compiled
-    """Close the heights at which a whole column is inside a sphere; east, north: from the map's corner, m."""
+    """Close the altitudes at which a whole column is inside a sphere.
+
+    East, north: from the map's corner, m.
+    """
     columns, rows = count.shape
     first, last = max(0, math.floor((east - radius) / side)), min(columns - 1, math.floor((east + radius) / side))
     bottom, top = max(0, math.floor((north - radius) / side)), min(rows - 1, math.floor((north + radius) / side))
@@ -169,14 +175,17 @@ def _close_sphere(
             left = radius * radius - dx * dx - dy * dy
             if left > 0.0:
                 half = math.sqrt(left)
-                _close_stretch(low[i, j], high[i, j], count[i], j, up - half, up + half)
+                _close_range(low[i, j], high[i, j], count[i], j, up - half, up + half)
 
 
 @inner
-def _close_stretch(
+def _close_range(
     low: Floats, high: Floats, count: Ints, j: int, begin: float, end: float
 ) -> None:  # pragma: no cover - compiled
-    """Add a stretch of height to the closed ones of column j of a row of columns; what finds no place stays open."""
+    """Add an altitude range to the closed ranges of column j of a row.
+
+    A range beyond the maximum number stays open.
+    """
     kept = 0
     for k in range(count[j]):
         if low[k] <= end and begin <= high[k]:
@@ -199,9 +208,9 @@ def _close_stretch(
 def _reaches(
     data: ProblemArrays, side: float, low: Floats, high: Floats, count: Ints
 ) -> bool:  # pragma: no cover - compiled
-    """Whether the destination is reached from the start through open heights of columns side by side.
+    """Return True if the destination can be reached from the start through open altitudes of adjacent columns.
 
-    Open stretch s of a column is that above its closed stretch s.
+    Open range s of a column is above its closed range s.
     """
     columns, rows, stretches = low.shape
     ends = np.zeros(2, dtype=np.int64)
@@ -209,7 +218,7 @@ def _reaches(
         point = data.start if k == 0 else data.destination
         i = min(columns - 1, max(0, math.floor((point[0] - data.west) / side)))
         j = min(rows - 1, max(0, math.floor((point[1] - data.south) / side)))
-        # A fixed end may be lower than the clearance; then it is in the lowest open stretch.
+        # A fixed end may be below the clearance; then it is in the lowest open range.
         s = 0
         while s + 1 < count[i, j] and low[i, j, s + 1] < point[2]:
             s += 1

@@ -1,9 +1,9 @@
-"""Explanations of a search without a feasible path: obstacles that block all routes, and limits of the method.
+"""Explain a search without a feasible path: obstacles that block all routes, and limits of the method.
 
-`explain_failure` collects lines for the user. It looks for lines across the map where ground and clearance reach the
+`explain_failure` collects lines for the user. It searches for lines across the map where ground and clearance reach the
 ceiling, or missiles cover the remaining heights; for zones that separate the start from the destination on a coarse
-grid (connected components); for bands of heights that the required margins close; and for missiles of which
-`planner.search.closed_ways` proves that they leave no path.
+grid (connected components); for vertical bands that the required margins close; and for missiles that leave no path, as
+`planner.search.closed_ways` proves.
 """
 
 import itertools
@@ -33,17 +33,21 @@ Flags = NDArray[np.bool_]
 # --- Zones that separate start and destination ---
 
 
-# Cells along the map's longer side, and heights from the lowest to the highest allowed.
-CELLS, HEIGHTS = 150, 5
-# State of a cell, unless it is the index of the zone that closes it.
-_OPEN, _GROUND = -1, -2
+# Number of cells along the map's longer side.
+CELLS = 150
+# Number of heights from the lowest to the highest allowed.
+HEIGHTS = 5
+# State of an open cell; the state of a cell closed by a zone is the index of the zone.
+_OPEN_CELL = -1
+# State of a cell closed by the ground.
+_GROUND_CELL = -2
 
 
 class SeparatingZones(NamedTuple):
     """Zones that separate start and destination.
 
-    zones: names of the zones adjacent to both regions, that reachable from the start and that from the destination.
-    pitch: of the cells, m.
+    zones: names of the zones adjacent to both the region of the start and the region of the destination.
+    pitch: side of the cells, m.
     """
 
     zones: tuple[str, ...]
@@ -51,9 +55,9 @@ class SeparatingZones(NamedTuple):
 
 
 def separating_zones(scenario: Scenario) -> SeparatingZones | None:
-    """Zones that separate start and destination; None if there are none, or if the ground alone separates them.
+    """Return the zones that separate start and destination; None without any, or if the ground alone does.
 
-    A gap narrower than a cell counts as closed. Missiles and the aircraft's climb are ignored.
+    A gap narrower than a cell is treated as closed. Missiles and the aircraft's climb are ignored.
 
     >>> from world.scenario import load_scenario
     >>> separating_zones(load_scenario("tight")) is None
@@ -69,24 +73,24 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
     top = np.full(ground.shape, scenario.ceiling)
     if scenario.limits.max_height_m is not None:
         top = np.minimum(top, ground + scenario.limits.max_height_m)
-    cells = np.full((HEIGHTS, *ground.shape), _OPEN, dtype=np.int64)
-    cells[:, ~(low <= top)] = _GROUND
+    cells = np.full((HEIGHTS, *ground.shape), _OPEN_CELL, dtype=np.int64)
+    cells[:, ~(low <= top)] = _GROUND_CELL
     ends = [_cell_of(scenario, end, pitch, low, top) for end in (scenario.start, scenario.destination)]
     if not _connected(cells, ends):
         return None
     _close_cells(zone_records(scenario.zones), east, north, ground, low, top, cells)
     for end in ends:
-        cells[end] = _OPEN
+        cells[end] = _OPEN_CELL
     if _connected(cells, ends):
         return None
-    adjacent = [_grown(_reached(cells == _OPEN, end)) for end in ends]
+    adjacent = [_grown(_reached(cells == _OPEN_CELL, end)) for end in ends]
     both = [set(cells[edge].tolist()) for edge in adjacent]
     found = (both[0] & both[1]) or (both[0] | both[1])
     return SeparatingZones(tuple(scenario.zones[z].name for z in sorted(found) if z >= 0), pitch)
 
 
 def _cell_of(scenario: Scenario, end: Floats, pitch: float, low: Floats, top: Floats) -> tuple[int, int, int]:
-    """Height, row and column of the cell of a fixed end."""
+    """Return height, row and column of the cell of a fixed end."""
     cell = ((end[:2] - scenario.bounds[:, 0]) / pitch).astype(np.int64)
     column, row = (int(np.clip(at, 0, size - 1)) for at, size in zip(cell, (low.shape[1], low.shape[0]), strict=True))
     share = (end[2] - low[row, column]) / max(float(top[row, column] - low[row, column]), 1e-6)
@@ -94,12 +98,15 @@ def _cell_of(scenario: Scenario, end: Floats, pitch: float, low: Floats, top: Fl
 
 
 def _connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
-    """Whether open cells connect the two ends."""
-    return bool(_reached(cells == _OPEN, ends[0])[ends[1]])
+    """Return True if open cells connect the two ends."""
+    return bool(_reached(cells == _OPEN_CELL, ends[0])[ends[1]])
 
 
 def _reached(is_open: Flags, start: tuple[int, int, int]) -> Flags:
-    """The open cells that are reached from one of them through their sides; none from a cell that is not open."""
+    """Return the open cells that can be reached from a cell through their sides.
+
+    None if the cell is not open.
+    """
     reached = np.zeros_like(is_open)
     reached[start] = is_open[start]
     count = -1
@@ -109,7 +116,7 @@ def _reached(is_open: Flags, start: tuple[int, int, int]) -> Flags:
 
 
 def _grown(cells: Flags) -> Flags:
-    """Cells and those that share a side with one of them."""
+    """Return the cells and all cells that share a side with one of them."""
     grown = cells.copy()
     for axis in range(cells.ndim):
         whole, one = np.moveaxis(grown, axis, 0), np.moveaxis(cells, axis, 0)
@@ -134,7 +141,7 @@ def _close_cells(
                 for k in range(cells.shape[0]):
                     up = low[i, j] + (top[i, j] - low[i, j]) * k / (cells.shape[0] - 1)
                     within = inside and not outside_band(zone, up, ground[i, j]) > 0.0
-                    if cells[k, i, j] == _OPEN and within == zone.exclusion:
+                    if cells[k, i, j] == _OPEN_CELL and within == zone.exclusion:
                         cells[k, i, j] = z
 
 
@@ -142,7 +149,7 @@ def _close_cells(
 
 
 def closed_bands(problem: Problem) -> list[str]:
-    """Lines that name each band of heights, of the limits or of an inclusion, that the required margins close.
+    """Return a line for each vertical band of the limits or of an inclusion that the required margins close.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -178,7 +185,7 @@ def closed_bands(problem: Problem) -> list[str]:
 
 
 def max_altitude(problem: Problem) -> tuple[float, str]:
-    """Greatest height of a plan anywhere, m AMSL, and the limit that sets it: the ceiling, or that of an inclusion.
+    """Return the highest altitude of a plan, m AMSL, and the limit that sets it: the ceiling or an inclusion's ceiling.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -198,17 +205,23 @@ def max_altitude(problem: Problem) -> tuple[float, str]:
 
 # --- Lines for the user ---
 
-# Points along and across the direct line.
-ALONG, ACROSS = 200, 400
-# Maximum number of zones, and of missiles, named; and spacing of points on a path that is tested against them, m.
-MAX_NAMES, MAX_CLOSING, ZONE_PITCH = 4, 12, 20.0
+# Number of points along the direct line.
+ALONG = 200
+# Number of points across the direct line.
+ACROSS = 400
+# Maximum number of zones that are named.
+MAX_NAMES = 4
+# Maximum number of missiles that are named.
+MAX_CLOSING = 12
+# Spacing of points on a path that is tested against zones, m.
+ZONE_PITCH = 20.0
 
 
 def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
-    """Lines that state what blocks an infeasible plan, and what a search in its encoding cannot find.
+    """Return lines that state what blocks an infeasible plan, and what a search in its encoding cannot find.
 
-    limits: of the path; if given, the margins that a plan requires are examined too, and nothing is said of a path that
-    keeps all of them.
+    limits: limits of the path; if given, the margins that a plan requires are examined, too, and a path that keeps all
+    of them gives no lines.
 
     >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
@@ -228,7 +241,7 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
         problem = make_problem(scenario, limits if chosen is None else limits_for(chosen, limits))
         found = certify(problem, plan.waypoints)
         if found.ok and found.kill_distance > 0.0 and not plan.violations.any():
-            # What is wrong is the autopilot's, and stands in the certificate: the search has found a path.
+            # The search has found a path; the fault concerns the autopilot, and the certificate states it.
             return []
         lines += closed_bands(problem) or ([] if lines else _margin_walls(problem))
         lines += _closing(problem)
@@ -256,7 +269,7 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
 
 
 def _walls(scenario: Scenario) -> list[str]:
-    """Lines across the whole map where the ground reaches the ceiling, or missiles cover every height above it."""
+    """Describe lines across the whole map where the ground reaches the ceiling, or missiles cover every height."""
     terrain = scenario.terrain
     if terrain is None:
         return []
@@ -279,7 +292,7 @@ def _walls(scenario: Scenario) -> list[str]:
 
 
 def _lines_across(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
-    """Lines across the map between the ends: distance from the start, m, and points (n, 2) on each."""
+    """Yield lines across the map between the ends: distance from the start, m, and points (n, 2) on each."""
     frame = rotated_frame(scenario.start, scenario.destination)
     widest = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
     across = np.linspace(-widest, widest, ACROSS)
@@ -291,7 +304,7 @@ def _lines_across(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
 
 
 def _margin_walls(problem: Problem) -> list[str]:
-    """Lines across the whole map where ground, clearance and required margins leave no height."""
+    """Describe lines across the whole map where ground, clearance and required margins leave no height."""
     scenario, data = problem.scenario, problem.certified
     if scenario.terrain is None:
         return []
@@ -312,7 +325,7 @@ def _margin_walls(problem: Problem) -> list[str]:
 
 
 def _outside_missiles(scenario: Scenario, points: np.ndarray, lowest: np.ndarray) -> bool:
-    """Whether any height above any of the points (n, 2) is outside every kill sphere."""
+    """Return True if any height above any of the points (n, 2) is outside every kill sphere."""
     threats = scenario.threats
     armed = threats.kill_radius > 0.0
     position, radius = threats.position[armed], threats.kill_radius[armed]
@@ -328,7 +341,7 @@ def _outside_missiles(scenario: Scenario, points: np.ndarray, lowest: np.ndarray
 
 
 def _closing(problem: Problem) -> list[str]:
-    """A line that names the missiles, or the height, which leave no path at all, if that can be proven."""
+    """Return a line that names the missiles, or the altitude, that leave no path at all, if that can be proven."""
     data, ceiling = problem.certified, "the ceiling"
     found, top = closing_missiles(data), highest_level_flight(data)
     if found is None:
@@ -349,7 +362,7 @@ def _closing(problem: Problem) -> list[str]:
 
 
 def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
-    """Names of the zones that a path (w, 3) violates: exclusions that it enters, inclusions that it leaves.
+    """Return the names of the zones that a path (w, 3) violates: exclusions that it enters, inclusions that it leaves.
 
     >>> from world.scenario import load_scenario
     >>> violated_zones(load_scenario("tight"), np.zeros((2, 3)))

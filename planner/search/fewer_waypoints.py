@@ -1,4 +1,4 @@
-"""A plan without the waypoints that it does not need: for an autopilot that may not fly on at each of them."""
+"""Remove unnecessary waypoints from a plan, for an autopilot that may not continue after each of them."""
 
 from dataclasses import replace
 
@@ -16,9 +16,10 @@ Floats = NDArray[np.float64]
 
 
 def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
-    """A safe plan without the waypoints that it stays safe without, the smallest detours first; it gets no longer.
+    """Return a safe plan without the waypoints that its safety does not need; the plan gets no longer.
 
-    Distances to missiles stay at what plans keep, or at the plan's own where that is less.
+    The waypoints with the smallest detours are removed first. Distances to missiles stay at the distance that plans
+    keep, or at the plan's own distance if that is smaller.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -43,9 +44,11 @@ def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
 
 
 def _without_one(problem: Problem, waypoints: Floats, nearest: float) -> tuple[Floats, Certificate] | None:
-    """Waypoints (w - 1, 3) of a path (w, 3) that is certified, and no nearer to a missile than this (m); None if none.
+    """Remove one waypoint of a path (w, 3), and return the path with its certificate.
 
-    The waypoint that makes the smallest detour is tried first.
+    None if none can be removed.
+    The path must be certified, and no nearer to a missile than `nearest` (m). The waypoint with the smallest detour is
+    tried first.
     """
     legs, chords = np.diff(waypoints, axis=0), waypoints[2:] - waypoints[:-2]
     runs = np.linalg.norm(legs, axis=1)

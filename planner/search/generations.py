@@ -1,4 +1,4 @@
-"""Generations of the two kinds of evolutionary search: of whole paths, and of single waypoints.
+"""Generations of two kinds of evolutionary search: over whole paths, and over single waypoints.
 
 `path_generations` runs an optimiser on vectors of whole paths, ranked by the preference between their scores.
 
@@ -36,15 +36,19 @@ Ints = NDArray[np.int64]
 # --- Whole paths ---
 
 
-# A seeded search ends when the best path has gained less than this share of the straight line in this many generations:
-# the final pattern search is more efficient from there.
-STALLED_GENERATIONS, MIN_GAIN = 10, 2e-4
-# Share of the paper's number of evaluations that a seeded search may spend: without a safe path, and with one.
-SEARCH_SHARE, SAFE_SHARE = 0.3, 0.1
+# Number of generations over which the gain of a seeded search is measured.
+STALLED_GENERATIONS = 10
+# Gain in these generations, as a fraction of the straight line, below which the search ends: from there the final
+# pattern search is more efficient.
+MIN_GAIN = 2e-4
+# Evaluations of a seeded search without a safe path, as a fraction of the paper's number.
+SEARCH_SHARE = 0.3
+# Evaluations of a seeded search with a safe path, as a fraction of the paper's number.
+SAFE_SHARE = 0.1
 
 
 def path_generations(search: Search, population: int, generations: int, starts: Floats) -> Floats:
-    """Run an optimiser on whole paths; returns the best vector (d,) of the last generation.
+    """Run an optimiser on whole paths, and return the best vector (d,) of the last generation.
 
     starts: vectors (s, d) around which the first population is sampled.
     """
@@ -73,7 +77,7 @@ def path_generations(search: Search, population: int, generations: int, starts: 
 
 
 def _levels(search: Search) -> tuple[Level, ...]:
-    """Preference levels for ranking; goals are those of the scenario, by default none."""
+    """Return the preference levels for ranking, with the goals of the scenario, if any."""
     goals = search.problem.scenario.planner.goals
     length = NO_GOAL if goals.length_ratio is None else goals.length_ratio
     kill = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
@@ -83,14 +87,14 @@ def _levels(search: Search) -> tuple[Level, ...]:
 
 
 def _best_row(scores: Floats) -> Floats:
-    """Best of the scores (n, 8), in the archive's order."""
+    """Return the best of the scores (n, 8), in the archive's order."""
     return np.asarray(scores[best_first(scores)[0]])
 
 
 def _make_optimiser(
     search: Search, rank: Callable[[Floats], Ints], population: int, initial: Floats | None
 ) -> Umda | DifferentialEvolution:
-    """The optimiser named by the algorithm."""
+    """Make the optimiser that the algorithm names."""
     lower, upper = search.encoding.lower, search.encoding.upper
     if search.algorithm.optimiser == "differential":
         return DifferentialEvolution(lower, upper, rank, population, search.rng, initial=initial)
@@ -103,7 +107,7 @@ def _make_optimiser(
 
 
 def _stagnant(bests: list[Floats]) -> bool:
-    """Whether the last generations gained almost nothing."""
+    """Return True if the last generations gained almost nothing."""
     if len(bests) <= STALLED_GENERATIONS:
         return False
     before, after = bests[-1 - STALLED_GENERATIONS], bests[-1]
@@ -113,29 +117,48 @@ def _stagnant(bests: list[Floats]) -> bool:
 
 # --- Single waypoints ---
 
-# Maximum number of generations; the last move waypoints by decimetres. With seeds, whose best path is tightened anyway,
-# fewer generations of a smaller population suffice.
-MAX_GENERATIONS, SEEDED_GENERATIONS, SEEDED_SHARE = 10, 6, 0.4
-# Population of later generations, as a share of the first, and its minimum.
-LATER_SHARE, MIN_POPULATION = 0.2, 24
+# Maximum number of generations; the last ones move waypoints by decimetres.
+MAX_GENERATIONS = 10
+# Maximum number of generations with seeds, whose best path is tightened anyway.
+SEEDED_GENERATIONS = 6
+# Population with seeds, as a fraction of the usual population.
+SEEDED_SHARE = 0.4
+# Population of later generations, as a fraction of the first.
+LATER_SHARE = 0.2
+# Minimum population of later generations.
+MIN_POPULATION = 24
 # Maximum number of legs between the candidates of one generation: limits memory.
 MAX_LEGS = 6_000_000
-# Legs that all attempts of a search together evaluate at most, over those between all candidates of the first attempt,
-# where the scenario states no budget; what has to be left of them for another attempt, over the same; and the share of
-# what is left that one generation may take where it has no short path, so that hardly a leg is spared.
-MAX_LEGS_SHARE, RETRY_SHARE, OPEN_SHARE = 2.0, 0.75, 0.5
-# Initial sampling deviations around a selected waypoint: along and across as shares of the interval, up in m; and their
-# reduction per generation.
-FIRST_ALONG, FIRST_ACROSS, FIRST_UP, SHRINK = 0.4, 0.5, 60.0, 0.5
-# Share of the height range by which draws extend above the ceiling before they are clipped: spheres are smallest there.
+# Maximum number of legs that all attempts of a search evaluate if the scenario states no budget, relative to the legs
+# between all candidates of the first attempt.
+MAX_LEGS_SHARE = 2.0
+# Remaining legs that another attempt requires, relative to the same number.
+RETRY_SHARE = 0.75
+# Fraction of the remaining legs that one generation without a short path may take, as hardly any leg can be skipped.
+OPEN_SHARE = 0.5
+# Initial sampling deviation around a selected waypoint along, as a fraction of the interval.
+FIRST_ALONG = 0.4
+# Initial sampling deviation across, as a fraction of the interval.
+FIRST_ACROSS = 0.5
+# Initial sampling deviation up, m.
+FIRST_UP = 60.0
+# Factor on these deviations per generation.
+SHRINK = 0.5
+# Fraction of the height range by which samples extend above the ceiling before they are clipped, as spheres are
+# smallest there.
 ABOVE_CEILING = 0.3
-# Maximum excess of a path through a selected waypoint over the best path, as a share: in the first and the last
-# generation; and the smaller first value with seeds, whose best path is closer to the optimum.
-FIRST_SLACK, LAST_SLACK, SEEDED_SLACK = 0.1, 0.003, 0.05
-# Bounds on the first path's cost over the straight line, tried in this order: lower bounds are faster.
+# Maximum excess of a path through a selected waypoint over the best path in the first generation, as a fraction.
+FIRST_SLACK = 0.1
+# The same in the last generation.
+LAST_SLACK = 0.003
+# The same in the first generation with seeds, whose best path is closer to the optimum.
+SEEDED_SLACK = 0.05
+# Bounds on the first path's cost relative to the straight line, tried in this order: lower bounds are faster.
 FIRST_BOUNDS = (1.15, 1.3, 1.6, 2.5, math.inf)
-# Paths evaluated as a whole: through this many of the best candidates of every n-th interval.
-BEST_PER_INTERVAL, EVERY = 3, 3
+# Number of best candidates per interval whose paths are evaluated as a whole.
+BEST_PER_INTERVAL = 3
+# Every n-th interval is used for these paths.
+EVERY = 3
 # Maximum evaluations of a pattern search on a generation's best path while no path is feasible.
 REPAIR_EVALUATIONS = 100
 
@@ -158,7 +181,7 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
     deviation = np.array([FIRST_ALONG * interval, FIRST_ACROSS * interval, FIRST_UP])
     rows = sampling.first(first, np.array([0.0, 0.0, ABOVE_CEILING]))
     if not len(search.archive.vectors):
-        # The archive must hold a path whenever the search is stopped.
+        # The archive must contain a path whenever the search is stopped.
         search.evaluate(_as_vectors(rows[:, :1]))
     steps = _generations(search, generations)
     slack_at_first = SEEDED_SLACK if seeded else FIRST_SLACK
@@ -183,23 +206,23 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
 
 
 def _first_candidates(search: Search, population: int) -> int:
-    """Candidates per interval in the first generation of this population."""
+    """Return the number of candidates per interval in the first generation of this population."""
     most = int(math.sqrt(MAX_LEGS / (search.encoding.waypoints - 1)))
     return max(2, min(int(population * (SEEDED_SHARE if search.algorithm.seeded else 1.0)), most))
 
 
 def _later_candidates(first: int) -> int:
-    """Candidates per interval in later generations."""
+    """Return the number of candidates per interval in later generations."""
     return min(first, max(MIN_POPULATION, int(LATER_SHARE * first)))
 
 
 def _generations(search: Search, generations: int) -> int:
-    """Number of generations of waypoints where so many are asked for."""
+    """Return the number of generations over waypoints: the requested number, limited to the maximum."""
     return min(generations, SEEDED_GENERATIONS if search.algorithm.seeded else MAX_GENERATIONS)
 
 
 def legs_left(search: Search) -> int:
-    """Legs that the search may still evaluate."""
+    """Return the number of legs that the search may still evaluate."""
     table = search.problem.scenario.planner
     if table.budget is not None:
         return ALL_LEGS
@@ -207,12 +230,12 @@ def legs_left(search: Search) -> int:
 
 
 def may_try_again(search: Search) -> bool:
-    """Whether enough legs are left for another attempt."""
+    """Return True if enough legs are left for another attempt."""
     return legs_left(search) >= RETRY_SHARE * _legs_of_attempt(search)
 
 
 def _legs_of_attempt(search: Search) -> int:
-    """Legs between all candidates of all generations of the first attempt."""
+    """Return the number of legs between all candidates of all generations of the first attempt."""
     table = search.problem.scenario.planner
     first = _first_candidates(search, table.population)
     squares = first**2 + max(0, _generations(search, table.generations) - 1) * _later_candidates(first) ** 2
@@ -220,14 +243,14 @@ def _legs_of_attempt(search: Search) -> int:
 
 
 def _as_vectors(rows: Floats) -> Floats:
-    """Candidates (i, k, 3) of intervals as vectors (k, 3 i): the k-th of each."""
+    """Convert candidates (i, k, 3) of intervals to vectors (k, 3 i) of the k-th candidate of each."""
     return rows.transpose(1, 0, 2).reshape(rows.shape[1], -1)
 
 
 def _join(search: Search, paths: Floats, slack: float) -> WaypointChains:
-    """Best paths through the candidates of paths (k, w, 3), bounded relative to the best path if there is one.
+    """Find the best paths through the candidates of paths (k, w, 3), bounded relative to the best path if any.
 
-    Without a bound almost every leg is evaluated: where few are left, between the first candidates only.
+    Without a bound almost every leg is evaluated; if few legs are left, only the first candidates are joined.
     """
     data, space = search.problem.search, search.problem.space
     straight = math.dist(space.start, space.destination)
@@ -249,7 +272,7 @@ def _join(search: Search, paths: Floats, slack: float) -> WaypointChains:
 
 
 def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None:
-    """Evaluate the best paths through some of the best candidates as a whole; repair one while none is feasible."""
+    """Evaluate whole paths through some of the best candidates, and repair one as long as none is feasible."""
     chosen = set()
     for i in range(1, len(chains.cost) - 1, EVERY):
         for k in np.argsort(chains.cost[i], kind="stable")[:BEST_PER_INTERVAL]:

@@ -1,4 +1,4 @@
-"""Small calls of the planner's kernels with the argument types of a search, to compile them ahead of use."""
+"""Call the planner's kernels on small problems with the argument types of a search, to compile them ahead of use."""
 
 from typing import NamedTuple
 
@@ -24,17 +24,26 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-# Of a search for one plan, and what a choice of plans calls beside it.
+# Parts of a search for one plan.
 PARTS = ("scores", "certificates", "shortening", "routes", "sides", "paper")
+# Additional part of a Pareto front of plans.
 FRONT = "fronts"
+# Number of waypoints of the path.
 WAYPOINTS = 8
-STAGES, MAX_ROUTES, FEW = 12, 2, 4
-# Offset of the path's middle to the side and upwards, m.
-ASIDE, ABOVE = 300.0, 20.0
+# Number of stages of the grids.
+STAGES = 12
+# Maximum number of routes.
+MAX_ROUTES = 2
+# Evaluations of a pattern search, and size of a set of objectives.
+FEW = 4
+# Offset of the path's middle point to the side, m.
+ASIDE = 300.0
+# Offset of the path's middle point upwards, m.
+ABOVE = 20.0
 
 
 class _Task(NamedTuple):
-    """A small problem, and a path (w, 3) near its direct line."""
+    """Small problem, and a path (w, 3) near its direct line."""
 
     problem: Problem
     encoding: Encoding
@@ -85,7 +94,7 @@ def _pass_sides(task: _Task) -> None:
 
 
 def _across(task: _Task) -> tuple[RotatedFrame, tuple[float, float]]:
-    """The frame of the direct line, and how far to its sides waypoints may lie, m."""
+    """Return the frame of the direct line, and the range of waypoints across it, m."""
     space, lower, upper = task.problem.space, task.encoding.lower, task.encoding.upper
     return rotated_frame(space.start, space.destination), (float(lower[1::3].min()), float(upper[1::3].max()))
 

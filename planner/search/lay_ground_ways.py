@@ -1,9 +1,9 @@
-"""Lay out a plan's ways from home up to its first waypoint, and from its last down to the landing strip.
+"""Lay out a plan's departure from home to its first waypoint, and its approach from the last waypoint to the strip.
 
-Both are searched for among a few thousand ways of straight legs, shortest first: launch courses or finals, and corners
-and laps between them and the plan.  A way counts if the certificate that judges the plan finds nothing on it (turns,
-slopes, clearance, missiles, zones, bounds), and if what lies below the certificate's clearance is free, too: the climb
-from the ground, and the glide to the landing point.  Where none counts, the plan's certificate says which came nearest.
+Both are searched among a few thousand paths of straight legs, shortest first: launch courses or finals, with corners
+and laps between them and the plan.  A path is accepted if it passes the plan's certificate (turns, slopes, clearance,
+missiles, zones, bounds), and if the parts below the certificate's clearance are free, too: the climb from the ground
+and the glide to the landing point.  If no path is accepted, the plan's certificate reports the best one.
 """
 
 import math
@@ -41,50 +41,76 @@ from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
-# Share of the aircraft's steepest climb, and of its steepest dive, at the cruise airspeed that a way takes: a take-off
-# climbs no less (the verdict's MIN_CLIMB).
+# Slope of departure and approach as a fraction of the aircraft's steepest climb and dive at cruise airspeed; a take-off
+# climbs at least as steeply (MIN_CLIMB of the verdict).
 SHARE = 0.7
-# Share of the steepest dive at the landing's airspeed that a glide takes.
+# Slope of a glide as a fraction of the steepest dive at the landing airspeed.
 GLIDE_SHARE = 0.85
-# Shares of these slopes that are tried: the arc of a turn is steeper than its legs, by a quarter at a right angle.
-_GENTLER = (1.0, 0.75, 0.6)
-# m.  So much higher than the certificate asks for a take-off ends, and no lower than this over home.
-_OVER_CLEARANCE, _MIN_TAKEOFF = 2.0, 40.0
-# The first leg is so much longer than the climb to the take-off's height: a share and m; and tried longer by these.  By
-# this share of that climb a take-off is over: what is left of the leg has to hold the turn at its end.
-_AFTER_TAKEOFF, _LONGER, _OVER = (1.05, 30.0), (1.0, 1.7), 0.8
-# m.  So far from home no ground stands in the way (the verdict's LAUNCH_RUN); beyond, this share of the height that was
-# climbed is to be left above ground, up to the scenario's clearance.
-_LAUNCH_RUN, _IN_HAND = 50.0, 0.5
-# m.  Steps in which the ground under the climb and the glide is looked at.
-_STEP = 10.0
-# Launch courses, and landing courses where there is no wind.
-_LAUNCHES, _LANDINGS = 36, 12
-# m/s.  With more wind from behind, and m of way that a launch with it has to spare.
-_TAIL, _TAIL_COST = 0.5, 5000.0
-# Finals: lengths (m) and slopes (rad) that are tried where the scenario states none; slopes beyond what PX4 takes last.
-_APPROACHES = (500.0, 600.0, 700.0, 800.0, 900.0, 1000.0, 1200.0, 1500.0, 2000.0)
-_SLOPES = tuple(math.radians(slope) for slope in (3.5, 4.0, 4.5, 4.9, 5.5, 6.0, 7.0))
-_PX4_SLOPE = math.radians(5.0)
-# Length of the line-up, in radii of the tightest turn, and m.
-_LINE_UP, _MIN_LINE_UP = 4.0, 500.0
-# The glide: so near (m) before the point the ground may be met; above ground before, by this share of its height over
-# the point, up to so much (m).
-_EARLY, _GLIDE_SHARE, _GLIDE_ROOM = 60.0, 0.4, 10.0
-# A go-around: least height over home and above ground, m, steps and the highest that is tried, m.
-_GO_AROUND, _GO_AROUND_ROOM, _HEIGHT_STEP, _HIGHEST = 50.0, 30.0, 10.0, 1000.0
-# Share of the wind by which the ground speed is higher that a turn's length is taken for.
-_WIND_SHARE = 0.5
-# Ways that are certified at most for each end, and finals that are tried.
-_CERTIFIED, _FINALS = 500, 8
+# Fractions of these slopes that are tried in turn: the arc of a turn is steeper than its legs, by a quarter at a right
+# angle.
+_SLOPE_FACTORS = (1.0, 0.75, 0.6)
+# Height of the end of a take-off above the clearance of the certificate, m.
+_CLEARANCE_EXCESS_M = 2.0
+# Lowest end of a take-off above home, m.
+_MIN_TAKEOFF_HEIGHT_M = 40.0
+# Length of the first leg: a factor on the climb to the take-off height, and an additional length, m.
+_FIRST_LEG_FACTOR_AND_M = (1.05, 30.0)
+# Factors on the length of the first leg that are tried in turn.
+_FIRST_LEG_FACTORS = (1.0, 1.7)
+# Fraction of the climb at which a take-off is complete; the rest of the leg must hold the turn at its end.
+_TAKEOFF_DONE_FRACTION = 0.8
+# Distance from home within which terrain is ignored, m (LAUNCH_RUN of the verdict).
+_LAUNCH_RUN_M = 50.0
+# Required height above ground beyond it, as a fraction of the height climbed, up to the scenario's clearance.
+_CLIMB_CLEARANCE_FRACTION = 0.5
+# Spacing of the ground samples under the climb and the glide, m.
+_GROUND_SPACING_M = 10.0
+# Number of launch courses.
+_LAUNCH_COURSE_COUNT = 36
+# Number of landing courses if there is no wind.
+_LANDING_COURSE_COUNT = 12
+# Tailwind above which a launch is penalised, m/s.
+_MAX_TAILWIND_MPS = 0.5
+# Penalty of a launch with tailwind, m of path length.
+_TAILWIND_COST_M = 5000.0
+# Lengths of the final that are tried if the scenario states none, m.
+_FINAL_LENGTHS_M = (500.0, 600.0, 700.0, 800.0, 900.0, 1000.0, 1200.0, 1500.0, 2000.0)
+# Slopes of the final that are tried if the scenario states none, rad.
+_FINAL_SLOPES_RAD = tuple(math.radians(slope) for slope in (3.5, 4.0, 4.5, 4.9, 5.5, 6.0, 7.0))
+# Steepest glide slope that PX4 accepts, rad; steeper slopes are tried last.
+_PX4_MAX_SLOPE_RAD = math.radians(5.0)
+# Length of the line-up, in radii of the tightest turn.
+_LINE_UP_RADII = 4.0
+# Smallest length of the line-up, m.
+_MIN_LINE_UP_M = 500.0
+# Distance before the landing point within which the glide may meet the ground, m.
+_GROUND_CONTACT_ZONE_M = 60.0
+# Required height of the glide above ground before that, as a fraction of its height over the landing point.
+_GLIDE_CLEARANCE_FRACTION = 0.4
+# Upper limit of this height, m.
+_MAX_GLIDE_CLEARANCE_M = 10.0
+# Lowest height of a go-around over home, m.
+_MIN_GO_AROUND_HEIGHT_M = 50.0
+# Required height of a go-around above ground, m.
+_GO_AROUND_CLEARANCE_M = 30.0
+# Step of the go-around heights that are tried, m.
+_GO_AROUND_STEP_M = 10.0
+# Upper limit of the go-around heights that are tried, m.
+_MAX_GO_AROUND_HEIGHT_M = 1000.0
+# Increase of the ground speed for the length of turns, as a fraction of the wind speed.
+_WIND_FRACTION = 0.5
+# Maximum number of certified paths for each end.
+_MAX_CERTIFIED = 500
+# Maximum number of finals that are tried.
+_MAX_FINALS = 8
 
 
 class FinalLaw(NamedTuple):
-    """What whoever flies makes of a final.
+    """Airspeed and slope that the autopilot flies on a final.
 
-    airspeed: true, on the glide, m/s, of the wind from behind (m/s) and the height (m AMSL).
-    slope: of the glide that is flown, m per m, of the height over and the distance before the landing point (m), the
-    wind from behind and the height of the point.
+    airspeed: true airspeed on the glide, m/s, as a function of tailwind (m/s) and altitude (m AMSL).
+    slope: flown slope of the glide, m per m, as a function of height over and distance before the landing point (m),
+    tailwind (m/s) and altitude of the point (m AMSL).
     """
 
     airspeed: Callable[[float, float], float]
@@ -92,10 +118,10 @@ class FinalLaw(NamedTuple):
 
 
 def with_ground_ways(plan: Plan, limits: Limits, final: FinalLaw, climbed: ClimbOut | None = None) -> Plan:
-    """The plan with the ways that its scenario's `[launch]` and `[landing]` ask for, or why there are none.
+    """Return the plan with the departure and approach that its scenario requires, or with the reason without them.
 
-    limits: that it was planned within.  climbed: the way up of a plan whose first legs are flown, which stays.
-    A plan whose scenario has neither table stays as it is.
+    The scenario requires them by `[launch]` and `[landing]`; a plan without either table is returned unchanged.
+    limits: limits of the plan.  climbed: the departure of a plan whose first legs are flown, which is kept.
     """
     scenario = plan.scenario
     if scenario.home is None or scenario.terrain is None or (scenario.launch is None and scenario.landing is None):
@@ -116,15 +142,15 @@ def with_ground_ways(plan: Plan, limits: Limits, final: FinalLaw, climbed: Climb
 
 
 # ----------------------------------------------------------------------
-# What both ends ask of the ground, the aircraft and the airspace.
+# Checks of ground, aircraft and airspace that departure and approach share.
 
 
 @dataclass(frozen=True, slots=True)
 class _Site:
-    """A plan, and what its ways are certified by.
+    """Plan, and the problems with which its departure and approach are certified.
 
-    low: the problem of what lies below the required clearance: of its certificate the distances from missiles and zones
-    count.  radius: of the tightest turn, m.  turning: what turns take of their legs.
+    low: problem of the parts below the required clearance; of its certificate only the distances from missiles and
+    zones are used.  radius: radius of the tightest turn, m.  turning: lengths that turns take of their legs.
     """
 
     plan: Plan
@@ -141,7 +167,7 @@ class _Site:
         return self.plan.scenario
 
     def slopes(self, course: float, amsl: float) -> tuple[float, float]:
-        """Climb and dive (m per m) that a way takes on a course (rad) at a height (m AMSL)."""
+        """Return the climb and dive slopes (m per m) for a course (rad) at an altitude (m AMSL)."""
         certified = aircraft_slopes(self.problem.certified.aircraft, course, amsl)
         stated = (self.limits.max_climb, self.limits.max_dive)
         found = []
@@ -151,21 +177,21 @@ class _Site:
         return found[0], found[1]
 
     def least_length(self, rise: float, side: int) -> float:
-        """Least length of a way that gains or loses a height, m; side: 0 for a climb, 1 for a descent."""
+        """Return the shortest path that gains or loses a height, m; side: 0 for a climb, 1 for a descent."""
         up = float(max(self.scenario.start[2], self.scenario.destination[2]))
         steepest = max(self.slopes(course, up)[side] for course in np.arange(8) * (math.pi / 4.0))
         return max(0.0, abs(rise)) / steepest if steepest > 0.0 else math.inf
 
     def certificate(self, chain: Floats, near: tuple[Floats, Floats]) -> Certificate:
-        """Certificate of a chain (n, 3).
+        """Return the certificate of a chain (n, 3).
 
-        near: places, (3,) m, near which less height above ground is asked for where they have less.
+        near: two places, (3,) m, near which less height above ground is required if they have less themselves.
         """
         data = self.problem.certified
         start, end = (min(data.buffer, 0.75 * max(0.0, self.above(place) - data.clearance - 0.01)) for place in near)
         free = data._replace(
-            start=_locked(near[0]),
-            destination=_locked(near[1]),
+            start=_read_only(near[0]),
+            destination=_read_only(near[1]),
             start_buffer=start,
             destination_buffer=end,
             start_course=math.nan,
@@ -174,11 +200,11 @@ class _Site:
         return certify(replace(self.problem, certified=free), np.ascontiguousarray(chain))
 
     def above(self, place: Floats) -> float:
-        """Height of a place above ground, m."""
+        """Return the height of a place above ground, m."""
         return float(place[2] - self.terrain.height(place[0], place[1]))
 
     def entered(self, chain: Sequence[Sequence[float]]) -> str:
-        """The missile or zone that a chain low over the ground enters, in words; "" for none."""
+        """Describe the missile or zone that a chain low over the ground enters; "" if it enters none."""
         found = certify(self.low, np.array(chain, dtype=np.float64))
         if found.kill_distance <= 0.0:
             return f"{-found.kill_distance:.0f} m inside a missile's reach"
@@ -189,7 +215,7 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
     scenario = plan.scenario
     within = limits_for(find_algorithm(plan.algorithm, scenario.name), limits)
     problem = make_problem(scenario, within)
-    # One to stay in that has a floor begins above the field.
+    # An inclusion with a floor begins above the field.
     zones = tuple(zone for zone in scenario.zones if zone.kind == "exclusion" or zone.floor is None)
     low = make_problem(replace(scenario, zones=zones), within)
     low = replace(low, certified=low.certified._replace(clearance=-1e5))
@@ -197,20 +223,20 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
     radius = max(within.turn_radius(course, course + math.pi, up) for course in (0.0, 0.5 * math.pi))
     turning = arc_lengths(radius)
     if (tracking := within.tracking) is not None:
-        # Ground speeds differ by course: what fits is certified.
-        share = 1.0 + _WIND_SHARE * scenario.wind.speed / within.airspeed
+        # An estimate, as ground speeds depend on the course; the certificate decides.
+        share = 1.0 + _WIND_FRACTION * scenario.wind.speed / within.airspeed
         before, after = (_at_speed(table, share) for table in (tracking.before, tracking.after))
         turning = TurnLengths(*(tuple(map(max, own, arcs)) for own, arcs in zip((before, after), turning, strict=True)))
     return _Site(plan, within, home, terrain, problem, low, radius, turning)
 
 
 def _at_speed(table: Floats, share: float) -> list[float]:
-    """Column of a tracking error's table, (t,) m, at a ground speed as a share of the airspeed."""
+    """Interpolate a tracking error's table, (t,) m, at a ground speed as a fraction of the airspeed."""
     return [float(np.interp(share, SPEED_SHARES, row)) for row in table]
 
 
-def _locked(place: Floats) -> Floats:
-    """A place that cannot be written to, as a problem's own: another kind of array would compile the kernels again."""
+def _read_only(place: Floats) -> Floats:
+    """Return a read-only copy of a place: a writable array would compile the kernels again."""
     out = np.array(place, dtype=np.float64)
     out.setflags(write=False)
     return out
@@ -221,20 +247,20 @@ def _points(spots: Sequence[Spot], heights: Floats) -> Floats:
 
 
 def _profile(terrain: Terrain, begin: Spot, course: float, last: float) -> tuple[Floats, Floats]:
-    """Runs from a place on a course, m, and heights of the ground there, NaN where that is not known."""
-    run = np.arange(0.0, last + _STEP, _STEP)
+    """Return distances from a place on a course, m, and the ground heights there, NaN if not known."""
+    run = np.arange(0.0, last + _GROUND_SPACING_M, _GROUND_SPACING_M)
     east, north = begin[0] + run * math.sin(course), begin[1] + run * math.cos(course)
     return run, terrain.height(east, north)
 
 
-class _Nearest:
-    """The best of the ways that do not count, and how many there were."""
+class _BestRefused:
+    """Best of the refused paths, and their number."""
 
     def __init__(self) -> None:
         self.tried, self._margin, self.problem = 0, -math.inf, ""
 
     def add(self, found: Certificate | None) -> None:
-        """Take a way's certificate into account, if it has one; one inside a missile's reach has no other problem."""
+        """Include the certificate of a refused path, if any; without a problem it is inside a missile's reach."""
         if found is None:
             return
         self.tried += 1
@@ -245,26 +271,26 @@ class _Nearest:
 
 
 # ----------------------------------------------------------------------
-# The climb-out.
+# Departure.
 
 
 def _climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
-    """The shortest way from home that counts; None and why not where none does."""
+    """Return the shortest accepted departure; None and the reason without one."""
     data, target = site.problem.certified, site.plan.waypoints[0]
     ground, goal = float(site.home[2]), float(target[2])
-    over = max(_MIN_TAKEOFF, data.clearance + data.buffer + _OVER_CLEARANCE)
+    over = max(_MIN_TAKEOFF_HEIGHT_M, data.clearance + data.buffer + _CLEARANCE_EXCESS_M)
     up = ground + over
     launches, why = _launches(site, launch, over, max(up, goal))
     if not launches:
         return None, why
-    nearest = _Nearest()
+    nearest = _BestRefused()
     for laps in _lap_counts(site, goal - ground, 0):
-        for _, course, spots in sorted(_ways_up(site, launches, laps), key=lambda one: one[0]):
+        for _, course, spots in sorted(_departures(site, launches, laps), key=lambda one: one[0]):
             found = _certified_climb(site, course, spots, up)
             if isinstance(found, ClimbOut):
                 return found, ""
             nearest.add(found)
-            if nearest.tried >= _CERTIFIED:
+            if nearest.tried >= _MAX_CERTIFIED:
                 break
     courses = (
         "on its course" if launch.course is not None else f"on {len({launch.course for launch in launches})} courses"
@@ -275,15 +301,15 @@ def _climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
 
 
 def _certified_climb(site: _Site, course: float, spots: list[Spot], up: float) -> ClimbOut | Certificate | None:
-    """A way from home over these corners; its certificate where it does not count, None where it cannot be flown.
+    """Return the departure over these corners, or its certificate if refused, or None if it cannot be flown.
 
-    up: height that the take-off climbs to, m AMSL.
+    up: altitude that the take-off climbs to, m AMSL.
     """
     onward, target = site.plan.waypoints[1:3], site.plan.waypoints[0]
     goal, top = float(target[2]), max(up, float(target[2]))
     found = None
-    for share in _GENTLER:
-        heights = risen(spots, float(site.home[2]), partial(_share_of, site, share, 0, top), up, goal)
+    for share in _SLOPE_FACTORS:
+        heights = risen(spots, float(site.home[2]), partial(_scaled_slope, site, share, 0, top), up, goal)
         if heights[-1] < goal - 1e-6:
             break
         chain = np.concatenate([_points(spots, heights), onward])
@@ -294,7 +320,7 @@ def _certified_climb(site: _Site, course: float, spots: list[Spot], up: float) -
 
 
 class _Start(NamedTuple):
-    """A launch: its course (rad), where its take-off is over, and where its first leg ends."""
+    """Launch: course (rad), place where the take-off is complete, and end of the first leg."""
 
     course: float
     over: Spot
@@ -302,34 +328,38 @@ class _Start(NamedTuple):
 
 
 def _launches(site: _Site, launch: Launch, over: float, high: float) -> tuple[list[_Start], str]:
-    """Launches that climb free of ground, missiles and zones; or why there are none.
+    """Return launches that climb free of ground, missiles and zones; or the reason without any.
 
-    over: height over home to climb to straight ahead.  high: height for which the climb is looked up, m AMSL.
+    over: height over home to climb to straight ahead.  high: altitude of the climb performance, m AMSL.
     """
-    courses = [2.0 * math.pi * k / _LAUNCHES for k in range(_LAUNCHES)] if launch.course is None else [launch.course]
+    courses = (
+        [2.0 * math.pi * k / _LAUNCH_COURSE_COUNT for k in range(_LAUNCH_COURSE_COUNT)]
+        if launch.course is None
+        else [launch.course]
+    )
     home, found, best = (float(site.home[0]), float(site.home[1])), [], (-math.inf, "")
     for course in courses:
         climb = site.slopes(course, high)[0]
         if climb <= 0.0:
             continue
-        least = over / climb * _AFTER_TAKEOFF[0] + _AFTER_TAKEOFF[1]
-        for longer in _LONGER:
+        least = over / climb * _FIRST_LEG_FACTOR_AND_M[0] + _FIRST_LEG_FACTOR_AND_M[1]
+        for longer in _FIRST_LEG_FACTORS:
             last = least * longer
             run, low = _profile(site.terrain, home, course, last)
             height = climb * run
-            needed = np.minimum(site.problem.certified.clearance, _IN_HAND * height)
-            room = (site.home[2] + height - low - needed)[run > _LAUNCH_RUN]
+            needed = np.minimum(site.problem.certified.clearance, _CLIMB_CLEARANCE_FRACTION * height)
+            room = (site.home[2] + height - low - needed)[run > _LAUNCH_RUN_M]
             where = f"on {round(math.degrees(course)) % 360}°"
             if not (room >= 0.0).all():
                 worst = float(np.nanmin(room)) if not np.isnan(room).all() else -math.inf
                 k = int(np.argmin(np.where(np.isnan(room), math.inf, room)))
-                at = float(run[run > _LAUNCH_RUN][k])
+                at = float(run[run > _LAUNCH_RUN_M][k])
                 said = f"the nearest, {where}, is {-worst:.0f} m too low over the ground {at:.0f} m from home"
                 best = max(best, (worst, said))
                 break
             east, north = math.sin(course), math.cos(course)
             end = (home[0] + last * east, home[1] + last * north)
-            risen_at = _OVER * over / climb
+            risen_at = _TAKEOFF_DONE_FRACTION * over / climb
             ground = float(site.home[2])
             entered = site.entered([(*home, ground), (*end, ground + climb * last)])
             if entered:
@@ -341,8 +371,8 @@ def _launches(site: _Site, launch: Launch, over: float, high: float) -> tuple[li
     return found, f"{whose} {no}free of ground, missiles and zones at {SHARE:.0%} of the steepest climb: {best[1]}"
 
 
-def _ways_up(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[tuple[float, float, list[Spot]]]:
-    """Ways from home to the plan's first waypoint: what each costs, its launch course, and its corners."""
+def _departures(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[tuple[float, float, list[Spot]]]:
+    """Yield departures from home to the plan's first waypoint: cost, launch course, and corners."""
     first, asked = site.plan.waypoints[0], site.scenario.start_course
     onward = float(leg_courses(site.plan.waypoints[:2])[0]) if asked is None else asked
     end, home = (float(first[0]), float(first[1])), (float(site.home[0]), float(site.home[1]))
@@ -354,21 +384,24 @@ def _ways_up(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[tup
             spots = [home, begin, *corners, end]
             way, before = measure([over, *spots[1:], after], site.turning), math.dist(home, over)
             if way.fits and before + way.length >= least:
-                yield before + way.cost + (_TAIL_COST if tail > _TAIL else 0.0), course, spots
+                yield before + way.cost + (_TAILWIND_COST_M if tail > _MAX_TAILWIND_MPS else 0.0), course, spots
 
 
 def _lap_counts(site: _Site, rise: float, side: int) -> list[int]:
-    """How many laps to try for a height to gain, or to lose, m, fewest first; side: 0 for a climb, 1 for a descent."""
-    most = math.ceil(site.least_length(rise, side) / _GENTLER[-1] / (4.0 * LAP_SIDE * site.radius))
+    """Return the numbers of laps to try to gain or lose a height, m, fewest first.
+
+    Side: 0 for climb, 1 for descent.
+    """
+    most = math.ceil(site.least_length(rise, side) / _SLOPE_FACTORS[-1] / (4.0 * LAP_SIDE * site.radius))
     return list(range(min(MAX_LAPS, most) + 1))
 
 
 # ----------------------------------------------------------------------
-# The descent.
+# Approach.
 
 
 class _Final(NamedTuple):
-    """A final: its course (rad), its length and height over the landing point (m), and its line-up, (2, 3) m."""
+    """Final: course (rad), length and height over the landing point (m), line-up, (2, 3) m, and landing point."""
 
     course: float
     length: float
@@ -378,14 +411,18 @@ class _Final(NamedTuple):
 
 
 def _descent(site: _Site, strip: LandingStrip, final: FinalLaw) -> tuple[Descent | None, str]:
-    """The first way down that counts; None and why not where none does."""
+    """Return the first accepted approach; None and the reason without one."""
     field = float(site.terrain.height(strip.east, strip.north))
     point = np.array([strip.east, strip.north, field])
     into = strip.into(site.scenario.wind, field)
-    courses = [into] if into is not None else [2.0 * math.pi * k / _LANDINGS for k in range(_LANDINGS)]
+    courses = (
+        [into]
+        if into is not None
+        else [2.0 * math.pi * k / _LANDING_COURSE_COUNT for k in range(_LANDING_COURSE_COUNT)]
+    )
     finals, reasons = [], []
     for course in courses:
-        rough = _rough(site.terrain, strip, course)
+        rough = _strip_fault(site.terrain, strip, course)
         if rough:
             reasons.append(rough)
             continue
@@ -395,8 +432,8 @@ def _descent(site: _Site, strip: LandingStrip, final: FinalLaw) -> tuple[Descent
     if not finals:
         return None, reasons[0]
     why = ""
-    for one in finals[:_FINALS]:
-        corners, why = _way_down(site, one)
+    for one in finals[:_MAX_FINALS]:
+        corners, why = _path_to_line_up(site, one)
         if corners is None:
             continue
         go_around = _go_around(site, one)
@@ -407,8 +444,8 @@ def _descent(site: _Site, strip: LandingStrip, final: FinalLaw) -> tuple[Descent
     return None, why
 
 
-def _rough(terrain: Terrain, strip: LandingStrip, course: float) -> str:
-    """What is wrong with the ground of a strip, in words; "" for nothing."""
+def _strip_fault(terrain: Terrain, strip: LandingStrip, course: float) -> str:
+    """Describe the fault of a strip's ground; "" if it is suitable."""
     for name, slope in zip(("along", "across"), strip_slopes(terrain, strip, course), strict=True):
         if math.isnan(slope):
             return "the ground of the strip is not known to its ends"
@@ -419,13 +456,13 @@ def _rough(terrain: Terrain, strip: LandingStrip, course: float) -> str:
 
 
 def _finals(site: _Site, strip: LandingStrip, course: float, point: Floats, law: FinalLaw) -> tuple[list[_Final], str]:
-    """Finals on a course that can be flown and are free, the gentlest and shortest first; or why there are none."""
+    """Return free, flyable finals on a course, the gentlest and shortest first; or the reason without any."""
     field = float(point[2])
     tail = site.scenario.wind.along(course, field)[0]
     able = GLIDE_SHARE * math.tan(site.limits.slopes(course, field, law.airspeed(tail, field))[1])
-    lengths = _APPROACHES if strip.approach is None else (strip.approach,)
-    slopes = _SLOPES if strip.slope is None else (strip.slope,)
-    pairs = sorted(((a, s) for a in lengths for s in slopes), key=lambda one: (one[1] > _PX4_SLOPE, one))
+    lengths = _FINAL_LENGTHS_M if strip.approach is None else (strip.approach,)
+    slopes = _FINAL_SLOPES_RAD if strip.slope is None else (strip.slope,)
+    pairs = sorted(((a, s) for a in lengths for s in slopes), key=lambda one: (one[1] > _PX4_MAX_SLOPE_RAD, one))
     found, why = list[_Final](), (-math.inf, "")
     for length, slope in pairs:
         height = length * math.tan(slope)
@@ -435,7 +472,7 @@ def _finals(site: _Site, strip: LandingStrip, course: float, point: Floats, law:
             why = max(why, (-1e6, f"a glide of {steep:.1f}° is steeper than the {most:.1f}° that can be flown there"))
             continue
         made = _Final(course, length, height, _line_up(site, point, course, length, height), point)
-        margin, blocked = _blocked(site, made)
+        margin, blocked = _obstacle_to(site, made)
         if blocked:
             why = max(why, (margin, f"a final of {length:.0f} m at {math.degrees(slope):.1f}° {blocked}"))
         else:
@@ -444,18 +481,21 @@ def _finals(site: _Site, strip: LandingStrip, course: float, point: Floats, law:
 
 
 def _line_up(site: _Site, point: Floats, course: float, length: float, height: float) -> Floats:
-    away = np.array([length + max(_MIN_LINE_UP, _LINE_UP * site.radius), length])
+    away = np.array([length + max(_MIN_LINE_UP_M, _LINE_UP_RADII * site.radius), length])
     east, north = point[0] - away * math.sin(course), point[1] - away * math.cos(course)
     return np.column_stack([east, north, np.full(2, point[2] + height)])
 
 
-def _blocked(site: _Site, final: _Final) -> tuple[float, str]:
-    """What stands in the way of a final and its line-up: by how much (m, negative), and in words; "" for nothing."""
+def _obstacle_to(site: _Site, final: _Final) -> tuple[float, str]:
+    """Return the margin (m, negative if blocked) and description of an obstacle to a final.
+
+    "" if it is free.
+    """
     begin, point = final.line_up[1], final.point
     run, low = _profile(site.terrain, (float(begin[0]), float(begin[1])), final.course, final.length)
     over = final.height * (1.0 - run / final.length)
-    room = float(point[2]) + over - low - np.minimum(_GLIDE_ROOM, _GLIDE_SHARE * over)
-    asked = room[run <= final.length - _EARLY]
+    room = float(point[2]) + over - low - np.minimum(_MAX_GLIDE_CLEARANCE_M, _GLIDE_CLEARANCE_FRACTION * over)
+    asked = room[run <= final.length - _GROUND_CONTACT_ZONE_M]
     if np.isnan(asked).any():
         return -math.inf, "leads over ground that is not known"
     if asked.min(initial=0.0) < 0.0:
@@ -472,8 +512,8 @@ def _blocked(site: _Site, final: _Final) -> tuple[float, str]:
     return 0.0, "" if found.kill_distance > 0.0 else "is inside a missile's reach"
 
 
-def _way_down(site: _Site, final: _Final) -> tuple[Floats | None, str]:
-    """Corners (n, 3) of the shortest way from the plan's last waypoint to a line-up; None and why not."""
+def _path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
+    """Return corners (n, 3) of the shortest path from the plan's end to a line-up; or None and the reason."""
     path, goal = site.plan.waypoints, float(final.line_up[0, 2])
     last, high = path[-1], float(path[-1, 2])
     asked = site.scenario.destination_course
@@ -482,7 +522,7 @@ def _way_down(site: _Site, final: _Final) -> tuple[Floats | None, str]:
     before = path[-3:-1]
     flown = [(float(one[0]), float(one[1])) for one in before]
     after = (float(final.line_up[1, 0]), float(final.line_up[1, 1]))
-    nearest = _Nearest()
+    nearest = _BestRefused()
     above = np.array([final.point[0], final.point[1], goal])
     side = int(goal < high)
     aside = math.dist(flown[-1], begin) + math.dist(end, after)
@@ -493,8 +533,8 @@ def _way_down(site: _Site, final: _Final) -> tuple[Floats | None, str]:
         measured = [(measure([*flown, *spots, after], site.turning), spots) for spots in ways]
         fitting = [(way.cost, spots) for way, spots in measured if way.fits and way.length >= least]
         for _, spots in sorted(fitting):
-            for share in _GENTLER:
-                heights = _heights_down(site, spots, share, high, goal)
+            for share in _SLOPE_FACTORS:
+                heights = _approach_altitudes(site, spots, share, high, goal)
                 if abs(heights[0] - high) > 1e-6 or abs(heights[-1] - goal) > 1e-6:
                     break
                 chain = np.concatenate([before, _points(spots, heights), final.line_up[1:], above[None]])
@@ -502,7 +542,7 @@ def _way_down(site: _Site, final: _Final) -> tuple[Floats | None, str]:
                 if found.ok and found.kill_distance > 0.0:
                     return chain[len(before) + 1 : len(before) + len(spots) - 1], ""
                 nearest.add(found)
-            if nearest.tried >= _CERTIFIED:
+            if nearest.tried >= _MAX_CERTIFIED:
                 break
     where = f"from the destination to the final on {round(math.degrees(final.course)) % 360}°"
     if not nearest.tried:
@@ -511,28 +551,34 @@ def _way_down(site: _Site, final: _Final) -> tuple[Floats | None, str]:
     return None, f"none of {nearest.tried} ways {where} is free: {remedy}; the nearest: {nearest.problem}"
 
 
-def _heights_down(site: _Site, spots: list[Spot], share: float, high: float, goal: float) -> Floats:
-    """Heights (n,) m of a way between two heights, m AMSL, at a share of the slopes that it may take."""
+def _approach_altitudes(site: _Site, spots: list[Spot], share: float, high: float, goal: float) -> Floats:
+    """Return the altitudes (n,) m of a path between two altitudes, m AMSL, at a fraction of its slope limits."""
     top = max(high, goal)
-    climb, dive = (partial(_share_of, site, share, side, top) for side in (0, 1))
+    climb, dive = (partial(_scaled_slope, site, share, side, top) for side in (0, 1))
     return fallen(spots, high, climb, dive, goal)
 
 
-def _share_of(site: _Site, share: float, side: int, amsl: float, course: float) -> float:
-    """A share of the climb (side 0) or dive (1) that a way takes on a course, m per m."""
+def _scaled_slope(site: _Site, share: float, side: int, amsl: float, course: float) -> float:
+    """Return a fraction of the climb (side 0) or dive (1) slope on a course, m per m."""
     return share * site.slopes(course, amsl)[side]
 
 
 def _go_around(site: _Site, final: _Final) -> float | None:
-    """Least height over home (m) of a go-around that climbs ahead and flies back to the line-up; None where none does.
+    """Return the lowest height over home (m) of a go-around that returns to the line-up, or None without one.
 
-    It climbs from the landing point at `SHARE` of the steepest climb.
+    It climbs straight ahead from the landing point at `SHARE` of the steepest climb, then flies back to the line-up.
     """
     home, field = float(site.home[2]), float(final.point[2])
     target = final.line_up[0]
-    # Above the line-up: aborted above its go-around's height, an aircraft turns at once, between the hills.
-    first = max(_GO_AROUND, field - home + _GO_AROUND, float(target[2]) - home + _GO_AROUND_ROOM)
-    for height in np.arange(math.ceil(first / _HEIGHT_STEP) * _HEIGHT_STEP, _HIGHEST, _HEIGHT_STEP).tolist():
+    # Above the line-up: an aircraft that aborts above the go-around height turns at once, between the hills.
+    first = max(
+        _MIN_GO_AROUND_HEIGHT_M,
+        field - home + _MIN_GO_AROUND_HEIGHT_M,
+        float(target[2]) - home + _GO_AROUND_CLEARANCE_M,
+    )
+    for height in np.arange(
+        math.ceil(first / _GO_AROUND_STEP_M) * _GO_AROUND_STEP_M, _MAX_GO_AROUND_HEIGHT_M, _GO_AROUND_STEP_M
+    ).tolist():
         top = home + height
         climb = site.slopes(final.course, top)[0]
         if climb <= 0.0:
@@ -540,19 +586,19 @@ def _go_around(site: _Site, final: _Final) -> float | None:
         run, low = _profile(
             site.terrain, (float(final.point[0]), float(final.point[1])), final.course, (top - field) / climb
         )
-        room = (field + climb * run - low)[run > _LAUNCH_RUN]
+        room = (field + climb * run - low)[run > _LAUNCH_RUN_M]
         turned = np.array(
             [final.point[0] + run[-1] * math.sin(final.course), final.point[1] + run[-1] * math.cos(final.course), top]
         )
-        if (room >= 0.0).all() and _back_room(site, turned, target) >= _GO_AROUND_ROOM:
+        if (room >= 0.0).all() and _back_room(site, turned, target) >= _GO_AROUND_CLEARANCE_M:
             return float(height)
     return None
 
 
 def _back_room(site: _Site, turned: Floats, target: Floats) -> float:
-    """Least height above ground on the way back from a go-around to the line-up, m; -inf where that is not known."""
+    """Return the lowest height above ground from a go-around back to the line-up, m; -inf if not known."""
     run = float(leg_runs(np.stack([turned, target]))[0])
-    share = np.linspace(0.0, 1.0, max(2, math.ceil(run / _STEP)))
+    share = np.linspace(0.0, 1.0, max(2, math.ceil(run / _GROUND_SPACING_M)))
     east, north = (turned[k] + share * (target[k] - turned[k]) for k in range(2))
     if target[2] > turned[2]:
         climb = site.slopes(math.atan2(target[0] - turned[0], target[1] - turned[1]), float(target[2]))[0]

@@ -1,10 +1,10 @@
-"""A front of plans: none of them is better than another in length, exposure, clearance and time or energy at once.
+"""Compute a Pareto front of plans in length, exposure, clearance, and time or energy.
 
-An estimation of distribution finds them (`planner.optimisers.front_sampling`), over the coordinates along, across and
-up of all waypoints in the rotated frame. It starts from the planner's own paths: the default plan, and routes past the
-obstacles, shortened for various preferences, each a bound or a cost that shortening knows: more height above ground,
-more distance from radars, and time or energy in place of length. All paths meet the graded constraints of a search, and
-every plan of the front has its own certificate.
+An estimation of distribution algorithm (`planner.optimisers.front_sampling`) searches over the coordinates along,
+across and up of all waypoints in the rotated frame. It starts from the planner's own paths: the default plan, and
+routes past the obstacles, shortened for various preferences. Each preference is a bound or a cost of shortening: more
+height above ground, more distance from radars, and time or energy instead of length. All paths meet the graded
+constraints of a search, and every plan of the front has its own certificate.
 """
 
 from collections.abc import Callable, Iterator
@@ -39,33 +39,59 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-# Preferences of the seeds: shares of the height above ground that the fixed ends allow, and shares of the radars'
-# reach that are kept out of.
-CLEARANCE_SHARES, RADAR_SHARES = (0.0, 0.25, 0.5, 0.75, 0.95), (0.0, 0.35, 0.5, 0.65, 0.8, 1.0)
-# Routes past the obstacles that are tried for each preference beside the default plan's: grids as of
-# `planner.search.seeds`.
-STAGES, SPREAD, RATIO, SHRINK, MAX_ROUTES, SLACK = 50, 0.2, 1.0 / 3.0, 0.3, 3, 1.25
-# Shares of what a search's margins are beyond the certificate's, the first of which is tried first.
+# Clearance preferences of the seeds, as fractions of the additional height above ground that the fixed ends allow.
+CLEARANCE_SHARES = (0.0, 0.25, 0.5, 0.75, 0.95)
+# Radar preferences of the seeds: fractions of the radars' radius that paths keep out of.
+RADAR_SHARES = (0.0, 0.35, 0.5, 0.65, 0.8, 1.0)
+# Grid for routes past the obstacles, which are shortened for each preference in addition to the default plan; see
+# `planner.search.seeds`. Number of stages of the grid.
+STAGES = 50
+# Size of the area of highest ground, as a fraction of a step.
+SPREAD = 0.2
+# Spacing across, as a fraction of a step.
+RATIO = 1.0 / 3.0
+# Reduction of the spheres.
+SHRINK = 0.3
+# Maximum number of routes.
+MAX_ROUTES = 3
+# Maximum cost of a route relative to the length of the default path.
+SLACK = 1.25
+# Fractions of the search margins beyond the certificate's margins, tried in this order.
 MARGINS = (0.5, 0.1, 0.0)
-# Solutions that the search keeps, at least, and for each plan that is asked for; samples of a generation, and
-# generations.
-ARCHIVE, KEPT, POPULATION, GENERATIONS = 100, 2, 120, 400
-# Largest deviations of the noise: a whole path's along, across and up, as shares of an interval, of the straight line
-# and of the height range.
-ALONG, ACROSS, UP = 0.3, 0.1, 0.3
-# Values beyond these do not count: length and time or energy by those of the default plan, and exposure by its own.
-MOST_LENGTH, MOST_EXPOSURE = 1.5, 1.5
-# Exposure that counts where the default plan has less, s.
+# Minimum number of solutions that the search keeps.
+ARCHIVE = 100
+# Number of solutions that the search keeps per requested plan.
+KEPT = 2
+# Samples per generation.
+POPULATION = 120
+# Number of generations.
+GENERATIONS = 400
+# Largest deviation of the noise along, as a fraction of an interval.
+ALONG = 0.3
+# Largest deviation of the noise across, as a fraction of the straight line.
+ACROSS = 0.1
+# Largest deviation of the noise up, as a fraction of the height range.
+UP = 0.3
+# Reference point: length and time or energy relative to the default plan.
+MOST_LENGTH = 1.5
+# Reference point: exposure relative to the default plan.
+MOST_EXPOSURE = 1.5
+# Exposure used in place of the default plan's exposure if that is lower, s.
 LEAST_EXPOSURE = 1.0
-# What is noticed: shares of the default plan's length and time or energy, and of its exposure, and clearance in m. A
-# plan that gains no more than this over another in any objective is no choice beside it. With these amounts fronts of
-# 20 cover what they did without (`benchmarks.planning.fronts`); with twice as much there were 17 plans for `jacksboro`.
-NOTICED, NOTICED_EXPOSURE, NOTICED_CLEARANCE = 0.001, 0.01, 1.0
+# Noticeable gains: a plan that gains no more than these amounts over another plan in any objective is not a separate
+# choice. With these amounts fronts of 20 plans cover as much as without (`benchmarks.planning.fronts`); with twice the
+# amounts there were 17 plans for `jacksboro`.
+# Noticeable gain of length and of time or energy, as a fraction of the default plan.
+NOTICED = 0.001
+# Noticeable gain of exposure, as a fraction of the default plan.
+NOTICED_EXPOSURE = 0.01
+# Noticeable gain of clearance, m.
+NOTICED_CLEARANCE = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class FrontPlan:
-    """One plan of a front, and its values in SI units: m, s, m, s, J (NaN where the aircraft's power is unknown)."""
+    """Plan of a front, and its values in SI units: m, s, m, s, J (NaN if the aircraft's power is unknown)."""
 
     plan: Plan
     length: float
@@ -77,16 +103,16 @@ class FrontPlan:
 
 @dataclass(frozen=True, slots=True)
 class Front:
-    """Plans none of which is better than another in every objective, the shortest first.
+    """Plans of which none is better than another in every objective, the shortest first.
 
-    Of any two at least one gains more than `noticed_amounts` over the other in some objective.
+    Of any two plans at least one gains more than `noticed_amounts` over the other in some objective.
 
-    asked: how many were asked for, at most.
-    fourth: what the fourth objective is, beside length, exposure and clearance: "time" or "energy".
-    default: the shortest plan that the planner finds alone, and its values.
-    reference: (4,) values beyond which a plan does not count, clearance negated.
-    evaluations: paths evaluated, beside the default plan's.
-    refused: how many others were found that were not safe once they were completed.
+    asked: maximum number of plans, as requested.
+    fourth: fourth objective, after length, exposure and clearance: "time" or "energy".
+    default: the shortest plan, found by the planner alone, and its values.
+    reference: (4,) reference point of the hypervolume, clearance negated; plans beyond it are ignored.
+    evaluations: paths evaluated, without the default plan's evaluations.
+    refused: number of other plans that were not safe once they were completed.
     """
 
     plans: tuple[FrontPlan, ...]
@@ -98,7 +124,7 @@ class Front:
     refused: int = 0
 
     def objectives(self) -> Floats:
-        """Objectives (n, 4) of the plans, all smaller is better."""
+        """Return the objectives (n, 4) of the plans; smaller is better for all of them."""
         return np.array([_row(one, self.fourth) for one in self.plans]).reshape(-1, 4)
 
 
@@ -119,13 +145,15 @@ def plan_front(
     finish: Callable[[Plan], Plan] = lambda plan: plan,
     generations: int = GENERATIONS,
 ) -> Front:
-    """Up to `count` plans of a front; none where the default planner finds no safe plan.
+    """Compute up to `count` plans of a front.
 
-    There are fewer where no more were found that gain something noticed over those before them.
-    The fourth objective is energy; time where the scenario asks for time or the aircraft's power is unknown.
-    default: the plan to begin from, complete; None to plan it here, and to finish it as the others.
-    waypoints: of the others while they are searched for, both ends among them; None for as many as it has.
-    finish: completes a plan, as with ways from the ground; only plans that are safe after it are taken.
+    The front is empty if the default planner finds no safe plan.
+    There are fewer plans if no further plan has a noticeable gain over the others.
+    The fourth objective is energy, or time if the scenario's objective is time or the aircraft's power is unknown.
+    default: the completed plan to begin from; None to plan it here, and to finish it like the others.
+    waypoints: number of waypoints of the other plans during the search, including both ends; None for the number of the
+    default plan.
+    finish: completes a plan, for example with departure and approach; only plans that are safe afterwards are taken.
     The same scenario, limits, count and seed give the same front.
 
     >>> from planfly.airframe import load_airframe
@@ -140,10 +168,10 @@ def plan_front(
         default = finish(plan_path(scenario, limits, seed=seed, progress=progress, stop=stop))
     path = with_waypoints(default.waypoints, waypoints or 0)
     task = fitted_task(task, path)
-    first = _valued(task, default)
+    first = _with_values(task, default)
     reference = reference_point(task, first)
     if not default.safe or len(path) == 2:
-        # Between the ends of two waypoints nothing lies that could be moved.
+        # A path of two waypoints has no inner waypoint to move.
         return Front((first,) if default.safe else (), count, task.fourth, first, reference, 0)
     size = max(ARCHIVE, KEPT * count)
     search = make_sampling(task, len(path), reference, size, stream(seed, PLANNER))
@@ -157,12 +185,12 @@ def plan_front(
 
 
 class FrontTask(NamedTuple):
-    """A problem with several objectives.
+    """Problem with several objectives.
 
-    scored: with margins between those of a search and those of the certificate: shortening ends at a search's margins,
-        give or take what a certificate forgives.
-    frame: in which waypoints are sampled. energy: cost of energy, None where power is unknown.
-    fourth: "time" or "energy". travel: the cost of this fourth objective.
+    scored: the problem with margins between the search's and the certificate's: shortening ends at the margins of a
+        search, within the tolerance of the certificate.
+    frame: frame in which waypoints are sampled. energy: cost of energy, or None if the power is unknown.
+    fourth: "time" or "energy". travel: cost of this fourth objective.
     """
 
     problem: Problem
@@ -173,13 +201,13 @@ class FrontTask(NamedTuple):
     travel: TravelCost
 
     def values(self, paths: Floats) -> Floats:
-        """Values (n, 5) of paths (n, w, 3)."""
+        """Return the values (n, 5) of paths (n, w, 3)."""
         return front_values(self.problem.search, self.energy, paths)
 
     def scores(self, paths: Floats) -> tuple[Floats, Floats]:
-        """Objectives (n, 4), and violations (n, 5): four graded constraints and the exposure to missiles.
+        """Return objectives (n, 4), and violations (n, 5): four graded constraints and the exposure to missiles.
 
-        Objectives are infinite where a constraint is not met: they take most of the time, and nothing asks for them.
+        Objectives are infinite if a constraint is not met: they take most of the time, and are not needed then.
         """
         violations, graded = graded_scores(self.scored, paths)
         every = np.concatenate([violations, graded[:, Objective.KILL_EXPOSURE, None]], axis=1)
@@ -188,18 +216,18 @@ class FrontTask(NamedTuple):
         return out, every
 
     def objectives(self, values: Floats) -> Floats:
-        """Objectives (n, 4) of values (n, 5): length, exposure, clearance negated, and time or energy."""
+        """Return the objectives (n, 4) of values (n, 5): length, exposure, negated clearance, and time or energy."""
         fourth = Value.TIME if self.fourth == "time" else Value.ENERGY
         out = values[:, [Value.LENGTH, Value.EXPOSURE, Value.CLEARANCE, fourth]]
         out[:, 2] *= -1.0
         return np.asarray(out)
 
     def vectors(self, paths: Floats) -> Floats:
-        """Waypoints between the ends in the rotated frame, (n, 3 (w - 2)), of paths (n, w, 3)."""
+        """Return the inner waypoints of paths (n, w, 3) in the rotated frame, (n, 3 (w - 2))."""
         return np.asarray(self.frame.rotate(paths[:, 1:-1]).reshape(len(paths), -1))
 
     def paths(self, vectors: Floats) -> Floats:
-        """Paths (n, w, 3) of vectors (n, 3 (w - 2))."""
+        """Return the paths (n, w, 3) of vectors (n, 3 (w - 2))."""
         data, count = self.problem.search, len(vectors)
         inside = self.frame.restore(vectors.reshape(count, -1, 3))
         ends = [np.broadcast_to(end, (count, 1, 3)) for end in (data.start, data.destination)]
@@ -207,7 +235,7 @@ class FrontTask(NamedTuple):
 
 
 def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
-    """The problem of a scenario with several objectives, with the margins of the default planner's search."""
+    """Make the problem of a scenario with several objectives, with the margins of the default planner's search."""
     chosen = find_algorithm(None, scenario.name)
     problem = make_problem(scenario, limits_for(chosen, limits))
     table = problem.search.aircraft
@@ -215,12 +243,12 @@ def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
     by_energy = energy is not None and scenario.planner.objective != "time"
     travel = energy if energy is not None and by_energy else time_cost(table)
     frame = rotated_frame(problem.space.start, problem.space.destination)
-    scored = _scored(problem, MARGINS[0])
+    scored = _with_margins(problem, MARGINS[0])
     return FrontTask(problem, scored, frame, energy, "energy" if by_energy else "time", travel)
 
 
-def _scored(problem: Problem, share: float) -> ProblemArrays:
-    """The problem with the margins of the certificate and a share of what a search keeps beyond them."""
+def _with_margins(problem: Problem, share: float) -> ProblemArrays:
+    """Return the problem with margins between the certificate's (share 0) and the search's (share 1)."""
     search, certified = problem.search, problem.certified
     names = ("buffer", "start_buffer", "destination_buffer", "kill_margin")
     least = {name: getattr(certified, name) for name in names}
@@ -228,16 +256,16 @@ def _scored(problem: Problem, share: float) -> ProblemArrays:
 
 
 def fitted_task(task: FrontTask, default: Floats) -> FrontTask:
-    """The task with margins that the default plan's path (w, 3) keeps: others may pass gaps as narrow as it does."""
+    """Return the task with margins that the default path (w, 3) keeps, so that others may pass equally narrow gaps."""
     for share in MARGINS:
-        task = task._replace(scored=_scored(task.problem, share))
+        task = task._replace(scored=_with_margins(task.problem, share))
         if (task.scores(default[None])[1] <= 0.0).all():
             break
     return task
 
 
 def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
-    """Objectives (4,) beyond which a plan does not count.
+    """Return the reference point of the hypervolume (4,), beyond which plans are ignored.
 
     1.5 times the default plan's length, exposure and time or energy, and the required clearance.
     """
@@ -247,8 +275,8 @@ def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
     return np.array([MOST_LENGTH * length, most, required, MOST_LENGTH * fourth])
 
 
-def _valued(task: FrontTask, plan: Plan) -> FrontPlan:
-    """A plan with its values; its clearance is that of the certificate."""
+def _with_values(task: FrontTask, plan: Plan) -> FrontPlan:
+    """Return a plan with its values; the clearance is taken from the certificate."""
     row = task.values(np.array(plan.waypoints)[None])[0]
     required = task.problem.certified.clearance
     clearance = plan.certificate.clearance + required
@@ -259,20 +287,23 @@ def _valued(task: FrontTask, plan: Plan) -> FrontPlan:
 
 
 def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
-    """Paths (w, 3) for various preferences, from the default plan's path (w, 3) and from routes past the obstacles."""
+    """Yield paths (w, 3) for various preferences, from the default path (w, 3) and routes past the obstacles."""
     yield default
     count = len(default)
     routes = [default, *(resample(route, count) for route in _routes(task, default))]
     for wanted in _preferences(task):
         for route in routes:
             path, _ = shorten_path(wanted, route)
-            # Again from equal legs, as the default plan's.
+            # Shorten again from equal legs, as for the default plan.
             path, _ = shorten_path(wanted, resample(path, count))
             yield path
 
 
 def _routes(task: FrontTask, default: Floats) -> list[Floats]:
-    """Routes (k, 3) on other sides of the obstacles; none among zones, which they do not know."""
+    """Return routes (k, 3) on other sides of the obstacles.
+
+    Empty if there are zones, which the routes ignore.
+    """
     data, frame = task.problem.search, task.frame
     if is_limited(data.airspace):
         return []
@@ -283,7 +314,7 @@ def _routes(task: FrontTask, default: Floats) -> list[Floats]:
 
 
 def _preferences(task: FrontTask) -> Iterator[ProblemArrays]:
-    """The problem with more clearance required, with radars kept out of, and with another cost."""
+    """Yield the problem with more required clearance, with radars to keep out of, and with another cost."""
     data, scenario = task.problem.search, task.problem.scenario
     at_ends = np.stack([[end, end] for end in (data.start, data.destination)])
     spare = max(0.0, float(task.values(at_ends)[:, Value.CLEARANCE].min()) - data.clearance)
@@ -310,7 +341,7 @@ def _search(
     stop: StopCondition | None,
     generations: int,
 ) -> int:
-    """Sample from the seeds on; the number of paths evaluated."""
+    """Sample generations from the seeds, and return the number of paths evaluated."""
     paths = []
     for path in seed_paths(task, np.array(default)):
         paths.append(path)
@@ -333,7 +364,7 @@ def _search(
 def make_sampling(
     task: FrontTask, waypoints: int, reference: Floats, size: int, rng: np.random.Generator
 ) -> FrontSampling:
-    """The estimation of distribution for paths of so many waypoints, which keeps so many solutions."""
+    """Make the estimation of distribution for paths of `waypoints` waypoints, with an archive of `size` solutions."""
     data, frame, inner = task.problem.search, task.frame, waypoints - 2
     corners = np.array([[x, y, 0.0] for x in (data.west, data.east) for y in (data.south, data.north)])
     rotated = frame.rotate(corners)
@@ -346,7 +377,7 @@ def make_sampling(
 
 
 def directions(inner: int, scales: Floats) -> Floats:
-    """Directions (k, 3 inner) of the noise: smooth modes of the whole path, and bumps of one to four waypoints.
+    """Return directions (k, 3 inner) of the noise: smooth modes of the whole path, and bumps of up to four waypoints.
 
     scales: (3,) largest deviations along, across and up.
     """
@@ -365,17 +396,17 @@ def directions(inner: int, scales: Floats) -> Floats:
 
 
 def noticed_amounts(default: FrontPlan, fourth: str) -> Floats:
-    """Amounts (4,) of the objectives that are noticed beside a default plan."""
+    """Return the noticeable gains (4,) of the objectives relative to a default plan."""
     length, exposure, _, last = _row(default, fourth)
     least = NOTICED_EXPOSURE * max(LEAST_EXPOSURE, exposure)
     return np.array([NOTICED * length, least, NOTICED_CLEARANCE, NOTICED * last])
 
 
 def distinct_rows(objectives: Floats, amounts: Floats) -> list[int]:
-    """Rows of objectives (n, m), in their order, that each gain more than an amount (m,) over all taken before.
+    """Return the rows of objectives (n, m), in order, that gain more than an amount (m,) over all rows taken before.
 
     The additive epsilon-dominance of Laumanns, Thiele, Deb and Zitzler (Evolutionary Computation 10, 2002): a row is
-    left out where one taken before is worse by no more than the amounts in every objective.
+    left out if a row taken before is worse by no more than the amounts in every objective.
 
     >>> distinct_rows(np.array([[1.0, 9.0], [1.1, 8.9], [2.0, 5.0], [9.0, 4.9]]), np.array([0.5, 0.5]))
     [0, 2]
@@ -395,9 +426,9 @@ def _certified(
     template: Plan,
     finish: Callable[[Plan], Plan],
 ) -> tuple[list[FrontPlan], int]:
-    """Up to `count` distinct plans that cover most of those that are safe, and how many others are not safe.
+    """Return up to `count` distinct plans that cover most of the safe ones, and the number of unsafe others.
 
-    Each is certified and completed. first: the default plan, complete; it is among them where nothing is better.
+    Each plan is certified and completed. first: the completed default plan, which is included if no plan is better.
     """
     amounts, found = noticed_amounts(first, task.fourth), dict[int, FrontPlan]()
     left = np.arange(len(search.vectors))
@@ -407,22 +438,22 @@ def _certified(
         for row in order:
             if row not in found:
                 path = task.paths(search.vectors[row][None])[0]
-                found[row] = _valued(task, finish(_plan(task, path, template)))
+                found[row] = _with_values(task, finish(_plan(task, path, template)))
         refused = [row for row in order if not found[row].plan.safe]
         chosen: list[FrontPlan] = []
         if not refused:
-            chosen = _choices([*(found[row] for row in order), first], task.fourth, amounts)
+            chosen = _distinct_undominated([*(found[row] for row in order), first], task.fourth, amounts)
             refused = [row for row in order if not any(one is found[row] for one in chosen)]
         if not refused:
             return chosen[:count], sum(not one.plan.safe for one in found.values())
         left = np.setdiff1d(left, refused)
 
 
-def _choices(found: list[FrontPlan], fourth: str, amounts: Floats) -> list[FrontPlan]:
-    """The plans that no other is better than, by the values of their certificates, and that gain something noticed."""
+def _distinct_undominated(found: list[FrontPlan], fourth: str, amounts: Floats) -> list[FrontPlan]:
+    """Return the plans that are not dominated, by the values of their certificates, and have a noticeable gain."""
     rows = np.array([_row(one, fourth) for one in found])
     order = np.arange(len(rows))
-    # Of equal ones the first.
+    # Of equal plans the first is kept.
     less = (rows[:, None] < rows[None]).any(axis=2) | (order[:, None] < order)
     beaten = ((rows[:, None] <= rows[None]).all(axis=2) & less).any(axis=0)
     best = np.flatnonzero(~beaten)

@@ -1,9 +1,9 @@
-"""Planning a path: run an algorithm on a scenario and return the plan with its certificate.
+"""Plan a path: run an algorithm on a scenario and return the plan with its certificate.
 
 A seeded search tries the straight line first, then fits waypoints to grid routes, shortens the best, tries other sides
 of the obstacles, and runs generations of samples if no path is safe. If the certificate fails, up to two more attempts
 use finer grids, larger populations, a larger clearance buffer and a smaller margin to missiles. If no safe path exists
-in the straight frame, or only a long one, a lattice search looks for routes that turn back. Where it is proven that no
+in the straight frame, or only a long one, a lattice search looks for routes that turn back. If it is proven that no
 path exists, the search ends.
 """
 
@@ -51,14 +51,16 @@ ATTEMPTS = (
     (((24, 3), (52, 3), (80, 3), (110, 2)), 2),
     (((44, 3), (96, 3), (160, 2)), 3),
 )
-# Attempts among zones, where grids take the longest and a second has not led to a safe path yet: see
-# `planner.search.seeds.MAX_FOLLOWED_AGAIN`.
+# Maximum number of attempts among zones, where grids take the longest and no second attempt has found a safe path yet;
+# see `planner.search.seeds.MAX_FOLLOWED_AGAIN`.
 MAX_ATTEMPTS_AMONG_ZONES = 2
 # Maximum evaluations of the final pattern search.
 LAST_SEARCH = 200
-# Scales of the moves that finally tighten the best path, relative to those that fit a seed; and rounds of each.
-LAST_MOVES, LAST_ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
-# Maximum wind as a share of the airspeed.
+# Scales of the moves that finally tighten the best path, relative to the moves that fit a seed.
+LAST_MOVES = (1.0, 0.5, 0.25, 0.12)
+# Rounds of each of these moves.
+LAST_ROUNDS = 4
+# Maximum wind speed as a fraction of the airspeed.
 MAX_WIND = 0.8
 # Maximum number of values in a population.
 MAX_NUMBERS = 30_000_000
@@ -87,20 +89,21 @@ def plan_path(
 
     algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None for the scenario's, or the default.
     progress: called with generations done, generations in total, and a short text.
-    stop: called every few hundredths of a second; a returned text ("interrupted") ends the search with the best path so
-    far and is recorded in the plan.
-    improved: called with each path (w, 3) that meets the constraints better than all before it, not yet certified.
+    stop: called every few hundredths of a second; a returned text ("interrupted") ends the search with the best path
+    found and is recorded in the plan.
+    improved: called with each path (w, 3), not yet certified, that meets the constraints better than all earlier ones.
     first_safe: end with the first safe path.
     previous: (w, 3) an older path with the same ends and number of waypoints to start from.
 
-    If no feasible path is found, the plan says so. Raises ScenarioError for options that cannot work.
+    If no feasible path is found, the certificate of the plan states the problems. Raises ScenarioError for options that
+    cannot work.
     """
     chosen = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
     _check_options(scenario, limits.airspeed)
     problem = make_problem(scenario, limits_for(chosen, limits))
     cost = wanted_cost(scenario, limits, problem)
     encoding = ENCODINGS[chosen.encoding](problem.space, scenario.planner.waypoints)
-    # No path is further from missile spheres than its own ends.
+    # A path is never further from missile spheres than its own ends.
     ends = min(kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination))
     wanted = min(CERTIFIED_KILL_MARGIN, ends - 1e-6)
     search = Search(problem, chosen, encoding, stream(seed, PLANNER), progress, stop, first_safe, wanted, improved)
@@ -194,7 +197,7 @@ def _retry(search: Search, number: int) -> None:
 
 
 def _attempt(search: Search, number: int, previous: Floats | None) -> None:
-    """One search from the first population to the last generation."""
+    """Search once, from the first population to the last generation."""
     table = search.problem.scenario.planner
     grids, growth = ATTEMPTS[number]
     population, algorithm = table.population * growth, search.algorithm
@@ -207,7 +210,7 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
         search.record()
         return
     if algorithm.seeded:
-        # Without a safe path the first attempt has tried them with the margins of the later ones, too.
+        # Without a safe path the first attempt has tried other sides with the margins of later attempts, too.
         if number == 0 or search.has_safe():
             search_other_sides(search)
         if number == 0 and not search.has_safe() and is_closed(search.problem.certified):

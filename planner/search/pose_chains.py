@@ -1,7 +1,8 @@
-"""Ways of few straight legs from a place and course to another: direct, by a few corners, and in laps.
+"""Paths of few straight legs from one place and course to another: direct, by a few corners, and in laps.
 
-A way has to hold its turns and to gain or lose a height.  `chains` lists candidates across the ground, `measure` says
-how long they are and whether legs are as long as their turns, and `risen` and `fallen` give the heights of corners.
+The legs of a path must hold its turns, and the path must gain or lose a height.  `chains` lists horizontal candidates,
+`measure` computes their lengths and checks that the legs hold the turns, and `risen` and `fallen` give the altitudes of
+the corners.
 """
 
 import math
@@ -19,40 +20,53 @@ Spot = tuple[float, float]
 # Steepest slope (m per m) on a course (rad).
 Slope = Callable[[float], float]
 
-# Turns sharper than this are not laid out, rad.
+# Sharpest turn of a path, rad.
 SHARPEST = math.radians(120.0)
-# Turns that lengths are known at, rad: from none in steps, so many of them.
-STEP, STEPS = math.radians(15.0), 11
-# Share of a leg that its turns may take: the rest is to settle in.
+# Step of the turns in a table of turn lengths, from 0 on, rad.
+STEP = math.radians(15.0)
+# Number of turns in a table of turn lengths.
+STEPS = 11
+# Largest fraction of a leg that its turns may take; the rest is needed to settle on the leg.
 TURN_SHARE = 0.95
-# m of way that a turn of one radian is worth, and one of two radians four times.
-_SHARP_COST = 250.0
-# Lengths in radii of the tightest turn: of the last leg; of the first beside it; of a leg across the last one's line.
-_LAST, _FIRST, _BASE = (3.0, 4.0, 5.5, 8.0), (3.0, 5.0, 8.0, 14.0), (4.5, 8.0)
-_DIRECTIONS, _ACROSS = 16, tuple(math.radians(side * turn) for side in (-1, 1) for turn in (60.0, 90.0, 120.0))
-# Length of a lap's side, in radii, and how many laps there are at most.
-LAP_SIDE, MAX_LAPS = 5.5, 8
+# Cost of a turn of one radian, m of path length; the cost grows with the square of the turn.
+_TURN_COST_M = 250.0
+# Lengths of the last leg, in radii of the tightest turn.
+_LAST_LEG_RADII = (3.0, 4.0, 5.5, 8.0)
+# Lengths of the leg to a corner near the beginning, in radii of the tightest turn.
+_FIRST_LEG_RADII = (3.0, 5.0, 8.0, 14.0)
+# Lengths of a base leg across the line of the last leg, in radii of the tightest turn.
+_BASE_LEG_RADII = (4.5, 8.0)
+# Number of directions of the leg to a corner near the beginning.
+_FIRST_DIRECTION_COUNT = 16
+# Directions from the end of a base leg back to its start, relative to the final course, rad.
+_BASE_LEG_TURNS_RAD = tuple(math.radians(side * turn) for side in (-1, 1) for turn in (60.0, 90.0, 120.0))
+# Side of a lap, in radii of the tightest turn.
+LAP_SIDE = 5.5
+# Maximum number of laps.
+MAX_LAPS = 8
 
 
 def chains(begin: Spot, course: float, end: Spot, end_course: float, radius: float, laps: int) -> Iterator[list[Spot]]:
-    """Corners between two places: none, one beside the beginning, and one or two before the end; after so many laps.
+    """Yield corners between two places: none, or one near the beginning and one or two before the end.
 
-    course: of the leg that leads to the beginning, end_course: of the one that leads on from the end, rad.
-    radius: of the tightest turn, m.
+    course, end_course: course of the leg before the beginning, and of the leg after the end, rad.
+    radius: radius of the tightest turn, m.  laps: number of laps before these corners.
     """
     heads: list[list[Spot]] = [[]]
     if laps:
         heads = [_laps(begin, course, side * LAP_SIDE * radius, laps) for side in (1.0, -1.0)]
-    befores = [_moved(end, end_course, -share * radius) for share in _LAST]
+    befores = [_moved(end, end_course, -share * radius) for share in _LAST_LEG_RADII]
     tails: list[list[Spot]] = [[], *([before] for before in befores)]
     bases = [
         [_moved(before, end_course + turn, share * radius), before]
         for before in befores[1:3]
-        for turn in _ACROSS
-        for share in _BASE
+        for turn in _BASE_LEG_TURNS_RAD
+        for share in _BASE_LEG_RADII
     ]
     firsts = [
-        [_moved(begin, 2.0 * math.pi * k / _DIRECTIONS, share * radius)] for share in _FIRST for k in range(_DIRECTIONS)
+        [_moved(begin, 2.0 * math.pi * k / _FIRST_DIRECTION_COUNT, share * radius)]
+        for share in _FIRST_LEG_RADII
+        for k in range(_FIRST_DIRECTION_COUNT)
     ]
     for head in heads:
         for tail in (*tails, *bases):
@@ -60,13 +74,16 @@ def chains(begin: Spot, course: float, end: Spot, end_course: float, radius: flo
         for first in firsts:
             for tail in tails:
                 yield [*head, *first, *tail]
-        for first in firsts[1 : 3 * _DIRECTIONS : 2]:
+        for first in firsts[1 : 3 * _FIRST_DIRECTION_COUNT : 2]:
             for tail in bases:
                 yield [*head, *first, *tail]
 
 
 def _laps(begin: Spot, course: float, side: float, laps: int) -> list[Spot]:
-    """Corners of squares that go on from a place on its course and come back to it; to the left of a negative side."""
+    """Return the corners of square laps that leave a place on its course and return to it.
+
+    To the left if side < 0.
+    """
     across = course + math.copysign(0.5 * math.pi, side)
     ahead = _moved(begin, course, abs(side))
     corner = _moved(ahead, across, abs(side))
@@ -79,13 +96,13 @@ def _moved(spot: Spot, course: float, run: float) -> Spot:
 
 
 class TurnLengths(NamedTuple):
-    """Lengths of leg (m) that turns take before and after their corners: at turns in steps of `STEP`, from none on."""
+    """Lengths of leg (m) that turns take before and after their corners, for turns from 0 in steps of `STEP`."""
 
     before: tuple[float, ...]
     after: tuple[float, ...]
 
     def of(self, turn: float) -> tuple[float, float]:
-        """Before and after the corner of a turn, rad."""
+        """Return the lengths before and after the corner of a turn (rad), m."""
         place = min(turn / STEP, len(self.before) - 1.001)
         k = int(place)
         u = place - k
@@ -96,7 +113,7 @@ class TurnLengths(NamedTuple):
 
 
 def arc_lengths(radius: float) -> TurnLengths:
-    """What the tangents of arcs of a radius (m) take.
+    """Return the turn lengths of arcs of a radius (m): the lengths of their tangents.
 
     >>> [round(length) for length in arc_lengths(150.0).of(math.radians(90.0))]
     [150, 150]
@@ -106,10 +123,10 @@ def arc_lengths(radius: float) -> TurnLengths:
 
 
 class Measured(NamedTuple):
-    """A way across the ground.
+    """Horizontal measures of a path.
 
-    length: m.  cost: length, and more for sharp turns: their arcs are shorter, and steeper, than the legs they cut.
-    sharpest: turn, rad.  fullest: share of a leg that its turns take, at most.
+    length: m.  cost: length plus a cost of sharp turns, as their arcs are shorter, and so steeper, than the legs.
+    sharpest: sharpest turn, rad.  fullest: largest fraction of a leg that its turns take.
     """
 
     length: float
@@ -119,12 +136,12 @@ class Measured(NamedTuple):
 
     @property
     def fits(self) -> bool:
-        """Whether no turn is too sharp, and each leg holds the turns at its ends."""
+        """True if no turn is too sharp, and each leg holds the turns at its ends."""
         return self.sharpest <= SHARPEST and self.fullest <= TURN_SHARE
 
 
 def measure(spots: Sequence[Spot], turning: TurnLengths) -> Measured:
-    """Measure a way.  In plain numbers: there are tens of thousands of ways.
+    """Measure a path, in plain numbers for speed, as there are tens of thousands of paths.
 
     >>> measure([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(150.0)).fits
     True
@@ -144,14 +161,14 @@ def measure(spots: Sequence[Spot], turning: TurnLengths) -> Measured:
             fullest, taken = max(fullest, (taken + before) / run), after
         length, east, north, run = length + to_run, to_east, to_north, to_run
     fullest = max(fullest, taken / run) if run else math.inf
-    return Measured(length, length + _SHARP_COST * turns, sharpest, fullest)
+    return Measured(length, length + _TURN_COST_M * turns, sharpest, fullest)
 
 
 def risen(spots: Sequence[Spot], low: float, climb: Slope, floor: float, end: float) -> Floats:
-    """Heights (n,) m at n places on a way that climbs from a height at the first one as steeply as it may.
+    """Return altitudes (n,) m at n places of a path that climbs as steeply as allowed.
 
-    low: at the first place.  floor: nowhere lower but at the end.  end: height that is not passed, and where the way
-    ends, m; the last height is below it where the way is too short.
+    low: altitude at the first place.  floor: lowest altitude except at the end.  end: final altitude, which is not
+    exceeded, m; the last altitude is lower if the path is too short.
 
     >>> risen([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 0.0, lambda course: 0.1, 20.0, 100.0).tolist()
     [20.0, 50.0, 100.0]
@@ -165,9 +182,9 @@ def risen(spots: Sequence[Spot], low: float, climb: Slope, floor: float, end: fl
 
 
 def fallen(spots: Sequence[Spot], high: float, climb: Slope, dive: Slope, end: float) -> Floats:
-    """Heights (n,) m at n places on a way from a height to another, as late down as it may, or as early up.
+    """Return altitudes (n,) m at n places of a path between two altitudes that descends late, or climbs early.
 
-    The first or the last height differs from what is asked for where the way is too short.
+    The first or the last altitude differs from the requested one if the path is too short.
 
     >>> fallen([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 200.0, lambda _: 0.1, lambda _: 0.1, 50.0).tolist()
     [200.0, 150.0, 50.0]

@@ -1,4 +1,4 @@
-"""Replanning in flight: flown legs stay, and the rest is planned again around newly known threats."""
+"""Replan in flight: keep the flown legs and plan the rest again around newly known threats."""
 
 import math
 from collections.abc import Callable
@@ -22,10 +22,11 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-# Completes a plan, with a search that plans a changed scenario, or within other limits, as the plan was planned.
+# A function that completes a plan, given a search that plans a changed scenario, or within other limits, in the same
+# way.
 Settle = Callable[[Plan, Search], Plan]
 
-# Minimum number of waypoints of the path ahead: with fewer it cannot avoid anything.
+# Minimum number of waypoints of the path ahead; with fewer it cannot avoid anything.
 MIN_WAYPOINTS = 8
 
 
@@ -41,13 +42,14 @@ def replan(
     stop: StopCondition | None = None,
     settle: Settle | None = None,
 ) -> Plan:
-    """Plan again from the waypoint at which leg `leg` of an old plan begins; the legs before it are flown and stay.
+    """Plan again from the waypoint at which leg `leg` of an old plan begins.
 
-    scenario: with the threats known now (`world.scenario.with_threats`). The turn at that waypoint is measured from the
-    course of the last flown leg. The search starts from the rest of the old plan, in addition to its grid routes. The
-    certificate is of the path ahead; violations and objectives are of the whole path in this scenario.
+    The flown legs before it are kept.
+    scenario: includes the threats known now (`world.scenario.with_threats`). The turn at that waypoint is measured from
+    the course of the last flown leg. The search starts from the rest of the old plan, in addition to its grid routes.
+    The certificate applies to the path ahead; violations and objectives to the whole path in this scenario.
 
-    settle: completes the path ahead in a scenario that begins where it does, before the flown legs come before it.
+    settle: completes the path ahead in a scenario that begins with it, before the flown legs are prepended.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -68,14 +70,14 @@ def replan(
     if not 0 <= leg < count - 1:
         raise MissionError.of_argument("at_leg", leg, f"the plan has legs 0..{count - 2}", file=scenario.name)
     same_mission(scenario, old)
-    _outside(scenario, old, leg)
+    _check_first_waypoint(scenario, old, leg)
     rest = with_waypoints(old.waypoints[leg:], max(MIN_WAYPOINTS, count - leg))
     course = scenario.start_course if leg == 0 else float(leg_courses(old.waypoints)[leg - 1])
     table = scenario.planner.model_copy(update={"waypoints": len(rest)})
     ahead = replace(scenario, start=rest[0], start_course=course, planner=table)
 
     def search(asked: Scenario, within: Limits) -> Plan:
-        # One of other waypoints than the old plan's does not start from it.
+        # A search with another number of waypoints cannot start from the old plan.
         previous = rest if asked.planner.waypoints == len(rest) else None
         return plan_path(asked, within, seed=seed, algorithm=algorithm, progress=progress, stop=stop, previous=previous)
 
@@ -92,7 +94,7 @@ def replan(
 
 
 def same_mission(scenario: Scenario, old: Plan) -> None:
-    """Raise MissionError if the ends of a plan are not the scenario's.
+    """Raise MissionError if the ends of a plan differ from the scenario's ends.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -116,7 +118,7 @@ def same_mission(scenario: Scenario, old: Plan) -> None:
             )
 
 
-def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
+def _check_first_waypoint(scenario: Scenario, old: Plan, leg: int) -> None:
     """Raise MissionError if the new plan would begin within a missile's kill radius or violate a zone there."""
     threats = scenario.threats
     inside = threats.kill_radius - np.sqrt(((threats.position - old.waypoints[leg]) ** 2).sum(axis=1))
@@ -137,7 +139,7 @@ def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
 
 
 def with_waypoints(path: Floats, count: int) -> Floats:
-    """A path (w, 3) whose longest legs are halved until it has `count` waypoints."""
+    """Return a path (w, 3) with its longest legs halved until it has `count` waypoints."""
     points = [np.asarray(point, dtype=np.float64) for point in path]
     while len(points) < count:
         longest = int(np.argmax(leg_runs(np.array(points))))

@@ -1,10 +1,10 @@
-"""The path that takes least time or energy, where a scenario asks for that instead of the shortest.
+"""Search for the path of least time or energy, if a scenario requires that instead of the shortest path.
 
 The search for the shortest path comes first, with its certificate. From that path, from the straight line and from
 routes on other sides of the obstacles, all waypoints then move at once so that the path costs less under the same
-constraints (`planner.seeding.shortening` with `planner.evaluation.travel_cost`): to heights where the wind helps or
-hinders less, and to courses on which it does. A result replaces the shortest path if its certificate is as good and it
-costs less, so that a plan never costs more than the shortest path does.
+constraints (`planner.seeding.shortening` with `planner.evaluation.travel_cost`): to altitudes and courses with a more
+favourable wind. A result replaces the shortest path if its certificate is as good and it costs less, so that a plan
+never costs more than the shortest path.
 """
 
 import math
@@ -30,22 +30,34 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-# Grids for routes on other sides: stages, shares of a step for the area of highest ground, the spacing across, and the
-# reductions of spheres; routes of each; and maximum length of a route relative to the shortest path.
-STAGES, SPREAD, RATIO, SHRINKS, MAX_ROUTES, SLACK = 50, 0.2, 1.0 / 3.0, (0.2, 0.5), 8, 1.2
-# Maximum repetitions from equidistant waypoints, and the minimum gain for another, as a share.
-MAX_REPEATS, MIN_GAIN = 4, 2e-5
-# Additional margins with which a path is tried until it is certified: to spheres and ground, m, and of slopes, rad. A
-# leg's steepest climb is that of its strongest wind, which its steps of height change.
+# Grids for routes on other sides. Number of stages.
+STAGES = 50
+# Size of the area of highest ground, as a fraction of a step.
+SPREAD = 0.2
+# Spacing across, as a fraction of a step.
+RATIO = 1.0 / 3.0
+# Reductions of the spheres, one for each grid.
+SHRINKS = (0.2, 0.5)
+# Maximum number of routes per grid.
+MAX_ROUTES = 8
+# Maximum length of a route relative to the shortest path.
+SLACK = 1.2
+# Maximum repetitions from equidistant waypoints.
+MAX_REPEATS = 4
+# Minimum gain for another repetition, as a fraction of the cost.
+MIN_GAIN = 2e-5
+# Additional margins with which a path is tried until it is certified: to spheres and ground, m, and of slopes, rad. The
+# steepest climb of a leg is at its strongest wind, which changes with the leg's altitudes.
 EXTRA_MARGINS = ((0.1, 0.0), (2.0, math.radians(0.2)), (2.0, math.radians(0.6)))
-# Shares of the way from the shortest path to a cheaper one that leaves the airspace, which shortening does not know.
+# Fractions of the step from the shortest path towards a cheaper one that violates the airspace, which shortening
+# ignores.
 SHARES = (1.0, 0.75, 0.5, 0.25, 0.1)
 
 _Found = tuple[Floats, Certificate]
 
 
 def wanted_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelCost:
-    """What a scenario's plan makes small. Raises ScenarioError for energy where the aircraft's power is unknown."""
+    """Return the cost that a scenario's plan minimises. Raises ScenarioError for energy if the power is unknown."""
     objective = scenario.planner.objective or "length"
     cost = make_travel_cost(objective, limits.envelope, problem.search.aircraft)
     if cost is None:
@@ -55,7 +67,7 @@ def wanted_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelC
 
 
 def search_cheapest(search: Search, found: _Found, cost: TravelCost) -> _Found:
-    """The path that costs least and its certificate; the shortest path where no other that is as safe costs less."""
+    """Return the cheapest path and its certificate; the shortest path if no equally safe path costs less."""
     by_length = cost.time == 0.0 and cost.energy == 0.0
     if by_length or not search.finished(found[1]):
         return found
@@ -78,12 +90,12 @@ def search_cheapest(search: Search, found: _Found, cost: TravelCost) -> _Found:
 
 
 def _cost(data: ProblemArrays, path: Floats) -> float:
-    """Cost of a path (w, 3), m; inf where a leg cannot be held against the wind."""
+    """Return the cost of a path (w, 3), m; inf if a leg cannot be held against the wind."""
     return float(path_cost(data.travel, data.aircraft, np.array(path, dtype=np.float64)))
 
 
 def _starts(search: Search, shortest: Floats) -> Iterator[Floats]:
-    """Paths (w, 3) to begin from: the shortest, with equal legs too, the straight line, and routes on other sides.
+    """Yield paths (w, 3) to start from: the shortest, also with equal legs, the straight line, and other routes.
 
     Raises SearchEnded if the search is asked to stop.
     """
@@ -103,7 +115,7 @@ def _starts(search: Search, shortest: Floats) -> Iterator[Floats]:
 
 
 def _cheaper(search: Search, data: ProblemArrays, start: Floats, best: _Found) -> _Found:
-    """The cheaper of the best path so far and of what shortening makes of a start (w, 3)."""
+    """Return the cheaper of the best path and the result of shortening a start (w, 3)."""
     path = start
     for extra_margin, angle in EXTRA_MARGINS:
         stricter = data._replace(angle_margin=data.angle_margin + angle)

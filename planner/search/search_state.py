@@ -36,6 +36,7 @@ Flags = NDArray[np.bool_]
 
 
 SCORE_COLUMNS = len(Violation) + len(Objective)
+# Columns of the objectives in a row of scores.
 LENGTH, KILL, DETECTION, HEIGHT = (len(Violation) + item for item in Objective)
 CONSTRAINTS = Level(tuple(Violation), (0.0,) * len(Violation))
 # Order of the archive: feasible paths first, then the lowest kill exposure, then the shortest.
@@ -43,27 +44,27 @@ ARCHIVE_LEVELS = (CONSTRAINTS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_
 
 
 def score_table(violations: NDArray[np.generic], objectives: Floats) -> Floats:
-    """Scores (n, 8) of violations (n, 4) and objectives (n, 4)."""
+    """Return scores (n, 8) of violations (n, 4) and objectives (n, 4)."""
     return np.concatenate([violations.astype(np.float64), objectives], axis=1)
 
 
 def no_scores() -> Floats:
-    """An empty table of scores (0, 8)."""
+    """Return an empty table of scores (0, 8)."""
     return np.empty((0, SCORE_COLUMNS))
 
 
 def violated(scores: Floats) -> Flags:
-    """Whether paths with these scores (..., 8) violate a constraint, (...,)."""
+    """Return True for scores (..., 8) of paths that violate a constraint, (...,)."""
     return np.asarray(scores[..., : len(Violation)].any(axis=-1))
 
 
 def safe(scores: Floats) -> Flags:
-    """Whether paths with these scores (..., 8) violate no constraint and are exposed to no missile, (...,)."""
+    """Return True for scores (..., 8) of paths without violations and without exposure to missiles, (...,)."""
     return np.asarray(~violated(scores) & ~(scores[..., KILL] > 0.0))
 
 
 def best_first(scores: Floats) -> Ints:
-    """Rows of scores (n, 8) in the archive's order; the sort is stable."""
+    """Return the rows of scores (n, 8) in the archive's order; the sort is stable."""
     return np.argsort(ranks(scores, ARCHIVE_LEVELS), kind="stable")
 
 
@@ -75,51 +76,51 @@ Improved = Callable[[Floats], None]
 ARCHIVE_SIZE = 24
 # Additional margins to spheres and ground, m, with which a path is shortened until it is certified.
 EXTRA_MARGINS = (0.1, 2.0)
-# The same for further attempts from the first path, with corners as flown, where legs have to hold their turns.
+# Additional margins, m, of further attempts from the first path, with corners as flown, if legs must hold their turns.
 CORNER_MARGINS = (2.0, 5.0)
-# Additional margins of slopes, rad, for last attempts with a path that fails by its slopes alone: where a leg climbs as
-# steeply as it may, shortening ends some hundredths of a degree beyond that.
+# Additional margins of slopes, rad, of last attempts with a path that fails only by its slopes: if a leg climbs at the
+# limit, shortening ends some hundredths of a degree beyond it.
 SLOPE_MARGINS = (math.radians(0.2), math.radians(0.6))
-# A path that is still this deep inside a missile's sphere once it is shortened is not tried with other margins, m.
+# Depth inside a missile's sphere, m, beyond which a shortened path is not tried with other margins.
 HOPELESS = 15.0
-# What a search keeps from missiles in gaps that are too narrow for its usual margin, beside the certificate's, m.
+# Distance from missiles in addition to the certificate's margin, m, in gaps too narrow for the search's usual margin.
 NARROW_RESERVE = 1.0
 # Evaluations that `tighten` may take: with less budget left it is skipped.
 TIGHTENING_EVALUATIONS = 600
 # Waypoints evaluated between two checks of the stop condition: some 10 ms.
 WAYPOINTS_AT_ONCE = 4000
-# Pauses for which a search that is asked to stop before it has a result looks for its first route: some 100 ms.
+# Number of pauses that a stopped search without a result may still take to find its first route: some 100 ms.
 GRACE = 10
 # Certificates made before the stop condition is checked: some 10 ms if none passes.
 CERTIFICATES_AT_ONCE = 4
 
 
 def with_narrow_margins(problem: Problem) -> Problem:
-    """A problem whose search passes missiles more closely, but with the certificate's margin and a little more."""
+    """Return a problem whose search passes missiles more closely: with little more than the certificate's margin."""
     data = problem.search
     margin = data.tracking.across + CERTIFIED_KILL_MARGIN + NARROW_RESERVE
     return replace(problem, search=data._replace(kill_margin=min(data.kill_margin, margin)))
 
 
 class SearchEnded(Exception):
-    """Raised within a search that is asked to stop; its archive holds the results so far."""
+    """Raised within a search that is asked to stop; its archive contains the results."""
 
 
 @dataclass(slots=True)
 class Archive:
-    """The best of all evaluated paths, best first: vectors (k, d) and scores (k, 8)."""
+    """Best of all evaluated paths, best first: vectors (k, d) and scores (k, 8)."""
 
     vectors: Floats
     scores: Floats
 
     def feasible(self) -> bool:
-        """Whether the best path meets the constraints; False if the archive is empty."""
+        """Return True if the best path meets the constraints; False if the archive is empty."""
         return len(self.scores) > 0 and not violated(self.scores[0])
 
     def take(self, vectors: Floats, scores: Floats) -> None:
-        """Insert new rows; of equal ranks the older stay first.
+        """Insert new rows; of rows of equal rank the older stay first.
 
-        Once any row is feasible, infeasible ones are dropped: there can be thousands of them to rank.
+        Once any row is feasible, infeasible rows are dropped, as there can be thousands of them to rank.
         """
         fit = ~violated(scores)
         if self.feasible():
@@ -141,25 +142,25 @@ class Archive:
 class Search:
     """State shared by all attempts of a search.
 
-    problem: with the margins of the current attempt.
-    algorithm, encoding, rng: of the search.
+    problem: the problem with the margins of the current attempt.
+    algorithm, encoding, rng: settings and random generator of the search.
     progress: called with generations done, generations in total, and a short text.
     stop: called after each generation and each start; a returned text ends the search and gives the reason.
-    first_safe: whether to end with the first safe path.
+    first_safe: True to end with the first safe path.
     required_distance: distance (m) from missiles that the certificate of a finished path requires.
-    improved: called with each path (w, 3) that is the best so far of those that meet the constraints.
+    improved: called with each path (w, 3) that meets the constraints and is better than all earlier ones.
     archive: the best paths.
     evaluations: paths evaluated, or equivalent work.
-    legs: evaluated between candidates for single waypoints.
+    legs: legs evaluated between candidates for single waypoints.
     done: generations done.
-    ended: why the search ended.
-    history: per generation, length ratio, kill exposure and violations of the best path so far.
-    certificates: by the path's vector.
+    ended: reason why the search ended.
+    history: per generation, length ratio, kill exposure and violations of the best path.
+    certificates: certificates by the path's vector.
     shortest: the shortest finished path (w, 3) from shortening and its certificate; its waypoints need not lie in their
     intervals.
-    budget_exhausted: whether the budget is too small for another shortening.
-    is_closed: whether it is proven that no safe path exists.
-    grace: pauses that are left to a search without a result, once it is asked to stop.
+    budget_exhausted: True if the budget is too small for another shortening.
+    is_closed: True if it is proven that no safe path exists.
+    grace: remaining pauses of a search without a result, once it is asked to stop.
     """
 
     problem: Problem
@@ -188,7 +189,7 @@ class Search:
         self.archive = Archive(np.empty((0, self.encoding.lower.size)), no_scores())
 
     def score(self, vectors: Floats) -> Floats:
-        """Scores (n, 8) of vectors (n, d), without effect on the archive or the budget."""
+        """Return the scores (n, 8) of vectors (n, d), without effect on the archive or the budget."""
         paths = np.ascontiguousarray(self.encoding.decode(vectors))
         data = self.problem.search
         if self.algorithm.graded:
@@ -199,7 +200,10 @@ class Search:
         return score_table(counts, objectives)
 
     def evaluate(self, vectors: Floats) -> Floats:
-        """Scores (n, 8) of vectors (n, d); the archive takes them. Raises SearchEnded if asked to stop."""
+        """Return the scores (n, 8) of vectors (n, d), and insert them into the archive.
+
+        Raises SearchEnded if asked to stop.
+        """
         at_once, scores = max(1, WAYPOINTS_AT_ONCE // self.encoding.waypoints), no_scores()
         for first in range(0, len(vectors), at_once):
             scores = np.concatenate([scores, self.score(vectors[first : first + at_once])])
@@ -213,7 +217,7 @@ class Search:
     def pause(self) -> None:
         """Raise SearchEnded if the search is asked to stop.
 
-        A search of whole paths that has no result yet goes on for some pauses, to its first route. Where there is none
+        A search of whole paths without a result continues for some pauses, until its first route. If it has no route
         by then, the straight line is its result.
         """
         if not self.asked_to_end():
@@ -226,7 +230,7 @@ class Search:
         raise SearchEnded
 
     def straight_vectors(self) -> Floats:
-        """The straight line as a vector (1, d) of the rotated encoding."""
+        """Return the straight line as a vector (1, d) of the rotated encoding."""
         encoding, space = self.encoding, self.problem.space
         edges = encoding.lower[0::3], encoding.upper[0::3]
         share = 0.5 * (edges[0] + edges[1]) / edges[1][-1]
@@ -234,13 +238,13 @@ class Search:
         return rotated_vectors(space, encoding, path[None])
 
     def asked_to_end(self) -> bool:
-        """Whether the stop condition asks the search to end; it is remembered why."""
+        """Return True if the stop condition asks the search to end, and store the reason."""
         reason = self.stop() if self.stop is not None else ""
         self.ended = reason or self.ended
         return bool(reason)
 
     def _take(self, vectors: Floats, scores: Floats) -> None:
-        """Count evaluated vectors and insert them into the archive."""
+        """Add evaluated vectors to the number of evaluations and to the archive."""
         self.evaluations += len(vectors)
         before = self.archive.vectors[:1]
         self.archive.take(vectors, scores)
@@ -248,22 +252,22 @@ class Search:
         if self.improved is None or not self.archive.feasible() or np.array_equal(before, best):
             return
         ratio = self.archive.scores[0][LENGTH]
-        if self.shortest is None or ratio * self._straight() < path_length(self.shortest[0]):
+        if self.shortest is None or ratio * self._straight_length() < path_length(self.shortest[0]):
             self.improved(self.encoding.decode(best)[0])
 
     def improve(self, vector: Floats, max_evaluations: int) -> Floats:
-        """Improve a vector (d,) by a pattern search; the archive takes the result. Returns the best scores (8,)."""
+        """Improve a vector (d,) by a pattern search, archive the result, and return the best scores (8,)."""
         left = min(max_evaluations, self._budget() - self.evaluations)
         if left < 2:
             return np.asarray(self.evaluate(vector[None])[0])
         found, made = search_patterns(self.problem.search, self.encoding, vector, int(left), self.asked_to_end)
         scores = self.evaluate(found)
-        # The pattern search has counted these vectors already.
+        # The pattern search has already included these vectors in its evaluations.
         self.evaluations += made - len(found)
         return np.asarray(scores[0])
 
     def tighten(self, vector: Floats, rounds: int, scale: float, max_evaluations: int) -> Floats:
-        """Move all waypoints of a vector (d,) at once, then `improve` it. Returns the best scores (8,)."""
+        """Move all waypoints of a vector (d,) at once, then `improve` it, and return the best scores (8,)."""
         if self._budget() - self.evaluations < TIGHTENING_EVALUATIONS:
             return self.improve(vector, max_evaluations)
         moved, made = tighten(self.problem.search, self.encoding, vector, rounds, scale)
@@ -272,7 +276,7 @@ class Search:
 
     @property
     def shortens(self) -> bool:
-        """Whether paths are shortened free of their intervals: not among zones, which shortening ignores."""
+        """True if paths are shortened free of their intervals; False among zones, which shortening ignores."""
         return self.algorithm.tightened and not is_limited(self.problem.search.airspace)
 
     def shorten(self, path: Floats) -> bool:
@@ -290,13 +294,13 @@ class Search:
             if self._budget() - self.evaluations < MAX_MODELS:
                 self.budget_exhausted = True
                 return False
-            # Another problem has to be laid out for kernels anew.
+            # Keep the same problem if possible: a new one must be laid out in memory for kernels again.
             stricter = data._replace(angle_margin=data.angle_margin + angle) if angle > 0.0 else data
             path, made = shorten_path(
                 stricter, path, extra_margin=extra_margin, corners_too=corners_too, pause=self.pause
             )
             self.evaluations += made
-            if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight():
+            if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight_length():
                 return False
             certificate = certify(self.problem, path)
             if self.finished(certificate):
@@ -309,13 +313,13 @@ class Search:
         return False
 
     def _fails_by_slopes(self, certificate: Certificate) -> bool:
-        """Whether a path meets all but the limits of slopes."""
+        """Return True if a path violates only the slope limits."""
         others = certificate.turn, certificate.clearance, certificate.bounds, certificate.zone_distance
         keeps_off = certificate.kill_distance >= self.required_distance and certificate.headroom >= 0.0
         return certificate.slope < self.problem.certified.angle_margin and keeps_off and min(others) >= 0.0
 
     def must_end(self) -> bool:
-        """Whether the search must end now: stopped, or out of budget."""
+        """Return True if the search must end now: stopped, or out of budget."""
         if self.budget_exhausted or self.evaluations >= self._budget():
             self.ended = "budget"
         elif self.stop is not None:
@@ -323,32 +327,32 @@ class Search:
         return self.ended != "completed"
 
     def best_is_safe(self) -> bool:
-        """Whether the archive's best path violates nothing and is exposed to no missile."""
+        """Return True if the archive's best path violates nothing and is exposed to no missile."""
         return bool(safe(self.archive.scores[0]))
 
     def first_safe_found(self) -> bool:
-        """Whether the search was to end with the first safe path, and one is finished."""
+        """Return True if the search should end with the first safe path, and one is finished."""
         if not self.first_safe or (self.shortest is None and not self.archive.feasible()):
             return False
         return self.shortest is not None or self.finished(self.best_certified()[1])
 
     def has_safe(self) -> bool:
-        """Whether a path is known that violates nothing and is exposed to no missile."""
+        """Return True if a path is known that violates nothing and is exposed to no missile."""
         return self.shortest is not None or (len(self.archive.scores) > 0 and self.best_is_safe())
 
-    def _straight(self) -> float:
+    def _straight_length(self) -> float:
         return math.dist(self.problem.space.start, self.problem.space.destination)
 
     def length_ratio(self) -> float:
-        """Length ratio of the best path so far."""
+        """Return the length ratio of the best path."""
         ratio = float(self.archive.scores[0][LENGTH])
         if self.shortest is None:
             return ratio
-        shortest = float(path_length(self.shortest[0])) / self._straight()
+        shortest = float(path_length(self.shortest[0])) / self._straight_length()
         return min(ratio, shortest) if self.best_is_safe() else shortest
 
     def finished(self, certificate: Certificate) -> bool:
-        """Whether this certificate meets the goal of the search."""
+        """Return True if this certificate meets the goal of the search."""
         return certificate.ok and certificate.kill_distance >= self.required_distance
 
     def _budget(self) -> float:
@@ -356,7 +360,7 @@ class Search:
         return math.inf if budget is None else budget
 
     def record(self) -> None:
-        """Append the best path so far to the history."""
+        """Append the best path to the history."""
         best = self.archive.scores[0]
         violations = best[: len(Violation)]
         count = np.count_nonzero(violations) if self.algorithm.graded else violations.sum()
@@ -375,10 +379,10 @@ class Search:
             self.progress(self.done, self.done + left, "no feasible path yet" if none_yet else remark)
 
     def best_certified(self) -> tuple[Floats, Certificate]:
-        """First path of the archive that is certified with the full kill margin.
+        """Return the first path of the archive that is certified with the full kill margin, and its certificate.
 
-        Otherwise the certified path furthest from missiles, or the first path if none is certified. A search that is
-        asked to end examines only the first few.
+        Otherwise return the certified path furthest from missiles, or the first path if none is certified. A search
+        that is asked to end examines only the first few.
         """
         first: tuple[Floats, Certificate] | None = None
         exposed: tuple[Floats, Certificate] | None = None
@@ -403,7 +407,7 @@ class Search:
         return result
 
     def best_path(self) -> tuple[Floats, Certificate]:
-        """The shorter of the archive's certified path and the shortened path."""
+        """Return the shorter of the archive's certified path and the shortened path, and its certificate."""
         found = self.best_certified()
         if self.shortest is None or (
             self.finished(found[1]) and path_length(found[0]) <= path_length(self.shortest[0])
@@ -412,7 +416,7 @@ class Search:
         return self.shortest
 
     def _certificate(self, vector: Floats, path: Floats) -> Certificate:
-        """Certificate of a vector's path, cached: it is the same in all attempts."""
+        """Return the certificate of a vector's path from a cache: it is the same in all attempts."""
         key = vector.tobytes()
         known = self.certificates.get(key)
         if known is None:

@@ -1,4 +1,4 @@
-"""Starting points of a seeded search: the straight line, routes over grids, other sides, and routes that turn back.
+"""Find starting points of a seeded search: the straight line, grid routes, other sides, and routes that turn back.
 
 Grid routes are fitted with waypoints and improved one after another; the best becomes the seed of the population. A
 grid estimates the shorter side of an obstacle only as well as it resolves gaps. Grids with reduced obstacles therefore
@@ -36,17 +36,21 @@ from world.geometry import path_length
 Floats = NDArray[np.float64]
 
 
-# Maximum evaluations of the pattern search on a quickly fitted path, and on a seed.
-QUICK_SEARCH, SEED_SEARCH = 50, 300
-# Factor on these for seeds below a maximum height above ground, where few moves stay within the band.
+# Maximum evaluations of the pattern search on a quickly fitted path.
+QUICK_SEARCH = 50
+# Maximum evaluations of the pattern search on a seed.
+SEED_SEARCH = 300
+# Factor on both for seeds below a maximum height above ground, where few moves stay within the band.
 BAND_EFFORT = 3
-# Number of routes followed once a path is safe; after them other sides are tried. Among zones, where no others are, of
-# an attempt after the first, safe or not: of 1,400 random scenarios 16 came to one, and none to a safe path by it.
-MAX_FOLLOWED, MAX_FOLLOWED_AGAIN = 2, 3
+# Number of routes followed once a path is safe; after them other sides are tried.
+MAX_FOLLOWED = 2
+# Number of routes followed among zones, where other sides are not tried, in attempts after the first. Of 1,400 random
+# scenarios 16 needed such an attempt, and none found a safe path by it.
+MAX_FOLLOWED_AGAIN = 3
 
 
 def straight_line(search: Search) -> bool:
-    """Whether the straight line is a safe path: no path is shorter, and the search is finished."""
+    """Return True if the straight line is a safe path: no path is shorter, and the search is finished."""
     if search.encoding.name != "rotated":
         return False
     vectors = search.straight_vectors()
@@ -60,12 +64,12 @@ def straight_line(search: Search) -> bool:
 def starting_vectors(
     search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None, *, again: bool = False
 ) -> Floats:
-    """Start vectors (n, d) of a search: the seed that is best after improvement, and the previous path.
+    """Return start vectors (n, d) of a search: the seed that is best after improvement, and the previous path.
 
-    The marginals of several routes at once describe none of them, so one seed leads. It is used before its improvement:
-    afterwards it is so close to every limit that hardly any sample around it is feasible. again: whether an attempt has
-    failed before; then, among zones, grids that are no finer than another are left out and only the best routes are
-    followed.
+    The marginals of several routes at once describe none of them, so only one seed is used. It is used in its form
+    before the improvement: afterwards it is so close to every limit that hardly any sample around it is feasible.
+    again: True if an earlier attempt has failed; then, among zones, grids that are not finer than another one are left
+    out and only the best routes are followed.
     """
     encoding, space, waypoints = search.encoding, search.problem.space, search.encoding.waypoints
     if encoding.name != "rotated" or (not search.algorithm.seeded and previous is None):
@@ -96,9 +100,9 @@ def starting_vectors(
 
 
 def _routes(search: Search, grids: tuple[tuple[int, int], ...], again: bool) -> list[GridRoute]:
-    """The grids' routes, those with the best quickly fitted paths first.
+    """Return the routes of the grids, ordered by their quickly fitted paths, best first.
 
-    The archive takes each fitted path as soon as it is found. again: as in `starting_vectors`.
+    Each fitted path is archived as soon as it is found. again: as in `starting_vectors`.
     """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     if search.progress is not None:
@@ -134,30 +138,41 @@ def _routes(search: Search, grids: tuple[tuple[int, int], ...], again: bool) -> 
 
 # --- Other sides of the obstacles ---
 
-# Share of a step for the area of highest ground; stages of the grids, reduction of spheres and spacing across, as
-# shares of a step. A route runs at up to 63 degrees to the direct line on the first: less closes ways near the ends.
-SPREAD, GRIDS = 0.2, ((50, 0.2, 2.0 / 3.0), (50, 0.5, 2.0 / 3.0))
-# Finer grids, with steeper and with more courses, where no path is safe or the best is longer than the straight line by
-# more than this share: then there is much to gain.
-FINER_GRIDS, LONG_WAY = ((80, 0.3, 0.5), (80, 0.7, 1.0)), 0.06
-# Steps of routes at the height of the ceiling, m, and how far they may enter missiles' spheres, m: these are tried
-# where the finer grids are, for they may turn back.
-CEILING_STEPS, CEILING_CLOSER = (250.0, 150.0, 100.0), (15.0, 40.0)
-# A path is not tried again if another one is this near to it on average, m.
+# Size of the area of highest ground, as a fraction of a step.
+SPREAD = 0.2
+# Grids: number of stages, reduction of the spheres, and spacing across as a fraction of a step. A route runs at up to
+# 63 degrees to the direct line on the first grid: a smaller angle would block paths near the ends.
+GRIDS = ((50, 0.2, 2.0 / 3.0), (50, 0.5, 2.0 / 3.0))
+# Finer grids, with steeper and with more courses, used if no path is safe or the best path is long, as there is much to
+# gain.
+FINER_GRIDS = ((80, 0.3, 0.5), (80, 0.7, 1.0))
+# Excess over the straight line above which a path is long, as a fraction.
+LONG_WAY = 0.06
+# Steps of routes at the altitude of the ceiling, m; they are tried together with the finer grids, as they may turn
+# back.
+CEILING_STEPS = (250.0, 150.0, 100.0)
+# Depths to which routes at the ceiling may enter missiles' spheres, m.
+CEILING_CLOSER = (15.0, 40.0)
+# Average distance from an earlier path below which a path is not tried again, m.
 SAME_PATH = 20.0
-# Maximum number of routes per grid; and maximum cost relative to the best path, or, if none is safe, to the straight
-# line. With few courses, grid routes are some percent too long.
-MAX_ROUTES, SLACK, MAX_DETOUR = 8, 1.08, 1.8
-# No other side is tried for a path that exceeds the straight line by less than this share.
+# Maximum number of routes per grid.
+MAX_ROUTES = 8
+# Maximum cost of a route relative to the best path. With few courses, grid routes are some percent too long.
+SLACK = 1.08
+# Maximum cost of a route relative to the straight line if no path is safe.
+MAX_DETOUR = 1.8
+# Excess over the straight line, as a fraction, below which no other side is tried.
 MIN_DETOUR = 0.004
-# Maximum repetitions of shortening from equidistant waypoints, and the minimum gain for another, as a share.
-MAX_REPEATS, MIN_GAIN = 3, 2e-5
+# Maximum repetitions of shortening from equidistant waypoints.
+MAX_REPEATS = 3
+# Minimum gain for another repetition, as a fraction of the length.
+MIN_GAIN = 2e-5
 
 
 def search_other_sides(search: Search) -> None:
     """Shorten the best path, and routes on other sides of the obstacles."""
     if not len(search.archive.scores):
-        # A search needs a result, even where the grids show no way.
+        # A search needs a result, even if the grids have no route.
         search.evaluate(search.straight_vectors())
     if search.shortens and search.has_safe():
         shorten_best(search)
@@ -168,11 +183,11 @@ def search_other_sides(search: Search) -> None:
     if not search.has_safe() or search.length_ratio() > 1.0 + LONG_WAY:
         tried += _try_grids(search, FINER_GRIDS) + _try_ceiling(search)
     if not search.has_safe():
-        _try_closely(search, tried)
+        _try_narrow_margins(search, tried)
 
 
 def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> list[Floats]:
-    """Shorten routes on other sides that these grids propose; returns the routes as paths (w, 3)."""
+    """Shorten the routes on other sides that these grids propose, and return the routes as paths (w, 3)."""
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     frame, straight = rotated_frame(space.start, space.destination), math.dist(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
@@ -189,7 +204,7 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
 
 
 def _try_ceiling(search: Search) -> list[Floats]:
-    """Shorten routes at the height of the ceiling, one for each step and depth; returns them as paths (w, 3)."""
+    """Shorten routes at the altitude of the ceiling, one for each step and depth, and return them as paths (w, 3)."""
     data, space = search.problem.search, search.problem.space
     frame = rotated_frame(space.start, space.destination)
     tried: list[Floats] = []
@@ -206,8 +221,8 @@ def _try_ceiling(search: Search) -> list[Floats]:
     return tried
 
 
-def _try_closely(search: Search, paths: list[Floats]) -> None:
-    """Shorten paths (w, 3), none of which is safe with the usual margins, with narrow ones."""
+def _try_narrow_margins(search: Search, paths: list[Floats]) -> None:
+    """Shorten paths (w, 3), of which none is safe with the usual margins, with narrow margins."""
     usual = search.problem
     search.problem = with_narrow_margins(usual)
     try:
@@ -221,7 +236,7 @@ def _try_closely(search: Search, paths: list[Floats]) -> None:
 
 
 def shorten_best(search: Search) -> None:
-    """Shorten the archive's best path, then repeatedly the shortest from equidistant waypoints while it gains."""
+    """Shorten the archive's best path, then the shortest path from equidistant waypoints as long as that gains."""
     search.shorten(search.encoding.decode(search.archive.vectors[:1])[0])
     for _ in range(MAX_REPEATS):
         if search.shortest is None or search.must_end():
@@ -235,22 +250,28 @@ def shorten_best(search: Search) -> None:
 
 # --- Routes that turn back ---
 
-# If a safe path is longer than this many times the straight line, a path that turns back may be shorter.
+# Length of a safe path relative to the straight line above which a path that turns back may be shorter.
 LONG_DETOUR = 1.25
-# Lattice steps, as shares of the step that turns require, tried until a path is safe.
+# Lattice steps as fractions of the step that turns require, tried until a path is safe.
 STEPS = (1.0, 0.6)
-# A route is followed if shorter than this share of the best safe path.
+# Maximum length of a followed route as a fraction of the best safe path.
 MAX_ROUTE_SHARE = 0.99
-# Before shortening, a path along a route is improved by this many pattern searches, with evaluations of each, and
-# evaluations after each move of all waypoints; scales of these moves relative to those of fitting, and rounds.
-FIRST_SEARCHES, FIRST_SEARCH, LATER_SEARCH = 4, 500, 600
-MOVES, ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
-# Where no shortened path is certified, another is followed that was shortened with these additional margins, m.
+# Number of pattern searches that improve a path along a route before shortening.
+FIRST_SEARCHES = 4
+# Evaluations of each of these pattern searches.
+FIRST_SEARCH = 500
+# Evaluations of the pattern search after each move of all waypoints.
+LATER_SEARCH = 600
+# Scales of the moves of all waypoints relative to the moves of fitting.
+MOVES = (1.0, 0.5, 0.25, 0.12)
+# Rounds of each move.
+ROUNDS = 4
+# Additional margins, m, with which a path is shortened and followed if no shortened path is certified.
 FOLLOWED_MARGINS = (2.0, 5.0, 2.0)
 
 
 def may_turn_back(search: Search, certificate: Certificate) -> bool:
-    """Whether to search for a path that turns back: the straight frame has no safe path, or only a long one."""
+    """Return True if the straight frame has no safe path, or only a long one, so that a path may have to turn back."""
     if not search.algorithm.seeded or search.encoding.name != "rotated" or search.must_end():
         return False
     if not search.finished(certificate):
@@ -259,12 +280,15 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
 
 
 def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """The path (w, 3) along a route that may turn back and its certificate, if better than `found`; else `found`."""
+    """Search a path (w, 3) along a route that may turn back.
+
+    Return it with its certificate if better than `found`.
+    """
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
     lattices, left = [make_lattice(data, frame, share * step) for share in STEPS], MAX_EXPANDED
     for number, share in enumerate(STEPS):
-        # Where memory sets the step, a smaller one makes the same lattice again.
+        # If memory limits the step, a smaller step gives the same lattice again.
         if left <= 0 or search.must_end() or lattices[number] in lattices[:number]:
             break
         try:
@@ -286,7 +310,7 @@ def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tu
 
 
 def _follow_shortened(search: Search, found: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """The best path along what shortening makes of a path, if it is shorter: shortening alone broke a constraint."""
+    """Return the best path along the shortened form of a path, if shorter: shortening alone violates a constraint."""
     if not search.shortens:
         return found
     for extra_margin in FOLLOWED_MARGINS:
@@ -302,7 +326,7 @@ def _follow_shortened(search: Search, found: tuple[Floats, Certificate]) -> tupl
 
 
 def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate, bool]:
-    """The best path found in a frame along a route (k, 3), its certificate, and whether shortening has made it."""
+    """Return the best path in a frame along a route (k, 3), its certificate, and True if shortening has made it."""
     waypoints = search.encoding.waypoints
     pieces, _ = sample_route(route, waypoints - 1)
     encoding = route_encoding(search.problem.space, pieces[:, :2])
@@ -344,7 +368,7 @@ def _improve_along(inner: Search, vector: Floats, routes: tuple[Floats, ...]) ->
 
 
 def _candidate_points(route: Floats, encoding: Encoding) -> Floats:
-    """Candidate points (w - 2, k, 3) on a route (k, 3) for each waypoint in its frame, within its piece."""
+    """Return candidate points (w - 2, k, 3) on a route (k, 3) for each waypoint in its frame, within its piece."""
     count = encoding.waypoints - 2
     dense, _ = sample_route(route, count * (CLOSE_FIT.candidates + 1) + 1)
     rows = np.arange(count)[:, None] * (CLOSE_FIT.candidates + 1) + 1 + np.arange(CLOSE_FIT.candidates)

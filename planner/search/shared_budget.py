@@ -1,4 +1,4 @@
-"""Several searches for one plan, which share the evaluations that the scenario allows."""
+"""Share the evaluations that a scenario allows between several searches for one plan."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,24 +7,24 @@ from aircraft.path_limits import Limits
 from planner.plan import Plan
 from world.scenario import Scenario
 
-# Plans a scenario within limits.
+# A function that plans a scenario within limits.
 Search = Callable[[Scenario, Limits], Plan]
 
 
 class SharedBudget:
-    """A search that may be made again for the same plan, in another scenario or within other limits.
+    """Search that may be repeated for the same plan, in another scenario or within other limits.
 
-    Each search has what those before it left of the scenario's budget of evaluations. With less left than a population
-    none is made.
+    Each search has the rest of the scenario's budget of evaluations. If less than a population is left, no search is
+    made.
     """
 
     def __init__(self, search: Search) -> None:
-        """Begin with nothing spent."""
+        """Begin with no evaluations spent."""
         self._search, self._made = search, list[Plan]()
         self._ended = "completed"
 
     def __call__(self, scenario: Scenario, limits: Limits) -> Plan:
-        """The plan that a search finds, or, where the budget allows no other search, that of the last one."""
+        """Return the plan of a new search, or of the last search if the budget allows no other one."""
         table = scenario.planner
         if table.budget is None:
             return self._keep(self._search(scenario, limits))
@@ -36,9 +36,10 @@ class SharedBudget:
         return self._keep(replace(self._search(within, limits), scenario=scenario))
 
     def total(self, plan: Plan) -> Plan:
-        """The plan that was settled on, with the evaluations of all searches.
+        """Return the final plan with the evaluations of all searches.
 
-        A plan that is not safe has ended as the first search that did not complete: without its end another might be.
+        A plan that is not safe gets the end reason of the first search that did not complete, as a complete search
+        might have found a safe plan.
         """
         ended = plan.ended if plan.safe or plan.ended != "completed" else self._ended
         return replace(plan, evaluations=self._spent(), ended=ended)

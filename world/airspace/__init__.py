@@ -1,1 +1,1 @@
-"""Airspace: zones to keep out of or to stay in, from tables, files and fences, and distances to them."""
+"""Airspace zones to keep out of or to stay in, from tables, files and fences, and distances to them."""

@@ -1,4 +1,4 @@
-"""Zones of a GeoPackage (OGC 12-128r19): the polygons and points of its feature tables, with their columns."""
+"""Read the features of a GeoPackage (OGC 12-128r19): polygons and points of its tables, with their columns."""
 
 import sqlite3
 from collections.abc import Iterator
@@ -15,18 +15,19 @@ from shapely.errors import ShapelyError
 from world.errors import ScenarioError
 from world.frames import crs_transformer, transform_points
 
-# Bytes of the envelope by its code in the flags of a geometry's header (clause 2.1.3.1.1).
-_ENVELOPES = {0: 0, 1: 32, 2: 48, 3: 48, 4: 64}
-_DEGREES = 4326
+# Size of the envelope, bytes, by its code in the flags of a geometry's header (clause 2.1.3.1.1).
+_ENVELOPE_BYTES = {0: 0, 1: 32, 2: 48, 3: 48, 4: 64}
+# EPSG code of longitude and latitude on WGS84.
+_WGS84_CODE = 4326
 
 
 def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Where each feature stands, and the feature as GeoJSON has it: in longitude and latitude, with its columns.
+    """Yield for each feature its place in the file, and the feature as GeoJSON, in longitude and latitude.
 
-    Raises ScenarioError for a file that cannot be read as a GeoPackage, and for a geometry that is none.
+    Raises ScenarioError for a file that cannot be read as a GeoPackage, and for an invalid geometry.
     """
     try:
-        # Neither locked nor written to, whatever else has it open.
+        # Read-only and immutable: the file is neither locked nor written, even if another program has it open.
         uri = f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1"
         with closing(sqlite3.connect(uri, uri=True)) as database:
             tables = database.execute(
@@ -35,20 +36,20 @@ def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str
             ).fetchall()
             for table, column, system in tables:
                 quoted = '"' + str(table).replace('"', '""') + '"'
-                cursor = database.execute(f"select * from {quoted}")  # a name of the file's own, quoted
+                cursor = database.execute(f"select * from {quoted}")  # a table name from the file, quoted
                 names = [one[0] for one in cursor.description]
                 code = _code_of(database, system)
                 for number, row in enumerate(cursor, 1):
                     where = f"{table} row {number}"
                     columns = dict(zip(names, row, strict=True))
                     shape = _shape(columns.pop(column, None), code, f"{source}: {where}")
-                    yield where, {"type": "Feature", "properties": _plain(columns), "geometry": shape}
+                    yield where, {"type": "Feature", "properties": _plain_columns(columns), "geometry": shape}
     except sqlite3.Error as error:
         raise ScenarioError(f"{source}: cannot be read as a GeoPackage: {error}", file=source) from error
 
 
 def _code_of(database: sqlite3.Connection, system: int) -> str:
-    """The coordinate reference system of a table, as PROJ names it; "" for longitude and latitude on WGS84."""
+    """Return a table's coordinate reference system for PROJ; "" for longitude and latitude on WGS84."""
     found = database.execute(
         "select organization, organization_coordsys_id, definition from gpkg_spatial_ref_sys where srs_id = ?", [system]
     ).fetchone()
@@ -56,12 +57,12 @@ def _code_of(database: sqlite3.Connection, system: int) -> str:
         return ""
     organization, number, definition = found
     if str(organization).upper() == "EPSG":
-        return "" if number == _DEGREES else f"EPSG:{number}"
+        return "" if number == _WGS84_CODE else f"EPSG:{number}"
     return str(definition)
 
 
-def _plain(columns: dict[str, Any]) -> dict[str, Any]:
-    """Columns that a zone can state something with, by the names that the other formats have."""
+def _plain_columns(columns: dict[str, Any]) -> dict[str, Any]:
+    """Return the columns with text or numbers, and the zone's name under the key of the other formats."""
     kept = {key: value for key, value in columns.items() if isinstance(value, str | int | float)}
     name = next((value for key, value in kept.items() if key.lower() in ("name", "identifier", "title")), None)
     return kept if name is None else kept | {"name": str(name)}
@@ -73,7 +74,7 @@ def _shape(blob: Any, code: str, source: str) -> dict[str, Any]:
         if blob[:2] != b"GP":
             raise ValueError
         flags = blob[3]
-        shape = shapely.from_wkb(blob[8 + _ENVELOPES[(flags >> 1) & 7] :])
+        shape = shapely.from_wkb(blob[8 + _ENVELOPE_BYTES[(flags >> 1) & 7] :])
     except (KeyError, IndexError, TypeError, ValueError, ShapelyError) as error:
         raise ScenarioError(f"{source}: geometry: {allowed}", file=source, field="geometry") from error
     if code:
@@ -84,11 +85,11 @@ def _shape(blob: Any, code: str, source: str) -> dict[str, Any]:
         to_degrees = partial(transformer.transform, direction="INVERSE")
         shape = shapely.transform(shape, lambda xy: np.column_stack(transform_points(to_degrees, xy[:, 0], xy[:, 1])))
     found: dict[str, Any] = shapely.geometry.mapping(shape)
-    return _listed(found)
+    return _with_lists(found)
 
 
-def _listed(found: dict[str, Any]) -> dict[str, Any]:
-    """A mapping of shapely's with lists in the place of tuples, as JSON has them."""
+def _with_lists(found: dict[str, Any]) -> dict[str, Any]:
+    """Replace the tuples in a mapping of shapely by lists, as in JSON."""
 
     def lists(value: Any) -> Any:
         return [lists(one) for one in value] if isinstance(value, tuple | list) else value

@@ -1,8 +1,8 @@
-"""Zones of an OpenAir file: one command a line, with classes, limits, polygons, arcs, circles and airways.
+"""Read zones of an OpenAir file: one command a line, with classes, limits, polygons, arcs, circles and airways.
 
 The commands are those of WinPilot's original and of Naviter's version 2 (https://github.com/naviter/seeyou_file_formats):
 AC begins an airspace, AN names it, AY is its type, AL and AH are its limits, AA its times; DP, DA, DB, DC and DY draw
-it, with what V sets.
+it, with the variables that V sets.
 """
 
 import math
@@ -17,11 +17,13 @@ from world.airspace.zones import band_outline
 from world.errors import ScenarioError
 from world.frames import GeoOrigin, to_geo, to_map
 
+# m.
 NAUTICAL_MILE = 1852.0
-# m.  A chord of an arc leaves it by this at most.
+# Largest distance between an arc and its chords, m.
 ARC_BEND = 1.0
-# Airspace that anybody may fly in without a clearance: classes, and types that ask for nothing either.
+# Classes of airspace that require no clearance.
 _FREE_CLASSES = ("E", "F", "G", "UNC", "W", "GSEC", "FIR", "UIR", "FIS")
+# Types of airspace that require no clearance either.
 _FREE_TYPES = ("", "NONE", "FIR", "UIR", "FIS", "GSEC", "ACCSEC", "TRZ", "VFRSEC", "VFRR")
 
 _Place = tuple[float, float]
@@ -33,7 +35,7 @@ _ABOVE_GROUND = ("AGL", "AAGL", "ASFC", "GND", "SFC")
 
 @dataclass(slots=True)
 class _Block:
-    """An airspace as it is read: what its lines have said so far."""
+    """Airspace that is being read: the contents of its lines up to the current one."""
 
     line: int
     airspace_class: str
@@ -50,7 +52,7 @@ class _Block:
 
 
 def is_openair(text: str) -> bool:
-    r"""Whether a text's first command is the one that begins an airspace, or a name that stands before one by mistake.
+    r"""Return True if a text's first command begins an airspace, or is a name written before AC by mistake.
 
     >>> is_openair("* Slovenia\nAC D\nAN CTR"), is_openair("QGC WPL 110")
     (True, False)
@@ -60,10 +62,10 @@ def is_openair(text: str) -> bool:
 
 
 def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] | str]]:
-    r"""Where each zone stands in a file, and its entries as a [[zones]] table has them, or why it keeps nobody out.
+    r"""Yield for each zone its place in the file and its [[zones]] entries, or the reason why it restricts no flight.
 
-    All airspace is kept out of but that of classes E, F, G and unclassified without a type that asks for more.  An arc
-    is drawn by chords that leave it by `ARC_BEND` at most.  Raises ScenarioError for a line that cannot be read.
+    Every airspace is an exclusion, except classes E, F, G and unclassified without a type that requires more.  An arc
+    is drawn with chords within `ARC_BEND` of it.  Raises ScenarioError for a line that cannot be read.
 
     >>> text = "AC D\nAN CTR\nAL GND\nAH 2500ft AMSL\nV X=46:00:00N 014:00:00E\nDC 5"
     >>> [(where, entries["radius_m"], entries["ceiling_amsl_m"]) for where, entries in openair_zones(text, "a file")]
@@ -96,9 +98,9 @@ def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] 
 
 
 def _command(line: str) -> str:
-    """A line without its comment.  V may stand before its variable without a space.
+    """Return a line without its comment, and with a space between V and its variable.
 
-    In what draws, as in some countries' files, a semicolon begins a comment, too; a name may hold one.
+    In drawing commands a semicolon also begins a comment, as in some countries' files; a name may contain one.
     """
     line = line.partition("*")[0].strip()
     if line[:1].upper() in ("D", "V"):
@@ -130,7 +132,7 @@ def _finished(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
 
 
 def _airway_rings(block: _Block, source: str) -> list[list[_Place]]:
-    """The outline of an airway: its segments, half of its width to either side and beyond its ends."""
+    """Return the outline of an airway: its segments, widened by half its width to both sides and beyond its ends."""
     if len(block.airway) < 2 or not block.width > 0.0:
         raise ScenarioError(f"{source}: DY: an airway has at least two points, and a width before (V W=)", file=source)
     origin = GeoOrigin(*block.airway[0])
@@ -141,7 +143,7 @@ def _airway_rings(block: _Block, source: str) -> list[list[_Place]]:
 
 
 # ----------------------------------------------------------------------
-# Commands: what each of them adds to its airspace.  Raise ValueError with what is allowed.
+# Commands.  Each adds its contents to the airspace, and raises ValueError with the allowed values.
 
 
 def _times(block: _Block, text: str) -> None:
@@ -164,7 +166,7 @@ def _limit(key: str) -> Callable[[_Block, str], None]:
 
 
 def _altitude(text: str, key: str) -> dict[str, Any] | None:
-    """A limit as openAIP states it; None for one that bounds nothing."""
+    """Return a limit in openAIP's form, or None if unlimited."""
     if text.upper() in ("GND", "SFC", "SURFACE", "0") and key == "lowerLimit":
         return None
     if text.upper() in ("UNL", "UNLIM", "UNLTD", "UNLIMITED") and key == "upperLimit":
@@ -215,7 +217,7 @@ def _arc_by_points(block: _Block, text: str) -> None:
         raise ValueError("two points are expected: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
     centre = _centre(block)
     (first, near), (last, far) = (_polar(centre, place) for place in found)
-    # Ends as they are stated, whatever the centre.
+    # The end points are kept as stated, even if they do not agree with the centre.
     arc = _arc(centre, (near, far), first, last, block.clockwise)
     block.corners += [found[0], *arc[1:-1], found[1]]
 
@@ -261,7 +263,7 @@ def _number(text: str) -> float:
 
 
 def _place(text: str) -> _Place:
-    """Latitude and longitude, degrees."""
+    """Parse a latitude and longitude, degrees."""
     found = _COORDINATE.fullmatch(text.strip())
     if found is None:
         raise ValueError("a place is expected: 45:40:30N 014:18:20E, or 45:40.500N 014:18.333E")
@@ -287,20 +289,23 @@ def _centre(block: _Block) -> _Place:
 
 
 def _polar(centre: _Place, place: _Place) -> tuple[float, float]:
-    """Bearing, degrees, and distance, m, of a place from a centre."""
+    """Return the bearing, degrees, and distance, m, of a place from a centre."""
     east, north = to_map(GeoOrigin(*centre), *place)
     return math.degrees(math.atan2(east, north)), math.hypot(east, north)
 
 
 def _arc(centre: _Place, radii: Sequence[float], first: float, last: float, clockwise: bool) -> list[_Place]:
-    """Places along an arc, its ends included; its radius goes from the first to the second, m."""
+    """Return places along an arc, including its ends.
+
+    The radius changes linearly from the first to the second, m.
+    """
     turn = (last - first) % 360.0 if clockwise else -((first - last) % 360.0)
     turn = turn or (360.0 if clockwise else -360.0)
     largest = max(*radii, ARC_BEND)
     piece = math.degrees(2.0 * math.acos(1.0 - min(0.3, ARC_BEND / largest)))
     count = max(1, math.ceil(abs(turn) / piece))
     shares = [k / count for k in range(count + 1)]
-    # Distances and bearings from its centre are those of a map about it.
+    # Distances and bearings from the centre are measured on a map with its origin there.
     turned = [math.radians(first + share * turn) for share in shares]
     away = [radii[0] + share * (radii[1] - radii[0]) for share in shares]
     east = [far * math.sin(angle) for far, angle in zip(away, turned, strict=True)]

@@ -1,9 +1,9 @@
-"""UAS geographical zones as Europe's authorities publish them: the JSON of EUROCAE ED-269, and ED-318's GeoJSON.
+"""Read UAS geographical zones as published by European authorities: EUROCAE ED-269 JSON and ED-318 GeoJSON.
 
 ED-269: features with a list of volumes, each a polygon or a circle between two limits.  ED-318: GeoJSON features whose
 geometries have a `layer`, and points an `extent`; its schema is public (https://github.com/UASGeoZones/ED-318).  Spain
-(ENAIRE) has what ED-318 says of a zone in tables of its own, `UASZone` and `verticalLayer`, or the layer and the times
-among the properties.  Of any, a zone without a restriction keeps nobody out.
+(ENAIRE) moves ED-318 entries of a zone to its own tables, `UASZone` and `verticalLayer`, or writes the layer and the
+times among the properties.  In both formats a zone without a restriction is open to all and is skipped.
 """
 
 import math
@@ -15,21 +15,23 @@ from world.airspace.zone_entries import published_entries
 from world.airspace.zone_times import WEEKDAYS, Period, parse_time
 from world.errors import ScenarioError
 
-# m, ft.  Swiss and other files write an upper limit that there is not so.
-_UNLIMITED = 99_999.0
+# An upper limit from this value on (m or ft) means no upper limit, as Swiss and other files write it.
+_UNLIMITED_VALUE = 99_999.0
 _UNITS = {"M": "M", "FT": "FT"}
 _DATUMS = ("AGL", "AMSL", "WGS84", "SFC")
-_FREE = "NO_RESTRICTION"
-# What says when a zone applies, where Spain has it among the properties.
-_PERIOD = ("startDateTime", "endDateTime", "day", "startTime", "endTime", "startEvent", "endEvent")
-# A date without an offset from UTC may be of any zone of time.
-_EARLIEST, _LATEST = timedelta(hours=-14), timedelta(hours=12)
+_NO_RESTRICTION = "NO_RESTRICTION"
+# Keys of a zone's times that Spain writes among the properties.
+_PERIOD_KEYS = ("startDateTime", "endDateTime", "day", "startTime", "endTime", "startEvent", "endEvent")
+# Shift from local time to UTC in the easternmost time zone, for a start date without an offset.
+_EARLIEST_UTC_SHIFT = timedelta(hours=-14)
+# Shift from local time to UTC in the westernmost time zone, for an end date without an offset.
+_LATEST_UTC_SHIFT = timedelta(hours=12)
 
-_Found = tuple[str, dict[str, Any] | str]
+_FoundZone = tuple[str, dict[str, Any] | str]
 
 
 def is_ed269(data: Mapping[str, Any]) -> bool:
-    """Whether JSON data is of ED-269: its features have a list of volumes.
+    """Return True if JSON data is ED-269: its features have a list of volumes.
 
     >>> is_ed269({"features": [{"geometry": [{"horizontalProjection": {}}]}]}), is_ed269({"features": []})
     (True, False)
@@ -40,25 +42,25 @@ def is_ed269(data: Mapping[str, Any]) -> bool:
 
 
 def is_ed318(feature: Any) -> bool:
-    """Whether a GeoJSON feature is of ED-318: it has a variant and a type of restriction.
+    """Return True if a GeoJSON feature is ED-318: it has a variant and a type of restriction.
 
     >>> is_ed318({"properties": {"type": "PROHIBITED", "variant": "COMMON"}}), is_ed318({"properties": None})
     (True, False)
     """
     properties = feature.get("properties") if isinstance(feature, dict) else None
-    return isinstance(properties, dict) and {"type", "variant"} <= _stated(properties).keys()
+    return isinstance(properties, dict) and {"type", "variant"} <= _zone_properties(properties).keys()
 
 
-def _stated(properties: Mapping[str, Any]) -> Mapping[str, Any]:
-    """What properties say of a zone, in a table of its own or not."""
+def _zone_properties(properties: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the properties of a zone, merged with its own table `UASZone` if it has one."""
     zone = properties.get("UASZone")
     return {**properties, **zone} if isinstance(zone, dict) else properties
 
 
-def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_Found]:
-    """Where each volume stands in a file, and its entries as a [[zones]] table has them, or why it keeps nobody out.
+def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
+    """Yield for each volume its place in the file and its [[zones]] entries, or the reason why it restricts no flight.
 
-    Raises ScenarioError for a volume that is none.
+    Raises ScenarioError for an invalid volume.
     """
     key = "features" if "features" in data else "UASZoneList"
     for k, feature in enumerate(_features(data)):
@@ -68,7 +70,7 @@ def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_Found]:
             raise _refused(source, where, "geometry", "a list of volumes is expected")
         name = _name(feature.get("name")) or _name(feature.get("identifier")) or f"zone {k + 1}"
         where += f" ({name})"
-        if (restriction := _word(feature.get("restriction"))) == _FREE:
+        if (restriction := _word(feature.get("restriction"))) == _NO_RESTRICTION:
             yield where, restriction
             continue
         stated = {"times": times} if (times := _times(feature.get("applicability"), f"{source}: {where}")) else {}
@@ -99,19 +101,19 @@ def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
     raise _refused(source, "", "horizontalProjection.type", "allowed Polygon, Circle")
 
 
-def ed318_zones(feature: Mapping[str, Any], where: str, number: int, source: str) -> Iterator[_Found]:
-    """Entries of each layer of an ED-318 feature, as `ed269_zones` gives those of volumes.
+def ed318_zones(feature: Mapping[str, Any], where: str, number: int, source: str) -> Iterator[_FoundZone]:
+    """Yield the entries of each layer of an ED-318 feature, in the form of `ed269_zones`.
 
-    where: names the feature in the file.  number: counts it from 0.
+    where: place of the feature in the file, for messages.  number: index of the feature, from 0.
     """
-    properties = _stated(feature["properties"])
+    properties = _zone_properties(feature["properties"])
     name = _name(properties.get("name")) or _name(properties.get("identifier")) or f"zone {number + 1}"
     where = f"{where} ({name})"
-    if (restriction := _word(properties["type"])) == _FREE:
+    if (restriction := _word(properties["type"])) == _NO_RESTRICTION:
         yield where, restriction
         return
     applicability = properties.get("limitedApplicability")
-    if applicability is None and any(properties.get(key) for key in _PERIOD):
+    if applicability is None and any(properties.get(key) for key in _PERIOD_KEYS):
         applicability = [{**properties, "schedule": [properties]}]
     times = _times(applicability, f"{source}: {where}")
     stated = {"times": times} if times else {}
@@ -124,7 +126,7 @@ def ed318_zones(feature: Mapping[str, Any], where: str, number: int, source: str
 
 
 def _geometries(geometry: Any) -> Iterator[Any]:
-    """A geometry, or those of a collection."""
+    """Yield a geometry, or the geometries of a collection."""
     inner = geometry.get("geometries") if isinstance(geometry, dict) else None
     if isinstance(inner, list):
         for one in inner:
@@ -133,11 +135,14 @@ def _geometries(geometry: Any) -> Iterator[Any]:
         yield geometry
 
 
-def _ed318_layer(geometry: Any, beside: Mapping[str, Any], source: str) -> Iterator[dict[str, Any]]:
-    """Entries of each part of a geometry between its layer's limits, or those that stand beside it."""
+def _ed318_layer(geometry: Any, default_layer: Mapping[str, Any], source: str) -> Iterator[dict[str, Any]]:
+    """Yield the entries of each part of a geometry.
+
+    default_layer: table with the vertical limits of a geometry that has no layer of its own.
+    """
     geometry = geometry if isinstance(geometry, dict) else {}
     layer = geometry.get("layer")
-    layer = layer if isinstance(layer, dict) else beside
+    layer = layer if isinstance(layer, dict) else default_layer
     unit = layer.get("uom") or layer.get("UOM") or "m"
     limits = {
         f"{side}Limit": _limit(layer.get(side), unit, layer.get(f"{side}Reference"), side, source)
@@ -161,21 +166,21 @@ def _ed318_layer(geometry: Any, beside: Mapping[str, Any], source: str) -> Itera
 
 
 # ----------------------------------------------------------------------
-# What both have: limits, shapes, names and times of activity.
+# Parts that both formats share: limits, shapes, names and times of activity.
 
 
 def _limit(value: Any, unit: Any, datum: Any, side: str, source: str) -> dict[str, Any] | None:
-    """A limit as openAIP states it; None where there is none."""
+    """Return a limit in openAIP's form, or None if unlimited."""
     if value is None or value == "":
         return None
     try:
         height = float(value)
     except (TypeError, ValueError, OverflowError):
         height = math.nan
-    # A limit of infinity is one that there is not.
+    # An infinite upper limit means no limit.
     if not height > -math.inf:
         raise _refused(source, "", f"{side} limit", "a number is expected")
-    if side == "upper" and height >= _UNLIMITED:
+    if side == "upper" and height >= _UNLIMITED_VALUE:
         return None
     if _word(unit) not in _UNITS:
         raise _refused(source, "", "unit of its limits", f"allowed {', '.join(_UNITS)}")
@@ -185,7 +190,7 @@ def _limit(value: Any, unit: Any, datum: Any, side: str, source: str) -> dict[st
 
 
 def _rings(coordinates: Any, source: str) -> list[list[list[float]]]:
-    """Rings of [latitude, longitude] of a polygon's coordinates."""
+    """Convert a polygon's coordinates to rings of [latitude, longitude]."""
     try:
         rings = [[[float(corner[1]), float(corner[0])] for corner in ring] for ring in coordinates]
     except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
@@ -203,7 +208,7 @@ def _circle(centre: Any, radius: Any, source: str) -> dict[str, float]:
 
 
 def _name(value: Any) -> str:
-    """A name in one line: a text, or the first of several in English, or the first of all."""
+    """Return a name in one line: the text, or of several texts the first English one, or else the first."""
     if isinstance(value, list):
         texts = [one for one in value if isinstance(one, dict) and isinstance(one.get("text"), str)]
         english = [one for one in texts if str(one.get("lang")).startswith("en")]
@@ -218,7 +223,7 @@ def _word(value: Any) -> str:
 
 
 def _times(applicability: Any, source: str) -> list[str]:
-    """The periods in which a zone applies, as a [[zones]] table has them; none for one that always does."""
+    """Return the periods in which a zone applies, in the form of a [[zones]] table; empty for always."""
     if applicability is None:
         return []
     if not isinstance(applicability, list) or not all(isinstance(one, dict) for one in applicability):
@@ -226,8 +231,8 @@ def _times(applicability: Any, source: str) -> list[str]:
     periods: list[Period] = []
     for one in applicability:
         try:
-            start = _moment(one.get("startDateTime"), _EARLIEST)
-            end = _moment(one.get("endDateTime"), _LATEST)
+            start = _moment(one.get("startDateTime"), _EARLIEST_UTC_SHIFT)
+            end = _moment(one.get("endDateTime"), _LATEST_UTC_SHIFT)
             if _word(one.get("permanent")) == "YES":
                 start = end = None
             schedule = one.get("schedule") or one.get("dailyPeriod") or [{}]
@@ -241,7 +246,7 @@ def _times(applicability: Any, source: str) -> list[str]:
 
 
 def _moment(value: Any, unknown: timedelta) -> datetime | None:
-    """A date and time, UTC; one without an offset moved by what its offset can be at most."""
+    """Return a date and time in UTC; add `unknown`, the extreme offset, to a time that states no offset."""
     if value is None or value == "":
         return None
     found = datetime.fromisoformat(value)
@@ -249,14 +254,17 @@ def _moment(value: Any, unknown: timedelta) -> datetime | None:
 
 
 def _daily(start: datetime | None, end: datetime | None, daily: Mapping[str, Any]) -> Period:
-    """A part of a schedule.  Hours by the sun, and those without an offset from UTC, are the whole day."""
+    """Convert one entry of a schedule.
+
+    Sunrise and sunset, and hours without a UTC offset, give the whole day.
+    """
     stated_days = daily.get("day") or []
     named = [_word(day) for day in ([stated_days] if isinstance(stated_days, str) else stated_days)]
     days = frozenset() if "ANY" in named else frozenset(WEEKDAYS.index(day) for day in named)
     stated = [daily.get(key) for key in ("startTime", "endTime")]
     first, last = _minutes(stated[0]), _minutes(stated[1], up=True)
     if first is None or last is None:
-        # A day of another zone of time reaches into the days beside it.
+        # A day in another time zone overlaps the previous and the next day in UTC.
         steps = (-1, 0, 1) if any(stated) else (0,)
         return Period(start, end, frozenset((day + step) % 7 for day in days for step in steps))
     shift, first = divmod(first, 24 * 60)
@@ -267,9 +275,9 @@ def _daily(start: datetime | None, end: datetime | None, daily: Mapping[str, Any
 
 
 def _minutes(value: Any, *, up: bool = False) -> int | None:
-    """Minutes of the day in UTC, of the day that the time names: below 0 on the day before it; None if not known.
+    """Return the UTC minute of the named day, negative on the day before it, or None if unknown.
 
-    up: count a part of a minute as one.
+    up: round a part of a minute up.
     """
     if value is None or value == "":
         return None

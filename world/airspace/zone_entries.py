@@ -1,4 +1,4 @@
-"""What files of zones say beside their shapes: kind, floor and ceiling, as entries of a [[zones]] table."""
+"""Convert the kind, floor and ceiling of a zone in a file to entries of a [[zones]] table."""
 
 import math
 from collections.abc import Mapping
@@ -6,18 +6,19 @@ from typing import Any
 
 from world.errors import ScenarioError
 
-# An entry that is none of a table: the zone is of a file that its reader cannot correct, an authority's, so that an
-# outline that crosses itself is taken as the area it encloses.
+# Three marks among the entries of a zone that are not keys of a [[zones]] table.
+# The zone is from an authority's file, which the user cannot correct: a self-crossing outline is taken as the area it
+# encloses.
 PUBLISHED = "published"
-# Another: its limits stand the wrong way round in the file.
+# The lower and upper limits are swapped in the file.
 UPSIDE_DOWN = "upside_down"
-# And another: its upper limit leaves no height to keep out of, and is not taken.
+# The upper limit leaves an empty vertical band and is ignored.
 NO_BAND = "no_band"
-# Keys that mean what they mean in a scenario file.
-_OWN = ("kind", "floor_amsl_m", "floor_agl_m", "ceiling_amsl_m", "ceiling_agl_m", "radius_m")
-# A property that begins so and is none of ours, nor another's that is read, may be one of ours misspelt.
-_LIKE_OURS = ("floor", "ceiling", "radius")
-# openAIP's limits: the API's keys and numbers, and the keys and names of its converters from OpenAir and AIXM.
+# Keys with the same meaning as in a scenario file.
+_SCENARIO_KEYS = ("kind", "floor_amsl_m", "floor_agl_m", "ceiling_amsl_m", "ceiling_agl_m", "radius_m")
+# An unknown property with one of these prefixes is probably a misspelt key of a scenario file.
+_SCENARIO_KEY_PREFIXES = ("floor", "ceiling", "radius")
+# Limits in openAIP's form: keys and codes of the API, and keys and names of its converters from OpenAir and AIXM.
 # https://docs.openaip.net, and the results in https://github.com/openAIP/openaip-openair-parser
 _LIMITS = {"lowerLimit": "floor", "lowerCeiling": "floor", "upperLimit": "ceiling", "upperCeiling": "ceiling"}
 _UNITS = {0: 1.0, "M": 1.0, 1: 0.3048, "FT": 0.3048, 6: 30.48, "FL": 30.48}
@@ -25,31 +26,34 @@ _DATUMS = {
     0: "agl", "GND": "agl", "AGL": "agl", "SFC": "agl", 1: "amsl", "MSL": "amsl", 2: "standard", "STD": "standard",
     "AMSL": "amsl", "WGS84": "ellipsoid",
 }  # fmt: skip
-# m.  A flight level is a pressure, not a height: between a low of 965 hPa and a high of 1,060 at the sea it lies up to
-# this far below or above where it is at 1,013.25 hPa (27 ft per hPa, ICAO Doc 7488).
+# Largest difference between a flight level (a pressure altitude) and its altitude at 1,013.25 hPa, m, for sea-level
+# pressures of 965 to 1,060 hPa (27 ft per hPa, ICAO Doc 7488).
 FLIGHT_LEVEL_ERROR = 400.0
-# m.  Mean sea level lies between 107 m below and 86 m above the ellipsoid of WGS84 (EGM2008): what is so high above the
-# ellipsoid is at most 86 m lower, and 107 m higher, above the sea.
-GEOID_HIGHEST, GEOID_LOWEST = 86.0, -107.0
-# What is no height above mean sea level, in words, and by how much one of them can lie below or above it, m.
-_LOOSE = {
+# Highest mean sea level above the WGS84 ellipsoid (EGM2008), m.
+GEOID_HIGHEST = 86.0
+# Lowest mean sea level, relative to the WGS84 ellipsoid (EGM2008), m.
+GEOID_LOWEST = -107.0
+# Datums other than mean sea level: name in messages, and the largest distance below and above the stated AMSL value, m.
+_INEXACT_DATUMS = {
     "standard": ("a flight level", FLIGHT_LEVEL_ERROR, FLIGHT_LEVEL_ERROR),
     "ellipsoid": ("a height above the ellipsoid", GEOID_HIGHEST, -GEOID_LOWEST),
 }
-# m.  Heights that a table takes: no flight is beyond them.
-_LOWEST, _HIGHEST = -500.0, 9000.0
+# Lowest altitude of a [[zones]] table, m AMSL, below every flight.
+_LOWEST_AMSL_M = -500.0
+# Highest altitude of a [[zones]] table, m AMSL, above every flight.
+_HIGHEST_AMSL_M = 9000.0
 # The FAA's limits in its open data (Class Airspace, Special Use Airspace): LOWER_VAL, LOWER_UOM, LOWER_CODE, and UPPER.
-_FAA = {"LOWER": "lowerLimit", "UPPER": "upperLimit"}
-# A value that is not applicable there.
-_FAA_NONE = -9998.0
+_FAA_LIMIT_KEYS = {"LOWER": "lowerLimit", "UPPER": "upperLimit"}
+# FAA value for "not applicable".
+_FAA_NOT_APPLICABLE = -9998.0
 
 
 def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Entries of a [[zones]] table that a zone's properties state; an exclusion where no kind is stated.
+    """Convert a zone's properties to entries of a [[zones]] table; an exclusion if no kind is stated.
 
-    A flight level bounds an exclusion by the height that it is within `FLIGHT_LEVEL_ERROR` of, and a height above the
-    ellipsoid by those that it can be above the sea, on the safe side.  Raises ScenarioError for a limit that is none,
-    for either of them on an inclusion, and for a property that looks like one of ours and is not.
+    A flight level or a height above the ellipsoid bounds an exclusion with a margin on the safe side:
+    `FLIGHT_LEVEL_ERROR`, and the range of the geoid.  Raises ScenarioError for an invalid limit, for either of these
+    two on an inclusion, and for an unknown property that looks like a key of a scenario file.
 
     >>> zone_entries({"lowerLimit": {"value": 0, "unit": 1, "referenceDatum": 0}, "ceiling_agl_m": 90.0}, "a file")
     {'kind': 'exclusion', 'ceiling_agl_m': 90.0}
@@ -60,23 +64,23 @@ def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
             continue
         if key in _LIMITS:
             entries |= _limit(value, key, properties.get("kind"), source)
-        elif key in _OWN:
+        elif key in _SCENARIO_KEYS:
             entries[key] = value
-        elif key.lower().startswith(_LIKE_OURS):
-            raise ScenarioError.at(source, key, value, f"unknown; known are {', '.join(_OWN)}", shown="")
-    if entries.get("floor_amsl_m") == _HIGHEST:
-        # All of it is above every flight.
+        elif key.lower().startswith(_SCENARIO_KEY_PREFIXES):
+            raise ScenarioError.at(source, key, value, f"unknown; known are {', '.join(_SCENARIO_KEYS)}", shown="")
+    if entries.get("floor_amsl_m") == _HIGHEST_AMSL_M:
+        # The whole zone is above every flight.
         entries.pop("ceiling_amsl_m", None)
     return entries
 
 
 def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """As `zone_entries`, of limits that an authority states, marked `PUBLISHED`.
+    """Convert the limits of an authority's zone as `zone_entries` does, and mark the entries `PUBLISHED`.
 
-    In authorities' files some limits leave no height to keep out of.  A lower limit above the upper one (both above the
-    sea, or both above ground) is taken for the upper, and the other way round, and marked `UPSIDE_DOWN`.  An upper
-    limit of 0 or below may stand for none, or for the lower one: the zone is one of all heights.  An upper limit that
-    equals the lower one is not taken.  Zones of both kinds are marked `NO_BAND`.
+    Some limits in authorities' files leave an empty vertical band.  A lower limit above the upper limit (both AMSL, or
+    both above ground) is swapped with it, and the zone marked `UPSIDE_DOWN`.  An upper limit of 0 or below may mean no
+    limit or the lower limit: the zone extends to all heights.  An upper limit equal to the lower limit is ignored.
+    Zones of the last two kinds are marked `NO_BAND`.
 
     >>> high, low = ({"value": feet, "unit": "FT", "referenceDatum": "MSL"} for feet in (1000, 500))
     >>> published_entries({"lowerLimit": high, "upperLimit": low}, "a file")["ceiling_amsl_m"]
@@ -85,7 +89,7 @@ def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
     {'kind': 'exclusion', 'floor_amsl_m': 304.8, 'published': True, 'no_band': True}
     """
     lower, upper = limits.get("lowerLimit"), limits.get("upperLimit")
-    low, high = _compared(lower), _compared(upper)
+    low, high = _comparable_limit(lower), _comparable_limit(upper)
     if high is not None and (high[1] <= 0.0 or low == high):
         entries = zone_entries({**limits, "upperLimit": None}, source)
         if high[1] <= 0.0:
@@ -97,8 +101,8 @@ def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
     return {**zone_entries(turned, source), PUBLISHED: True, UPSIDE_DOWN: True}
 
 
-def _compared(limit: Any) -> tuple[bool, float] | None:
-    """Whether a limit counts from the ground, and its height, m; None where `_limit` refuses it, or there is none."""
+def _comparable_limit(limit: Any) -> tuple[bool, float] | None:
+    """Return True if a limit is above ground, with its height, m; None if there is no valid limit."""
     if not isinstance(limit, dict):
         return None
     try:
@@ -108,30 +112,30 @@ def _compared(limit: Any) -> tuple[bool, float] | None:
 
 
 def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Limits as the FAA writes them, as openAIP's."""
+    """Convert limits in the FAA's form to openAIP's form."""
     found = {}
-    for side, key in _FAA.items():
+    for side, key in _FAA_LIMIT_KEYS.items():
         if (value := properties.get(f"{side}_VAL")) is None:
             continue
         try:
             height = float(value)
         except (TypeError, ValueError) as error:
             raise ScenarioError.at(source, f"{side}_VAL", value, "a number is expected", shown="") from error
-        if height != _FAA_NONE:
+        if height != _FAA_NOT_APPLICABLE:
             unit, datum = properties.get(f"{side}_UOM"), properties.get(f"{side}_CODE")
             found[key] = {"value": height, "unit": unit, "referenceDatum": datum}
     return found
 
 
 def _limit(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
-    """The entry that one of openAIP's limits comes to; none for the ground as a floor."""
+    """Convert a limit in openAIP's form to a table entry; empty for the ground as a floor."""
     if not isinstance(value, dict):
         allowed = "a table of value, unit and referenceDatum is expected"
         raise ScenarioError.at(source, key, value, allowed, shown="")
     height, unit, datum = value.get("value"), value.get("unit"), value.get("referenceDatum")
     if isinstance(height, bool) or not isinstance(height, int | float) or not math.isfinite(height):
         raise ScenarioError.at(source, f"{key}.value", height, "a number is expected", shown="")
-    # A list, say, is not even looked for.
+    # A list, for example, is not hashable and cannot be looked up.
     if not isinstance(unit, int | str) or unit not in _UNITS:
         allowed = f"allowed {', '.join(map(str, _UNITS))}"
         raise ScenarioError.at(source, f"{key}.unit", unit, allowed, shown="")
@@ -145,10 +149,10 @@ def _limit(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
         raise ScenarioError.at(source, key, value, "above 0 is expected: nothing lies below the ground", shown="")
     if _UNITS[unit] == _UNITS["FL"]:
         counted = "standard"
-    if counted in _LOOSE:
-        words, below, above = _LOOSE[counted]
+    if counted in _INEXACT_DATUMS:
+        words, below, above = _INEXACT_DATUMS[counted]
         if kind == "inclusion":
             allowed = f"{words} bounds no inclusion; give a height in metres above mean sea level"
             raise ScenarioError.at(source, key, value, allowed, shown="")
         counted, metres = "amsl", metres + (above if side == "ceiling" else -below)
-    return {f"{side}_{counted}_m": min(_HIGHEST, max(_LOWEST, metres))}
+    return {f"{side}_{counted}_m": min(_HIGHEST_AMSL_M, max(_LOWEST_AMSL_M, metres))}

@@ -1,4 +1,4 @@
-"""Files of zones: read by their suffixes into the [[zones]] tables that a scenario file would have them in."""
+"""Read files of zones, in the format of their suffix, into [[zones]] tables of a scenario file."""
 
 import json
 import math
@@ -22,17 +22,17 @@ from world.scenario_tables import MAX_ZONES, ZoneTable
 # ----------------------------------------------------------------------
 # Zones of a GeoJSON file (RFC 7946): polygons, multipolygons with their holes, and points with a radius.
 
-# Names of the CRS that the older GeoJSON of 2008 may state and that means longitude and latitude on WGS84.
-_DEGREES = ("CRS84", "4326")
-# Of a zone: where it stands in its file, and its entries as a [[zones]] table has them, or why it keeps nobody out.
+# Endings of the CRS names in GeoJSON of 2008 that mean longitude and latitude on WGS84.
+_WGS84_CRS_SUFFIXES = ("CRS84", "4326")
+# Place of a zone in its file, and its [[zones]] entries, or the reason why it restricts no flight.
 Found = tuple[str, dict[str, Any] | str]
 
 
 def geojson_zones(text: str, source: str) -> Iterator[Found]:
-    """The zones of a file of GeoJSON, of which ED-318 is a kind, or of the JSON of ED-269.
+    """Yield the zones of a GeoJSON file, which includes ED-318, or of ED-269 JSON.
 
-    A multipolygon is one zone of several parts.  Raises ScenarioError for what is neither, and for a geometry that is
-    no zone.
+    A multipolygon is one zone of several parts.  Raises ScenarioError for any other text, and for a geometry that is
+    not a zone.
 
     >>> square = '{"type": "Polygon", "coordinates": [[[8, 46], [8.01, 46], [8.01, 46.01], [8, 46]]]}'
     >>> [(where, entries["name"], len(entries["rings_deg"][0])) for where, entries in geojson_zones(square, "a file")]
@@ -70,13 +70,13 @@ def _no_number(name: str) -> float:
 
 
 def _check_crs(data: dict[str, Any], source: str) -> None:
-    """Raise ScenarioError for coordinates of another kind than longitude and latitude."""
+    """Raise ScenarioError unless the coordinates are longitude and latitude."""
     crs = data.get("crs")
     if crs is None:
         return
     properties = crs.get("properties") if isinstance(crs, dict) else None
     name = properties.get("name") if isinstance(properties, dict) else None
-    if not (isinstance(name, str) and name.endswith(_DEGREES)):
+    if not (isinstance(name, str) and name.endswith(_WGS84_CRS_SUFFIXES)):
         raise ScenarioError(
             f"{source}: crs: coordinates are longitude and latitude on WGS84 (RFC 7946)", file=source, field="crs"
         )
@@ -89,7 +89,7 @@ def _geojson_zone(feature: Any, where: str, number: int, source: str) -> tuple[s
     properties = properties if isinstance(properties, dict) else {}
     name = properties.get("name") or f"zone {number + 1}"
     if isinstance(name, str):
-        # Latvia's file has a tab before one.
+        # Latvia's file has a tab before a name.
         name = " ".join(name.split())
     label = f"{where} ({name})" if isinstance(name, str) and name.isprintable() else where
     geometry = geometry if isinstance(geometry, dict) else {}
@@ -122,12 +122,12 @@ def _geojson_zone(feature: Any, where: str, number: int, source: str) -> tuple[s
 
 
 def _rings(coordinates: Any) -> list[list[tuple[float, float]]]:
-    """Rings of (latitude, longitude) of a polygon's coordinates."""
+    """Convert a polygon's coordinates to rings of (latitude, longitude)."""
     return [[_corner(corner) for corner in ring] for ring in coordinates]
 
 
 def _corner(coordinates: Any) -> tuple[float, float]:
-    """Latitude and longitude of a position, whose height, if it has one, says nothing of a zone."""
+    """Return latitude and longitude of a position; its height, if any, is ignored."""
     if not isinstance(coordinates, list) or not all(type(value) in (int, float) for value in coordinates):
         raise TypeError("no position")
     lon, lat = coordinates[0], coordinates[1]
@@ -137,19 +137,19 @@ def _corner(coordinates: Any) -> tuple[float, float]:
 # ----------------------------------------------------------------------
 # Zones of a KML file (OGC 07-147r2): placemarks with polygons, and with a point and a radius.
 
-# The names of KML 2.0 to 2.2 stand in several namespaces, which nothing of ours needs to tell apart.
+# KML 2.0 to 2.2 use several namespaces, which need not be distinguished here.
 _Element = ElementTree.Element
-# m.  Corners of one level differ by no more.
-_LEVEL = 0.5
-_NUMBERS = ("floor_amsl_m", "floor_agl_m", "ceiling_amsl_m", "ceiling_agl_m", "radius_m")
+# Largest height difference between the corners of a level ceiling, m.
+_LEVEL_TOLERANCE_M = 0.5
+_NUMERIC_KEYS = ("floor_amsl_m", "floor_agl_m", "ceiling_amsl_m", "ceiling_agl_m", "radius_m")
 
 
 def kml_zones(text: str, source: str) -> Iterator[Found]:
-    """Where each zone stands in a file, and its entries as a [[zones]] table has them.
+    """Yield for each zone its place in a KML file and its [[zones]] entries.
 
-    An extruded polygon is a zone up to its height, as `altitudeMode` counts it; one that is clamped to the ground has
-    no ceiling.  ExtendedData states kind, floors, ceilings and radii by the keys of a scenario file.  Raises
-    ScenarioError for what is no KML, and for a placemark that is no zone.
+    An extruded polygon is a zone up to its height, with the datum of `altitudeMode`; a polygon clamped to the ground
+    has no ceiling.  ExtendedData states kind, floors, ceilings and radii by the keys of a scenario file.  Raises
+    ScenarioError for text that is not KML, and for a placemark that is not a zone.
 
     >>> ring = "<coordinates>8,46 8.01,46 8.01,46.01</coordinates>"
     >>> ring = f"<outerBoundaryIs><LinearRing>{ring}</LinearRing></outerBoundaryIs>"
@@ -157,11 +157,11 @@ def kml_zones(text: str, source: str) -> Iterator[Found]:
     >>> [(where, len(entries["rings_deg"][0])) for where, entries in kml_zones(text, "a file")]
     [('Placemark 1 (lake)', 3)]
     """
-    # Entities may name other files, and grow a small file without end: KML has no use of them.
+    # Entities can read other files and expand a small file without limit; KML does not need them.
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise ScenarioError(f"{source}: a document type is declared: not allowed in a file of zones", file=source)
     try:
-        root = ElementTree.fromstring(text)  # what could grow was refused above
+        root = ElementTree.fromstring(text)  # entities were refused above
     except (ElementTree.ParseError, ValueError) as error:
         raise ScenarioError(f"{source}: not valid XML: {str(error).splitlines()[0]}", file=source) from error
     if _tag(root) != "kml":
@@ -181,7 +181,7 @@ def _all(element: _Element, tag: str) -> list[_Element]:
 
 
 def _kml_text(element: _Element, tag: str) -> str:
-    """Text of an element's own child of this name; "" for none."""
+    """Return the text of an element's direct child with this tag, or "" without one."""
     return next(((child.text or "").strip() for child in element if _tag(child) == tag), "")
 
 
@@ -213,7 +213,7 @@ def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
 
 
 def _ceiling(polygon: _Element, ups: list[float], source: str) -> tuple[str, float]:
-    """The key of a polygon's ceiling and its height, m; ("", 0) where it has none."""
+    """Return the key of a polygon's ceiling and its height, m; ("", 0) without a ceiling."""
     mode = _kml_text(polygon, "altitudeMode") or "clampToGround"
     if mode == "clampToGround":
         return "", 0.0
@@ -225,13 +225,13 @@ def _ceiling(polygon: _Element, ups: list[float], source: str) -> tuple[str, flo
     if _kml_text(polygon, "extrude") not in ("1", "true"):
         message = f"{source}: altitudeMode {mode} without extrude: a sheet in the air holds no airspace"
         raise ScenarioError(message, file=source, field="altitudeMode", value=mode)
-    if not ups or max(ups) - min(ups) > _LEVEL:
+    if not ups or max(ups) - min(ups) > _LEVEL_TOLERANCE_M:
         raise ScenarioError(f"{source}: its corners have different heights: a zone has a level ceiling", file=source)
     return key, ups[0]
 
 
 def _coordinates(element: _Element, source: str) -> list[tuple[float, float, float]]:
-    """Longitude, latitude and height of an element's positions."""
+    """Return longitude, latitude and height of an element's positions."""
     out = []
     for coordinates in _all(element, "coordinates"):
         for position in (coordinates.text or "").split():
@@ -248,12 +248,12 @@ def _coordinates(element: _Element, source: str) -> list[tuple[float, float, flo
 
 
 def _extended(placemark: _Element, source: str) -> dict[str, Any]:
-    """What a placemark's ExtendedData states: Data with a value, and SimpleData."""
+    """Return the entries of a placemark's ExtendedData: Data with a value, and SimpleData."""
     stated = {str(one.get("name")): _kml_text(one, "value") for one in _all(placemark, "Data")}
     stated |= {str(one.get("name")): (one.text or "").strip() for one in _all(placemark, "SimpleData")}
     found: dict[str, Any] = {}
     for key, value in stated.items():
-        if key in _NUMBERS:
+        if key in _NUMERIC_KEYS:
             try:
                 found[key] = float(value)
             except ValueError as error:
@@ -265,11 +265,11 @@ def _extended(placemark: _Element, source: str) -> dict[str, Any]:
 
 
 # ----------------------------------------------------------------------
-# The formats by suffix, and files read in them.
+# Formats by suffix, and reading of files.
 
-# Of a text, and of its name in messages.
+# A function of a text and the file's name in messages.
 Reader = Callable[[str, str], Iterator[Found]]
-# All suffixes but that of a GeoPackage, which is no text.
+# Readers of text formats by suffix; a GeoPackage is not a text.
 FORMATS: dict[str, Reader] = {
     ".geojson": geojson_zones,
     ".json": geojson_zones,
@@ -277,31 +277,31 @@ FORMATS: dict[str, Reader] = {
     ".openair": openair_zones,
     ".txt": openair_zones,
 }
-# What is mended in files of authorities, in notes.
+# Notes about repairs to authorities' files.
 _CROSSED = "outlines that cross themselves are taken as the area they enclose"
 _EMPTY = "outlines that enclose no area are left out"
 _TURNED = "lower and upper limits that stand the wrong way round are swapped"
 _NO_BAND = "upper limits of 0, or equal to the lower one, are taken for none: no ceiling"
-# Bytes of a file at most.
+# Maximum size of a file, bytes.
 MAX_BYTES = 64 * 2**20
 
 
 @dataclass(slots=True)
 class FileZones:
-    """What a file of zones holds: its zones, and what of it is not taken as it stands, a line each."""
+    """Zones of a file, and one line for each kind of change or omission on reading it."""
 
     zones: list[ZoneTable] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
 
 def is_zone_file(path: Path) -> bool:
-    """Whether a file is one of zones, by its suffix; a .txt by its first command, as OpenAir has it."""
+    """Return True if a file contains zones, judged by its suffix; for .txt by the first OpenAir command."""
     suffix = path.suffix.lower()
     if suffix != ".txt":
         return suffix in SUFFIXES
     try:
         with path.open("rb") as file:
-            # A letter that is cut in two, or of another encoding, is no command.
+            # A letter cut in two, or in another encoding, does not matter: commands are ASCII.
             return is_openair(file.read(65536).decode("utf-8-sig", errors="replace"))
     except OSError:
         return False
@@ -310,7 +310,7 @@ def is_zone_file(path: Path) -> bool:
 def read_zone_files(files: str | Sequence[str], source: str, base: Path | None) -> FileZones:
     """Read the zones of a scenario's files, one or several.
 
-    source: names the scenario in messages.  base: folder that relative paths count from.  Raises ScenarioError as
+    source: name of the scenario in messages.  base: folder of relative paths.  Raises ScenarioError as
     `read_zone_file` does, and for more zones than a scenario may have.
     """
     found = FileZones()
@@ -324,8 +324,8 @@ def read_zone_files(files: str | Sequence[str], source: str, base: Path | None) 
 def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
     """Read the zones of a file, in the format of its suffix.
 
-    source: names it in messages.  most: zones that it may have.  Raises ScenarioError for a file that cannot be read,
-    for one zone more than that, and for a zone that is none.
+    source: name of the file in messages.  most: maximum number of zones.  Raises ScenarioError for a file that cannot
+    be read, for more zones than ``most``, and for an invalid zone.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -371,7 +371,10 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
 
 
 def _mend(entries: dict[str, Any]) -> list[str]:
-    """Mend the outline of an authority's zone; what was mended, in words: nothing of anyone else's zone."""
+    """Repair the outline of an authority's zone and return the notes about it.
+
+    Leave other zones as they are.
+    """
     published = entries.pop(PUBLISHED, False)
     words = [said for mark, said in ((UPSIDE_DOWN, _TURNED), (NO_BAND, _NO_BAND)) if entries.pop(mark, False)]
     if published and "rings_deg" in entries and (rings := mended_rings(entries["rings_deg"])) is not None:
@@ -381,7 +384,7 @@ def _mend(entries: dict[str, Any]) -> list[str]:
 
 
 def _found(path: Path, suffix: str, source: str) -> Iterator[Found]:
-    """The zones of a file in the format of its suffix."""
+    """Yield the zones of a file in the format of its suffix."""
     if suffix == GEOPACKAGE:
         _check_size(path, source)
         for k, (where, feature) in enumerate(geopackage_features(path, source)):
@@ -400,7 +403,7 @@ def _check_size(path: Path, source: str) -> None:
 
 
 def _text(path: Path, source: str, *, openair: bool) -> str:
-    """The text of a file; older OpenAir files are in Latin letters of one byte each."""
+    """Return the text of a file; an OpenAir file that is not UTF-8 is read as Latin-1."""
     try:
         _check_size(path, source)
         data = path.read_bytes()

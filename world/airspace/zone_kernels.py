@@ -1,6 +1,6 @@
-"""Distances to zones, compiled: of a place, and along a segment, exact on straight edges and circles.
+"""Compiled distances to zones from a place and along a segment, exact for straight edges and circles.
 
-Zones are records and their polygons' edges are records of one array, so that a kernel reads one zone after the other.
+Zones are records, and the edges of all polygons are records of one array, so that kernels read zones sequentially.
 """
 
 import math
@@ -13,9 +13,9 @@ from world.airspace.zones import Cylinder, Ring, Zone, ZoneLevel
 from world.by_reference import by_reference
 from world.kernels import Record, Records, compiled, compiled_inline, inlined, inner, record_dtype
 
-# One zone.  round: whether it is a cylinder, of which `centre_east`, `centre_north` and `radius` say all.  first_edge,
-# last_edge: its edges in the array of edges, the last not included.  west to north: its box on the map.  floor,
-# ceiling: m, -inf and inf where there is none; above mean sea level, or above ground where the field beside it says so.
+# One zone.  round: True for a cylinder, which `centre_east`, `centre_north` and `radius` describe completely.
+# first_edge, last_edge: its range in the array of edges, the last not included.  west to north: its box on the map.
+# floor, ceiling: m, -inf and inf if unlimited; above mean sea level, or above ground if the field after it is True.
 ZONE = record_dtype(
     ("exclusion", np.bool_),
     ("round", np.bool_),
@@ -33,20 +33,20 @@ ZONE = record_dtype(
     ("floor_above_ground", np.bool_),
     ("ceiling_above_ground", np.bool_),
 )
-# One edge of a polygon: from a corner to the next, m.  The inside is to its left.
+# One edge of a polygon, from a corner to the next, m.  The inside is to its left.
 EDGE = record_dtype("east", "north", "to_east", "to_north")
 
 
 @by_reference
 class ZoneRecords(NamedTuple):
-    """Zones for compiled code: (z,) of `ZONE` in the order they were given, and (e,) of `EDGE`, all polygons' edges."""
+    """Zones for compiled code: (z,) of `ZONE` in the given order, and (e,) of `EDGE`, the edges of all polygons."""
 
     zones: Records
     edges: Records
 
 
 def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
-    """Zones as the records that kernels read.
+    """Convert zones to the records that kernels read.
 
     >>> records = zone_records([Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))])
     >>> float(records.zones[0].north), len(records.edges)
@@ -78,10 +78,10 @@ def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
 
 
 def _set_boxes(zones: Records, edges: Records) -> None:
-    """Fill in the boxes of polygons by their edges."""
+    """Set the boxes of polygons from their edges."""
     made = np.flatnonzero(~zones["round"])
     if made.size:
-        # No polygon is without edges, and their edges follow each other.
+        # Every polygon has edges, and the edges of a polygon are consecutive.
         starts = zones["first_edge"][made]
         for low, high, name in (("west", "east", "east"), ("south", "north", "north")):
             zones[low][made] = np.minimum.reduceat(edges[name], starts)
@@ -89,7 +89,7 @@ def _set_boxes(zones: Records, edges: Records) -> None:
 
 
 def _edges(rings: list[Ring]) -> Records:
-    """(e,) of `EDGE` from every corner of some rings to the next of its ring."""
+    """Return (e,) of `EDGE` from every corner of the rings to the next corner of its ring."""
     corners = np.array([corner for ring in rings for corner in ring], dtype=np.float64).reshape(-1, 2)
     after = np.roll(corners, -1, axis=0)
     sizes = np.array([len(ring) for ring in rings], dtype=np.int64)
@@ -109,7 +109,7 @@ def _level(level: ZoneLevel | None, absent: float) -> tuple[float, bool]:
 def box_distance(
     records: ZoneRecords, z: int, west: float, east: float, south: float, north: float
 ) -> float:  # pragma: no cover - compiled
-    """Horizontal distance between zone z's box and another box, m; 0 where they meet."""
+    """Return the horizontal distance between the box of zone z and another box, m; 0 if they meet."""
     zone = records.zones[z]
     across = max(0.0, zone.west - east, west - zone.east)
     along = max(0.0, zone.south - north, south - zone.north)
@@ -118,7 +118,7 @@ def box_distance(
 
 @inlined
 def distance_to_edge(edge: Record, east: float, north: float) -> float:  # pragma: no cover - compiled
-    """Horizontal distance from a place to one edge, m."""
+    """Return the horizontal distance from a place to one edge, m."""
     step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
     off_e, off_n = east - edge.east, north - edge.north
     share = (off_e * step_e + off_n * step_n) / (step_e * step_e + step_n * step_n)
@@ -132,9 +132,9 @@ def distance_to_edge(edge: Record, east: float, north: float) -> float:  # pragm
 def nearest_edge(
     records: ZoneRecords, z: int, east: float, north: float
 ) -> tuple[float, int]:  # pragma: no cover - compiled
-    """Horizontal distance from a place to zone z's outline, m, negative inside its shape, and the edge that is nearest.
+    """Return the horizontal distance from a place to the outline of zone z, m, negative inside, and the nearest edge.
 
-    A cylinder has no edges: its number is -1.
+    The edge number is -1 for a cylinder, which has no edges.
     """
     zone = records.zones[z]
     if zone.round:
@@ -153,7 +153,7 @@ def nearest_edge(
         away2 = off_e * off_e + off_n * off_n
         if away2 < nearest2:
             nearest2, nearest = away2, k
-        # A ray to the east: an edge counts with its lower end and without its upper.
+        # Ray casting to the east: an edge includes its lower end and excludes its upper end.
         if (edge.north > north) != (edge.to_north > north) and edge.east + step_e * (
             north - edge.north
         ) / step_n > east:
@@ -163,22 +163,23 @@ def nearest_edge(
 
 @compiled
 def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> float:  # pragma: no cover - compiled
-    """Horizontal distance from a place to zone z's outline, m; negative inside its shape."""
+    """Return the horizontal distance from a place to the outline of zone z, m; negative inside its shape."""
     away, _ = nearest_edge(records, z, east, north)
     return away
 
 
 @compiled_inline
 def outside_band(zone: Record, up: float, ground: float) -> float:  # pragma: no cover - compiled
-    """Height below a zone's floor or above its ceiling, m; negative between them, by the nearer.
+    """Return the height below a zone's floor or above its ceiling, m.
 
-    zone: a record of `ZONE`.  up: m above mean sea level.  ground: height of the ground there, NaN where it is not
-    known, which a zone with levels above ground makes NaN of.
+    Negative between them, to the nearer one.
+    zone: a record of `ZONE`.  up: m above mean sea level.  ground: height of the ground there, NaN if not known; the
+    result is then NaN for a zone with levels above ground.
     """
     floor: float = zone.floor + ground if zone.floor_above_ground else zone.floor
     ceiling: float = zone.ceiling + ground if zone.ceiling_above_ground else zone.ceiling
     below, above = floor - up, up - ceiling
-    # Written so that NaN stays.
+    # The comparison is written so that NaN is kept.
     return below if below > above or below != below else above
 
 
@@ -186,11 +187,11 @@ def outside_band(zone: Record, up: float, ground: float) -> float:  # pragma: no
 def inside_share(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, first: float, last: float
 ) -> float:  # pragma: no cover - compiled
-    """Share of the segment a-b that lies inside zone z's shape on the map, of its part from ``first`` to ``last``.
+    """Return the fraction of the segment a-b inside the shape of zone z, within its part from ``first`` to ``last``.
 
-    first, last: shares of the segment, 0 and 1 for all of it.  Exact: the way goes in and out of a shape in turns, so
-    that the shares at which it goes out, each brought between first and last, less those at which it goes in, are the
-    share inside.  It counts a way along an edge as outside on the edge's right and inside on its left.
+    first, last: fractions of the segment, 0 and 1 for all of it.  Exact: entries and exits alternate, so that the sum
+    of the exit fractions minus the sum of the entry fractions, each clipped to first and last, is the fraction inside.
+    A segment along an edge is outside if it is to the right of the edge, and inside if it is to the left.
     """
     zone = records.zones[z]
     dx, dy = bx - ax, by - ay
@@ -212,14 +213,14 @@ def inside_share(
     inside = 0.0
     for k in range(zone.first_edge, zone.last_edge):
         edge = records.edges[k]
-        # Heights of both ends of the edge on the left of the line through the segment, times its length.
+        # Signed distances of the two ends of the edge to the left of the segment's line, times the segment's length.
         before = dx * (edge.north - ay) - dy * (edge.east - ax)
         after = dx * (edge.to_north - ay) - dy * (edge.to_east - ax)
         if (before > 0.0) == (after > 0.0):
             continue
         step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
-        # The edge leads from the line's left to its right, or back: with its inside on its left the line goes in, or
-        # out, there.
+        # The inside is to the left of the edge: the segment enters where the edge crosses its line from left to right,
+        # and leaves where the edge crosses from right to left.
         share = ((edge.east - ax) * step_n - (edge.north - ay) * step_e) / (dx * step_n - dy * step_e)
         share = min(last, max(first, share))
         inside += -share if before > 0.0 else share
@@ -230,7 +231,7 @@ def inside_share(
 def _between(
     edge: Record, ax: float, ay: float, dx: float, dy: float, run2: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Squared distance of the nearer of an edge's first corner and the segment, and the share of the segment there."""
+    """Return the squared distance from an edge's first corner to the segment, and its fraction of the segment."""
     share = ((edge.east - ax) * dx + (edge.north - ay) * dy) / run2 if run2 > 0.0 else 0.0
     share = min(1.0, max(0.0, share))
     off_e, off_n = ax + share * dx - edge.east, ay + share * dy - edge.north
@@ -241,10 +242,10 @@ def _between(
 def segment_distance(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Least horizontal distance from the segment a-b to zone z's shape, m, and the share of the segment where it is.
+    """Return the smallest horizontal distance from the segment a-b to the shape of zone z, m, and its fraction of a-b.
 
-    0 where the segment meets the shape, at a share inside it or on its outline; `edge_distance` says how deep.  Exact:
-    two straight pieces that do not cross are nearest at an end of one of them.
+    The distance is 0 if the segment meets the shape, at a fraction inside it or on its outline; `edge_distance` gives
+    the depth.  Exact: two straight pieces that do not cross are nearest at an end of one of them.
     """
     zone = records.zones[z]
     dx, dy = bx - ax, by - ay

@@ -1,4 +1,4 @@
-"""The suffixes of files of zones, apart from their readers: ``--help`` imports this, and no library of geometry."""
+"""Suffixes of files of zones, in a module of their own so that ``--help`` imports no geometry library."""
 
 GEOPACKAGE = ".gpkg"
 SUFFIXES = (".geojson", ".json", ".kml", ".openair", ".txt", GEOPACKAGE)

@@ -1,7 +1,7 @@
-"""When a zone is active: periods of time as a scenario file states them, and whether a flight may meet one.
+"""Parse the periods in which a zone is active, and decide if it may be active during a flight.
 
-A period is one line of text, in universal time (UTC): ``START/END``, then days of the week and hours of the day where
-it does not last throughout.  ``..`` is an end that is not known, and BY NOTAM a zone that a notice activates.
+A period is one line of text, in universal time (UTC): ``START/END``, then days of the week and hours of the day if it
+is not active throughout.  ``..`` is an unknown end, and BY NOTAM a zone that a notice activates.
 
     2026-05-01T00:00Z/2026-10-01T00:00Z
     2026-05-01T00:00Z/.. SAT,SUN 07:00/20:00
@@ -13,13 +13,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, time, timedelta
 
-# As datetime.weekday() counts them, from 0.
+# In the order of datetime.weekday(), from 0.
 WEEKDAYS = ("MON", "TUE", "WED", "THU", "FRI", "SAT", "SUN")
-# A zone that is activated by a notice, which no file holds: it counts as active.
+# A zone activated by a notice; no file contains the notice, so the zone is treated as active.
 BY_NOTAM = "BY NOTAM"
+# Unknown start or end of a period.
 OPEN = ".."
-# A flight of which only the start is given may last so long; one of which both are given at most so long.
-DEFAULT_SPAN, LONGEST_SPAN = timedelta(hours=1), timedelta(days=7)
+# Duration of a flight of which only the start is given.
+DEFAULT_SPAN = timedelta(hours=1)
+# Longest duration of a flight with a given start and end.
+LONGEST_SPAN = timedelta(days=7)
 _HOURS = re.compile(r"([01]\d|2[0-4]):([0-5]\d)/([01]\d|2[0-4]):([0-5]\d)")
 _DAY = timedelta(days=1)
 
@@ -28,7 +31,7 @@ _DAY = timedelta(days=1)
 class Period:
     """One period, in UTC.
 
-    start, end: None where they are not known.  days: of the week, 0 for Monday; empty for all.
+    start, end: None if unknown.  days: of the week, 0 for Monday; empty for all.
     first, last: minutes of the day, None for the whole day; a last that is not after the first is on the next day.
     """
 
@@ -39,7 +42,7 @@ class Period:
     last: int | None = None
 
     def text(self) -> str:
-        """The line that `parse_period` reads.
+        """Return the line that `parse_period` reads.
 
         >>> Period(days=frozenset({5, 6}), first=420, last=1200).text()
         '../.. SAT,SUN 07:00/20:00'
@@ -53,7 +56,7 @@ class Period:
 
 
 def parse_period(text: str) -> Period | None:
-    """The period that a line of text states; None for `BY_NOTAM`.  Raises ValueError for what is none.
+    """Parse the period of a line of text; None for `BY_NOTAM`.  Raises ValueError for an invalid period.
 
     >>> parse_period("2026-05-01T00:00Z/.. SAT,SUN 07:00/20:00").days == {5, 6}
     True
@@ -86,9 +89,9 @@ def parse_period(text: str) -> Period | None:
 
 
 def parse_time(text: str) -> datetime:
-    """A time by ISO 8601 with its offset from UTC, in UTC; 24:00 is the next day's 00:00.
+    """Parse an ISO 8601 time with a UTC offset, and return it in UTC; 24:00 is 00:00 of the next day.
 
-    Raises ValueError, which does not repeat the text: whoever read it names it.
+    Raises ValueError.  Its message does not repeat the text, which the caller adds.
 
     >>> parse_time("2026-05-01T24:00+02:00").isoformat()
     '2026-05-01T22:00:00+00:00'
@@ -107,7 +110,7 @@ def parse_time(text: str) -> datetime:
 
 
 def _part(text: str) -> datetime:
-    """A time within a longer text, of which the error then names this part."""
+    """Parse a time within a longer text; the error message names this part."""
     try:
         return parse_time(text)
     except ValueError as error:
@@ -115,10 +118,10 @@ def _part(text: str) -> datetime:
 
 
 def parse_span(text: str) -> tuple[datetime, datetime]:
-    """From when to when a flight lasts: ``START`` or ``START/END``, with offsets from UTC.
+    """Parse the time span of a flight, ``START`` or ``START/END`` with UTC offsets, to its begin and finish.
 
-    One of which only the start is given lasts `DEFAULT_SPAN`.  Raises ValueError for what is no such text, for an end
-    before the start, and for more than `LONGEST_SPAN`.
+    A span without an end lasts `DEFAULT_SPAN`.  Raises ValueError for any other text, for an end before the start, and
+    for more than `LONGEST_SPAN`.
 
     >>> [f"{one:%H:%M}" for one in parse_span("2026-05-01T10:00+02:00")]
     ['08:00', '09:00']
@@ -132,26 +135,26 @@ def parse_span(text: str) -> tuple[datetime, datetime]:
 
 
 def is_active(times: Sequence[str], begin: datetime, finish: datetime) -> bool:
-    """Whether a zone may be active at any time from `begin` to `finish`, both included.
+    """Return True if a zone may be active at any time from `begin` to `finish`, both included.
 
-    times: as `parse_period` reads them; without any, and by a notice, a zone is always active.
+    times: periods as `parse_period` reads them; without any, or with BY NOTAM, a zone is always active.
 
     >>> begin, finish = parse_span("2026-05-02T06:30Z")  # a Saturday
     >>> is_active(["../.. SAT 07:00/20:00"], begin, finish), is_active(["../.. SUN"], begin, finish)
     (True, False)
     """
     periods = [parse_period(text) for text in times]
-    return not periods or any(period is None or _meets(period, begin, finish) for period in periods)
+    return not periods or any(period is None or _overlaps(period, begin, finish) for period in periods)
 
 
-def _meets(period: Period, begin: datetime, finish: datetime) -> bool:
+def _overlaps(period: Period, begin: datetime, finish: datetime) -> bool:
     begin = begin if period.start is None else max(begin, period.start)
     finish = finish if period.end is None else min(finish, period.end)
     if begin > finish:
         return False
     first, last = (0, 24 * 60) if period.first is None or period.last is None else (period.first, period.last)
     last += 24 * 60 if last <= first else 0
-    # From two days before: hours of that day's evening may go on into this one.
+    # Start two days earlier, because evening hours may continue past midnight.
     day = datetime.combine(begin.date(), time(), UTC) - 2 * _DAY
     while day <= finish:
         meets = day + timedelta(minutes=first) <= finish and day + timedelta(minutes=last) >= begin

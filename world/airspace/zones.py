@@ -1,8 +1,8 @@
-"""Zones of airspace: where a flight must not be, and where it must stay, each between a floor and a ceiling.
+"""Airspace zones that a flight must avoid or must stay in, each between a floor and a ceiling.
 
 A zone is a polygon or a cylinder on the map and a band of heights.  A flight violates an exclusion where it is inside
-its shape and between its floor and its ceiling, and an inclusion where it is not.  Several inclusions all count, as
-ArduPlane has them unless FENCE_OPTIONS says otherwise (ArduPilot's parameter reference): a flight stays in every one.
+its shape and between its floor and its ceiling, and an inclusion where it is not.  A flight must stay in all inclusions
+at once, as in ArduPlane unless FENCE_OPTIONS is set otherwise (ArduPilot's parameter reference).
 """
 
 import math
@@ -16,16 +16,16 @@ import shapely
 
 ZoneKind = Literal["inclusion", "exclusion"]
 Datum = Literal["amsl", "ground"]
-# Corners, (east, north) m; the last is joined to the first, which is not repeated.
+# Corners, (east, north) m; the last corner is joined to the first, which is not repeated.
 Ring = tuple[tuple[float, float], ...]
 
-# m^2.  A polygon with less inside is empty.
+# Smallest area of a polygon, m^2; a smaller polygon is empty.
 MIN_AREA = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class ZoneLevel:
-    """The floor or the ceiling of a zone.
+    """Floor or ceiling of a zone.
 
     height: m, above mean sea level ("amsl") or above the ground below the aircraft ("ground"), as `datum` says.
     """
@@ -36,7 +36,7 @@ class ZoneLevel:
 
 @dataclass(frozen=True, slots=True)
 class Polygon:
-    """Parts of the map, each with holes or without, by their edges.
+    """Parts of the map, each with or without holes, by their edges.
 
     rings: outlines run anticlockwise, holes clockwise (the inside is to the left); none crosses itself or another.
     """
@@ -46,7 +46,7 @@ class Polygon:
 
 @dataclass(frozen=True, slots=True)
 class Cylinder:
-    """A circle on the map: its centre and its radius, m."""
+    """Circle on the map: its centre and its radius, m."""
 
     east: float
     north: float
@@ -57,10 +57,10 @@ class Cylinder:
 class Zone:
     """One zone.
 
-    name: what a person calls it, one line.
+    name: name for messages, one line.
     kind: "exclusion" to keep out of, "inclusion" to stay in.
-    shape: on the map.
-    floor, ceiling: None where it begins at the ground and below, or has no top.
+    shape: outline on the map.
+    floor, ceiling: None if the zone has no lower or no upper limit.
 
     >>> Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0), ceiling=ZoneLevel(120.0, "ground")).floor is None
     True
@@ -74,16 +74,16 @@ class Zone:
 
     @property
     def above_ground(self) -> bool:
-        """Whether its floor or its ceiling is counted from the ground."""
+        """True if the floor or the ceiling is a height above ground."""
         return any(level is not None and level.datum == "ground" for level in (self.floor, self.ceiling))
 
 
 def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
-    """Make a polygon of its outlines and holes in any order and direction, (east, north) m a corner.
+    """Make a polygon from its outlines and holes, in any order and direction, with corners (east, north) m.
 
-    A place is inside where it lies in an odd number of rings.  A corner that repeats the one before it, or closes a
-    ring, is left out.  Raises ValueError for a ring of fewer than three corners, one that crosses itself, rings that
-    cross each other, and a polygon with nothing inside.
+    A place is inside if an odd number of rings contain it.  A corner that repeats the previous corner, or closes a
+    ring, is left out.  Raises ValueError for a ring of fewer than three corners, for a ring that crosses itself, for
+    rings that cross each other, and for a polygon of no area.
 
     >>> make_polygon([[(0.0, 0.0), (0.0, 90.0), (90.0, 90.0), (90.0, 0.0), (0.0, 0.0)]]).rings
     (((90.0, 0.0), (90.0, 90.0), (0.0, 90.0), (0.0, 0.0)),)
@@ -102,7 +102,7 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
     for first, second in tree.query(shapes, predicate="intersects").T:
         if first < second and _cross(shapes[first], shapes[second]):
             raise ValueError("its rings cross each other, or share an edge")
-    # A ring is within itself.
+    # Minus 1, as a ring is within itself.
     depths = [len(tree.query(shape, predicate="within")) - 1 for shape in shapes]
     _check_area(sum(shape.area * (1 if depth % 2 == 0 else -1) for shape, depth in zip(shapes, depths, strict=True)))
     return Polygon(tuple(_turned(ring, depth) for ring, depth in zip(cleaned, depths, strict=True)))
@@ -114,7 +114,7 @@ def _check_area(inside: float) -> None:
 
 
 def _cross(one: shapely.Polygon, other: shapely.Polygon) -> bool:
-    """Whether two rings cross, or run along each other; that they touch at a corner is allowed."""
+    """Return True if two rings cross or share a stretch of an edge; touching at a corner is allowed."""
     return bool(one.overlaps(other)) or float(one.exterior.intersection(other.exterior).length) > 0.0
 
 
@@ -131,13 +131,13 @@ def _cleaned(ring: Sequence[tuple[float, float]]) -> Ring:
 
 
 def _turned(ring: Ring, depth: int) -> Ring:
-    """The ring anticlockwise, or clockwise where it bounds a hole: where it lies in an odd number of others."""
+    """Return the ring anticlockwise, or clockwise if it bounds a hole: if an odd number of other rings contain it."""
     anticlockwise = shapely.LinearRing(ring).is_ccw
     return ring if anticlockwise == (depth % 2 == 0) else ring[::-1]
 
 
 def make_cylinder(east: float, north: float, radius: float) -> Cylinder:
-    """Make a cylinder.  Raises ValueError for a radius that is not above zero, and for what is not a number.
+    """Make a cylinder.  Raises ValueError for a radius of zero or below, and for values that are not finite.
 
     >>> make_cylinder(0.0, 0.0, 0.0)
     Traceback (most recent call last):
@@ -152,7 +152,7 @@ def make_cylinder(east: float, north: float, radius: float) -> Cylinder:
 
 
 def is_hole(ring: Ring) -> bool:
-    """Whether a ring of a `Polygon` bounds a hole: it runs clockwise.
+    """Return True if a ring of a `Polygon` bounds a hole: it runs clockwise.
 
     >>> is_hole(((0.0, 0.0), (0.0, 90.0), (90.0, 90.0)))
     True
@@ -161,7 +161,7 @@ def is_hole(ring: Ring) -> bool:
 
 
 def band_outline(corners: Sequence[tuple[float, float]], width: float) -> list[tuple[float, float]]:
-    """The outline of a band of this width along a line, with half circles at its ends, m.
+    """Return the outline of a band of this width along a line, with half circles at its ends, m.
 
     >>> outline = band_outline([(0.0, 0.0), (0.0, 90.0)], 20.0)
     >>> min(north for _, north in outline), max(east for east, _ in outline)
@@ -171,17 +171,17 @@ def band_outline(corners: Sequence[tuple[float, float]], width: float) -> list[t
     return [(float(east), float(north)) for east, north in band.exterior.coords[:-1]]
 
 
-# Degrees, a tenth of a metre.  An area that an outline encloses where it crosses itself grows by this: its parts, which
-# may touch each other in points, have a way between them, however they are rounded on a map.
+# Buffer around the area of a repaired outline, degrees (about 0.1 m).  It connects parts that touch only in points, so
+# that rounding on a map cannot separate them.
 MENDED_BY = 1e-6
 
 
 def mended_rings(rings: Sequence[Sequence[Sequence[float]]]) -> list[list[list[float]]] | None:
-    """Rings of the area that an outline with its holes encloses, where they cross; none for an outline of no area.
+    """Repair rings that cross: return the rings of the enclosed area, empty for an outline of no area.
 
-    rings: of [latitude, longitude], the outline first.  One that does not lie inside another is no hole: it is a part
-    of the area; one of fewer than three different corners is none.  The area is larger by `MENDED_BY` on all sides.
-    Returns None where nothing is to be mended.
+    rings: rings of [latitude, longitude], the outline first.  A ring that is not inside another one is a part of the
+    area, not a hole; a ring of fewer than three different corners is dropped.  The area grows by `MENDED_BY` on all
+    sides.  Returns None if there is nothing to repair.
 
     >>> len(mended_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]]))  # both halves of a bow tie, joined in the middle
     1
@@ -205,10 +205,11 @@ def mended_rings(rings: Sequence[Sequence[Sequence[float]]]) -> list[list[list[f
 
 
 def _enclosed(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
-    """The area of rings, each mended alone: a ring inside an odd number of others is a hole, in those that hold it.
+    """Return the area of rings, each repaired alone.
 
-    Inside is what is beyond the other by `MENDED_BY` at most; of two rings that are the same, neither is.  A ring that
-    crosses another one, touches it from outside or lies apart from it is a part of the area.
+    A ring inside an odd number of others is a hole in them.
+    A ring inside another one may extend beyond it by `MENDED_BY`; of two identical rings neither is inside the other.
+    A ring that crosses another one, touches it from outside or is separate from it is a part of the area.
     """
     made = shapely.make_valid(np.array(rings), method="structure", keep_collapsed=False)
     made = made[shapely.area(made) > 0.0]
@@ -232,7 +233,7 @@ def _enclosed(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
 
 
 def holes_lie_inside(rings: Sequence[Sequence[tuple[float, float]]]) -> bool:
-    """Whether all rings but the first lie within it, or one of them is no ring, which `make_polygon` refuses.
+    """Return True if all rings but the first are within the first, or if a ring is invalid (see `make_polygon`).
 
     >>> square = [(0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0)]
     >>> holes_lie_inside([square, [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)]])

@@ -1,4 +1,4 @@
-"""The zones of a scenario on its map: shapes checked, ends on their right sides, and outlines to be drawn."""
+"""Place the zones of a scenario on its map, check start and destination against them, and make outlines to draw."""
 
 import math
 from collections.abc import Sequence
@@ -16,20 +16,20 @@ from world.terrain import Terrain
 Floats = NDArray[np.float64]
 
 # ----------------------------------------------------------------------
-# Rings of latitudes and longitudes on a map: their edges, straight in degrees, with more corners where they bend.
+# Rings of latitudes and longitudes on a map: edges are straight in degrees, with extra corners where they bend.
 
-# m.  An edge that is straight in degrees leaves the straight line between its corners on the map by this at most: one
-# along a parallel at 46 degrees bends by so much over 2.2 km.
+# Largest distance between an edge that is straight in degrees and its straight pieces on the map, m; an edge along a
+# parallel at 46 degrees bends by this over 2.2 km.
 EDGE_BEND = 0.1
-# Pieces that an edge is cut into at most.
+# Maximum number of pieces of an edge.
 _MAX_PIECES = 2_000
 
 
 def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
-    """Corners (east, north) m of a ring of (latitude, longitude) degrees.
+    """Convert a ring of (latitude, longitude) degrees to corners (east, north) m.
 
-    Between two corners a ring is straight in degrees, as GeoJSON has it (RFC 7946, 3.1.1) and as autopilots take their
-    fences; where that is not straight on the map, corners are put between.  A longitude goes the short way round.
+    Between two corners a ring is straight in degrees, as in GeoJSON (RFC 7946, 3.1.1) and in the fences of autopilots;
+    where that is not straight on the map, corners are inserted.  The longitude takes the shorter direction.
 
     >>> origin = GeoOrigin(46.0, 8.0)
     >>> len(ring_on_map(origin, [(46.0, 8.0), (46.0, 8.01), (46.01, 8.0)]))
@@ -45,7 +45,7 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
     east, north = to_map(origin, lat, lon)
     middle = to_map(origin, lat + 0.5 * step_lat, lon + 0.5 * step_lon)
     off = np.hypot(middle[0] - 0.5 * (east + np.roll(east, -1)), middle[1] - 0.5 * (north + np.roll(north, -1)))
-    # The bend of a piece falls with the square of its length.
+    # The bend of a piece is proportional to the square of its length.
     pieces = np.clip(np.ceil(np.sqrt(off / EDGE_BEND)), 1, _MAX_PIECES).astype(int)
     lats, lons = [], []
     for k, count in enumerate(pieces.tolist()):
@@ -59,8 +59,8 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
 def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> tuple[Zone, ...]:
     """Place the zones of a scenario file on its map.
 
-    source: names the file in messages.  Raises ScenarioError for a shape that is none, and for a level above ground
-    where there is no terrain.
+    source: name of the file in messages.  Raises ScenarioError for an invalid shape, and for a level above ground
+    without terrain.
     """
     zones = []
     for k, table in enumerate(tables):
@@ -80,17 +80,17 @@ def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, grou
     return tuple(zones)
 
 
-# m.  No flight that stays in its area comes near a zone beyond this.
+# Distance from the area beyond which zones are left out, m; a flight within its area comes nowhere near them.
 FAR = 20_000.0
-# m.  A degree of latitude.
-_METRES = 111_000.0
+# Length of a degree of latitude, m.
+_DEGREE_LENGTH_M = 111_000.0
 
 
 def near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
-    """The zones of a file that a flight may meet: inclusions, and exclusions within `FAR` of the area.
+    """Return the zones of a file that a flight may meet: inclusions, and exclusions within `FAR` of the area.
 
-    source: names the file in messages.  bounds: (2, 2) m, west and east, south and north of the area.
-    Raises ScenarioError for a shape that is none among those that are left out; `make_zones` looks at the others.
+    source: name of the file in messages.  bounds: (2, 2) m, west and east, south and north of the area.
+    Raises ScenarioError for an invalid shape among the zones left out; `make_zones` checks the others.
     """
     near = []
     for k, table in enumerate(tables):
@@ -105,12 +105,12 @@ def near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, boun
 
 
 def _check_far(table: ZoneTable) -> None:
-    """Raise ValueError for rings in degrees that are no polygon; their shape on the map is not asked for."""
+    """Raise ValueError for rings in degrees that are not a polygon, without projecting them on the map."""
     rings = table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
     if rings and rings[0]:
         middle = rings[0][0][1]
         about = [[(lat, (lon - middle + 180.0) % 360.0 - 180.0) for lat, lon in ring] for ring in rings]
-        make_polygon([[(lon * _METRES, lat * _METRES) for lat, lon in ring] for ring in about])
+        make_polygon([[(lon * _DEGREE_LENGTH_M, lat * _DEGREE_LENGTH_M) for lat, lon in ring] for ring in about])
 
 
 def _is_near(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
@@ -147,7 +147,7 @@ def _level(amsl: float | None, above_ground: float | None) -> ZoneLevel | None:
 def check_ends(zones: Sequence[Zone], source: str, ends: Sequence[tuple[str, Floats]], ground: Terrain | None) -> None:
     """Raise ScenarioError for an end inside an exclusion, or outside an inclusion.
 
-    ends: of each its key in the file, and its position (3,) m.
+    ends: key in the file and position (3,) m of each end.
     """
     records = zone_records(zones)
     for key, point in ends:
@@ -158,7 +158,9 @@ def check_ends(zones: Sequence[Zone], source: str, ends: Sequence[tuple[str, Flo
 
 
 def zone_broken_at(zones: Sequence[Zone], point: Floats, ground: Terrain | None) -> Zone | None:
-    """The first zone that a position (3,) m violates, None for none; unknown ground puts it within a band.
+    """Return the first zone that a position (3,) m violates, or None.
+
+    Unknown ground is treated as within the band.
 
     >>> from world.airspace.zones import Cylinder
     >>> mast = Zone("mast", "exclusion", Cylinder(0.0, 0.0, 200.0), ceiling=ZoneLevel(300.0, "amsl"))
@@ -181,14 +183,14 @@ def _first_broken(zones: Sequence[Zone], records: ZoneRecords, point: Floats, gr
 
 
 # ----------------------------------------------------------------------
-# Outlines of zones to be drawn: closed rings on the map, and the heights of floor and ceiling along them.
+# Outlines of zones to draw: closed rings on the map, and the heights of floor and ceiling along them.
 
-# Corners that a circle is drawn with.
+# Number of corners of a drawn circle.
 CIRCLE_CORNERS = 72
 
 
 def zone_rings(zone: Zone) -> tuple[Floats, ...]:
-    """Rings (k, 2) of a zone, east and north in m, the last corner as the first; holes run the other way round.
+    """Return the rings (k, 2) of a zone, east and north in m, closed; holes run in the opposite direction.
 
     >>> square = zone_rings(Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0)))[0]
     >>> square.shape, square[0].tolist()
@@ -204,7 +206,7 @@ def zone_rings(zone: Zone) -> tuple[Floats, ...]:
 
 
 def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
-    """Parts of a zone: rings as `zone_rings` has them, each part's outline and then its holes.
+    """Return the parts of a zone, with rings as in `zone_rings`: the outline of each part and then its holes.
 
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
     >>> [len(part) for part in zone_parts(zone)]
@@ -213,7 +215,7 @@ def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
     if isinstance(zone.shape, Cylinder):
         return [zone_rings(zone)]
     rings = list(zip(zone_rings(zone), map(is_hole, zone.shape.rings), strict=True))
-    # From the smallest: a hole belongs to the smallest outline about it.
+    # Smallest first: a hole belongs to the smallest outline around it.
     outlines = sorted((ring for ring, hole in rings if not hole), key=_area)
     shapes = zone_records([Zone("", "exclusion", Polygon((_open(ring),))) for ring in outlines])
     parts: list[list[Floats]] = [[ring] for ring in outlines]
@@ -233,7 +235,9 @@ def _area(ring: Floats) -> float:
 
 
 def level_heights(level: ZoneLevel | None, ground: Floats, absent: float) -> Floats:
-    """Heights (n,) of a floor or a ceiling over ground (n,), m AMSL; `absent` where the zone has none.
+    """Return the altitudes (n,) of a floor or a ceiling over ground (n,), m AMSL.
+
+    `absent` if the level is None.
 
     >>> level_heights(ZoneLevel(120.0, "ground"), np.array([10.0, 30.0]), 0.0).tolist()
     [130.0, 150.0]
@@ -244,9 +248,9 @@ def level_heights(level: ZoneLevel | None, ground: Floats, absent: float) -> Flo
 
 
 def zone_walls(zone: Zone, terrain: Terrain | None, low: float, top: float) -> list[Floats]:
-    """Rings (k, 2, 3) of a zone as a body: foot and upper edge of each corner, m.
+    """Return rings (k, 2, 3) of the walls of a zone: lower and upper end of each corner, m.
 
-    low, top: where no floor, or no ceiling, and no ground below says more, m AMSL.  A floor below the ground is on it.
+    low, top: default floor and ceiling, m AMSL.  A floor below the ground is raised to it.
 
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0), ceiling=ZoneLevel(120.0, "amsl"))
     >>> zone_walls(zone, None, 0.0, 900.0)[0][0].tolist()
