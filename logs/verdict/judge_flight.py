@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.conditions import setup_conditions
-from logs.verdict.findings import Finding, left_open
+from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.imported.judge_imported_flight import judge_imported_flight
 from logs.verdict.judge_geometry import (
     deciding_items,
@@ -102,7 +102,7 @@ def _levels(
     if requirements.envelope:
         predicted = (*deciding_items(requirements.setup), *geometric_findings(requirements, flown))
         fails = any(item.ok is False for item in predicted)
-        passes = not fails and not left_open(predicted)
+        passes = not fails and not undecided_findings(predicted)
         differing = _differing("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
         said = headline(predicted, passes, source)
         levels.append(LevelAnswer("geometry", passes, said, differing, undecided=not passes and not fails))
@@ -113,7 +113,7 @@ def _levels(
         # What is not flyable although nothing of it failed was left open.
         unsure = not airframe.flyable and not airframe.failed
         levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing, undecided=unsure))
-    undecided = bool(left_open(flown)) and not any(item.ok is False for item in flown)
+    undecided = bool(undecided_findings(flown)) and not any(item.ok is False for item in flown)
     own = LevelAnswer(flown_level(requirements.setup), flyable, headline(flown, flyable, source), undecided=undecided)
     return (*levels, own)
 

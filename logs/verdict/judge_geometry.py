@@ -12,10 +12,10 @@ from logs.verdict.findings import (
     UNKNOWN_AIRCRAFT,
     Finding,
     badness,
-    left_open,
     make_finding,
     message,
     reason_of,
+    undecided_findings,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -43,7 +43,7 @@ def deciding_items(setup: FlightSetup) -> list[Finding]:
     """
     asked = setup.plan is None or setup.autopilot.refuses
     found = mission_findings(setup) if asked else []
-    return [item for item in found if item.ok is False or left_open([item])]
+    return [item for item in found if item.ok is False or undecided_findings([item])]
 
 
 def geometric_findings(requirements: RouteRequirements, flown: Sequence[Finding] | None = None) -> tuple[Finding, ...]:

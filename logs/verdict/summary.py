@@ -1,4 +1,4 @@
-"""The verdict in a line, and what a reader should know beside it."""
+"""The summary of a verdict: the headline, and the lines that a reader should know with it."""
 
 import math
 from collections.abc import Sequence
@@ -6,7 +6,14 @@ from collections.abc import Sequence
 from flight.autopilots.parameter_files import LONGEST_NAME
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line
-from logs.verdict.findings import BESIDE_FLIGHT, NOT_FLOWN, UNKNOWN_AIRCRAFT, UNKNOWN_WAY, Finding, left_open
+from logs.verdict.findings import (
+    APART_FROM_FLIGHT,
+    NOT_FLOWN,
+    UNKNOWN_AIRCRAFT,
+    UNKNOWN_WAY,
+    Finding,
+    undecided_findings,
+)
 from logs.verdict.measures.mission_ends import missing_ends_text
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule_words import RULE_WORDS, RuleWords
@@ -22,14 +29,14 @@ _LEVELS = {
 
 
 def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> str:
-    """First line: the answer, and what failed, or was not judged or only just passed.
+    """Write the first line: the answer, and what failed, was not judged or only just passed.
 
-    source: what the aircraft's model was made from, where it is not known for certain.
+    source: the source of the aircraft's model, if the model is uncertain.
     """
     whose = [f"an aircraft from {source}"] if source else []
     if flyable:
-        silent = [_not_judged(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
-        return "; ".join(["flyable", *filter(None, silent), *_by_luck(findings), *whose])
+        silent = [_unjudged_text(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
+        return "; ".join(["flyable", *filter(None, silent), *_near_miss_notes(findings), *whose])
     failed = _failed(findings)
     if not failed and (open_text := undecided_text(findings)):
         return "; ".join([f"not judged in full: {open_text}", *whose])
@@ -40,7 +47,7 @@ def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> st
 
 
 def undecided_text(findings: Sequence[Finding]) -> str:
-    """What the aircraft is not known well enough for, only a flight tells, or may be in the way; "" for nothing.
+    """Describe what leaves the verdict open, or return "" for nothing.
 
     >>> from logs.verdict.findings import UNKNOWN_AIRCRAFT, make_finding
     >>> from logs.verdict.places import Place
@@ -48,22 +55,22 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     >>> undecided_text([make_finding("slope", leg, ok=None, reason="", check=UNKNOWN_AIRCRAFT) for leg in legs])
     'slopes on leg 0, to item 1, and leg 1, to item 2, are within what is not known of the aircraft'
     """
-    open_findings = left_open(findings)
+    open_findings = undecided_findings(findings)
     ways = [
         f"{'the turn-around on' if item.place.kind == 'leg' else 'the circle at'} {place_text(item.place)}"
         for item in open_findings
         if item.check == UNKNOWN_WAY
     ]
     circles = f"where {' and '.join(ways[:_NAMED])} is flown, only a flight tells" if ways else ""
-    known = _unknown_of_aircraft([item for item in open_findings if item.check == UNKNOWN_AIRCRAFT])
-    beside = [item.brief for item in open_findings if item.check in BESIDE_FLIGHT]
+    known = _unknown_aircraft_text([item for item in open_findings if item.check == UNKNOWN_AIRCRAFT])
+    beside = [item.brief for item in open_findings if item.check in APART_FROM_FLIGHT]
     items = [item.brief for item in open_findings if item.check == NOT_FLOWN]
     more = [f"{len(items) - _NAMED} more items"] if len(items) > _NAMED else []
     return "; ".join(filter(None, [known, circles, *items[:_NAMED], *more, *beside]))
 
 
-def _unknown_of_aircraft(every: Sequence[Finding]) -> str:
-    """What of some findings the aircraft is not known well enough for, in words; "" for nothing."""
+def _unknown_aircraft_text(every: Sequence[Finding]) -> str:
+    """Describe the findings for which the aircraft is not known well enough, or return "" for none."""
     found = [item for item in every if item.rule == "slope"]
     if len(found) < len(every):
         speeds = sum(item.rule == "speed" for item in every)
@@ -87,7 +94,7 @@ def _unknown_of_aircraft(every: Sequence[Finding]) -> str:
 
 
 def first_failed(findings: Sequence[Finding]) -> Finding | None:
-    """The failed finding that the first line names first; None where nothing failed.
+    """Return the failed finding that the headline names first, or None if nothing failed.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import FLIGHT
@@ -101,14 +108,14 @@ def first_failed(findings: Sequence[Finding]) -> Finding | None:
 
 
 def _failed(findings: Sequence[Finding]) -> list[Finding]:
-    """What failed: what ends a flight first, then what a plan may be mended by, then in the verdict's order."""
+    """Return the failed findings by urgency, and in the order of the rules."""
     order = {name: k for k, name in enumerate(RULE_WORDS)}
     failed = (item for item in findings if item.ok is False)
     return sorted(failed, key=lambda item: (-RULE_WORDS[item.rule].urgency, order[item.rule]))
 
 
-def _not_judged(findings: Sequence[Finding], rule: RuleWords) -> str:
-    """What of a rule was not judged, in words; "" for nothing."""
+def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
+    """Describe what of a rule was not judged, or return "" for nothing."""
     mine = [item for item in findings if item.rule == rule.name]
     silent = sum(item.ok is None for item in mine)
     if not silent:
@@ -116,8 +123,8 @@ def _not_judged(findings: Sequence[Finding], rule: RuleWords) -> str:
     return f"{rule.unjudged} not judged" + ("" if silent == len(mine) else f" on {silent} {rule.unjudged_of}")
 
 
-def _by_luck(findings: Sequence[Finding]) -> list[str]:
-    """Threats that the aircraft missed by less than it may have been off, in words."""
+def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
+    """Name each threat that the aircraft missed by less than its navigation error."""
     out = []
     for item in findings:
         facts = {fact.what: fact.value for fact in item.facts if item.rule == "threat" and item.ok}
@@ -127,7 +134,7 @@ def _by_luck(findings: Sequence[Finding]) -> list[str]:
 
 
 def _most_telling(failed: list[Finding]) -> list[Finding]:
-    """At most four findings: the worst of each rule before the second worst of any."""
+    """Return at most four findings: the worst of each rule before the second worst of any rule."""
     margins = [0.0 if item.margin is None else item.margin for item in failed]
     by_margin = sorted(range(len(failed)), key=margins.__getitem__)
     count: dict[str, int] = {}
@@ -139,7 +146,7 @@ def _most_telling(failed: list[Finding]) -> list[Finding]:
 
 
 def _phrase(item: Finding) -> str:
-    """One failed finding in a few words."""
+    """Describe a failed finding in a few words."""
     words = RULE_WORDS[item.rule]
     return words.phrase(words.word, item)
 
@@ -152,16 +159,16 @@ def summary_lines(
     conditions: Conditions,
     deciding: DecidingParameter | None = None,
 ) -> tuple[str, ...]:
-    """Lines of the summary: the answer; whose fault it is; start, conditions, autopilot; what was not judged; levels.
+    """Write the summary: answer, airframe or autopilot, start, conditions, autopilot, what was not judged, levels.
 
     levels: the verdict's own last, with the headline.
     """
     *others, own = levels
-    lines = [own.headline, *_whose_fault(levels, deciding, setup)]
+    lines = [own.headline, *_airframe_or_autopilot_lines(levels, deciding, setup)]
     lines.append(f"Start: {setup.started}" if setup.started else "Start: not stated")
     lines += [*condition_lines(conditions), autopilot_line(conditions, flown=level == "flown")]
     lines += _parameter_lines(setup, flown=level == "flown")
-    lines += _unheeded_lines(setup)
+    lines += _ignored_settings_lines(setup)
     silent: dict[str, str] = {}
     for item in findings:
         if item.ok is None and RULE_WORDS[item.rule].explained:
@@ -181,7 +188,7 @@ def summary_lines(
         for item in findings
         if RULE_WORDS[item.rule].warns and item.ok is None
     ]
-    lines += _less_error(findings, setup)
+    lines += _terrain_error_lines(findings, setup)
     if setup.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.notes)}")
     if level == "flown":
@@ -194,8 +201,10 @@ def summary_lines(
     return tuple(lines)
 
 
-def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, setup: FlightSetup) -> list[str]:
-    """Where the aircraft can what the autopilot cannot: that it is so, and the parameter that decides."""
+def _airframe_or_autopilot_lines(
+    levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, setup: FlightSetup
+) -> list[str]:
+    """If the airframe can fly the mission but the autopilot cannot, say so and name the parameter that decides."""
     answers = {level.name: level.flyable for level in levels}
     if answers.get("autopilot") is not False or not answers.get("airframe") or levels[-1].undecided:
         return []
@@ -209,7 +218,7 @@ def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | No
 
 
 def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
-    """Return where the parameters are from, if a file states any, and which of the file's have no use here.
+    """Describe the source of the parameters if a file states any, and the names in the file that have no effect.
 
     Without a flight only what is wrong with the file is said.
     """
@@ -240,16 +249,16 @@ def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
     ]
 
 
-def _unheeded_lines(setup: FlightSetup) -> list[str]:
-    """What the scenario asks of returns and this autopilot has no parameter for."""
+def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
+    """Name the settings of the scenario's returns for which the autopilot has no parameter."""
     returns, parameters = setup.scenario.returns, setup.autopilot.parameters
     if returns is None or returns.rtl_autoland is None or parameters is None or hasattr(parameters, "rtl_autoland"):
         return []
     return [f"Not used: rtl_autoland of [returns], for which {setup.autopilot.title} has no parameter"]
 
 
-def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """The lowest clearance less the terrain's stated error, where one is stated."""
+def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
+    """Subtract the terrain's stated error, if any, from the lowest clearance."""
     error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
     heights = [
         item.planned if item.flown is None else item.flown
@@ -266,7 +275,7 @@ def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
 
 
 def _agreement(other: LevelAnswer) -> str:
-    """Where the verdict and another level differ, in words."""
+    """Describe where the verdict and another level differ."""
     differing = other.disagreements
     if not differing:
         geometry = other.name == "geometry"

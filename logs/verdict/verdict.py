@@ -14,7 +14,7 @@ from logs.verdict.document import (
     level_document,
     parameters_document,
 )
-from logs.verdict.findings import BESIDE_FLIGHT, Finding, left_open
+from logs.verdict.findings import APART_FROM_FLIGHT, Finding, undecided_findings
 from logs.verdict.junit import junit_text
 from logs.verdict.notebook import verdict_html
 from logs.verdict.places import DecidingParameter, LevelAnswer
@@ -24,26 +24,26 @@ from world.extras import need_extra
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Verdict:
-    """Whether a plan really flies.
+    """The answer to the question whether a plan really flies, with a finding for every rule and place.
 
     flyable: complete, and no finding failed.
-    complete: the plan was feasible, flown to its end, and recorded whole (at the geometric level: feasible, or a
+    complete: the plan was feasible, flown to its end, and recorded in full (at the geometric level: feasible, or a
     mission that a person brought).
-    lines: the summary for a person, of which the first, the headline, answers the question.
+    lines: the summary for a person; its first line, the headline, answers the question.
     level: "flown", "geometric" (from the envelope, without a flight) or "plan" (no feasible plan, so nothing was
     flown).
-    levels: what each level says that was asked, geometry first, the verdict's own last; none of a plan that was not
-    flown.
-    deciding: the autopilot's parameter that decides, where the flight fails by one and the aircraft passes.
-    notes: what is not flown as the mission has it; the lines say it too.
-    leg_ends: of a flown verdict, when the flight passed each waypoint between its ends, s, and inf from the first that
-    it did not get to; empty where too little was recorded to tell.
-    program: of a flown verdict, the real autopilot that flew, None where none did.
-    parameters: of a flown verdict, those of the ArduPlane that flew, by its law or itself; None where none did.
-    unjudged: what was not judged, so that the flight is not flyable although nothing failed; "" for nothing: items that
-    the log of an imported flight lacks, its end, or slopes that the aircraft is not known well enough for.
-    imported: of a flight that another program logged, which was flown as planned or was not.
-    conditions: what it is for: aircraft, speed, weather, navigation, autopilot, ground; the lines say it too.
+    levels: the answers of the levels that were asked, geometry first, the verdict's own last; empty for a plan that was
+    not flown.
+    deciding: the autopilot's parameter that decides, if the flight fails by one parameter and the aircraft passes.
+    notes: items that are not flown as the mission states them; the lines name them too.
+    leg_ends: times (s) at which the flight passed each waypoint between its ends, inf from the first waypoint that it
+    did not reach; empty if too little was recorded.
+    program: the SITL program that flew, or None.
+    parameters: the parameters of the autopilot that flew, or None.
+    unjudged: the part that was not judged, for which the flight is not flyable although nothing failed, or "": items
+    that the log of an imported flight lacks, its end, or slopes that the aircraft is not known well enough for.
+    imported: True for a flight that another program logged, which was flown as planned or was not.
+    conditions: aircraft, speed, weather, navigation, autopilot and ground of the verdict; the lines name them too.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
@@ -81,12 +81,12 @@ class Verdict:
 
     @property
     def undecided(self) -> bool:
-        """Whether nothing failed, and a part of the mission was not judged."""
+        """True if nothing failed, and a part of the mission was not judged."""
         return bool(self.unjudged) and not self.failed
 
     @property
     def flies(self) -> bool:
-        """Whether it is flyable, but for ways from and to the ground and returns that are left open beside the flight.
+        """True if the flight is flyable, apart from departure, approach and returns that are not decided.
 
         >>> from dataclasses import replace
         >>> from logs.verdict.findings import GROUND_WAY, make_finding
@@ -96,8 +96,8 @@ class Verdict:
         >>> verdict.flies, replace(verdict, complete=False).flies
         (True, False)
         """
-        beside = all(item.check in BESIDE_FLIGHT for item in left_open(self.findings))
-        return self.flyable or (self.complete and self.undecided and beside)
+        apart = all(item.check in APART_FROM_FLIGHT for item in undecided_findings(self.findings))
+        return self.flyable or (self.complete and self.undecided and apart)
 
     @property
     def headline(self) -> str:
@@ -131,14 +131,14 @@ class Verdict:
         return {name: finding for name, finding in closest.items() if finding is not None}
 
     def to_pandas(self) -> Any:
-        """A `pandas.DataFrame`: a row a finding, in the verdict's order, NaN for numbers that it has none of.
+        """Return a `pandas.DataFrame` with a row for each finding, in the verdict's order, and NaN for missing numbers.
 
         Columns: rule, place and index (of the leg, turn or threat), then as in `Finding`: planned, flown, limit,
         tolerance, margin, unit, limit_source, method, ok (None where it was not judged) and reason.
         Raises `planfly.MissingExtraError`, which is an ImportError, without the extra ``planfly[tables]``.
         """
         need_extra("tables", "to_pandas() needs")
-        # An extra: nobody else needs it.
+        # Imported here: pandas is an extra.
         import pandas as pd
 
         numbers = ("planned", "flown", "limit", "tolerance", "margin")
