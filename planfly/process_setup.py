@@ -12,8 +12,6 @@ _Given = TypeVar("_Given")
 _STACK_VALUES = 2**17
 # In the environment of a process that `prepare_process` set up, and so of those that it starts.
 _MARK = "PLANFLY_OWN_PROCESS"
-# In the environment of the one that a campaign's are forked from: its parent, which may be gone before it can ask.
-PARENT = "PLANFLY_FORKED_FOR"
 
 
 def prepare_process() -> None:
@@ -28,7 +26,7 @@ def prepare_process() -> None:
 
 
 def prepare_child() -> None:
-    """Collect garbage seldom in a process that one of planfly's own started, a campaign's worker or planner.
+    """Collect garbage seldom in a process that one of planfly's own started, such as a campaign's worker.
 
     A sixth of what a short campaign takes went into looking for garbage in its processes.  Where address space is
     limited, import nothing that does not fit (`world.address_space`).

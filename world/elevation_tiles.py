@@ -22,6 +22,8 @@ from world.raster_file import RasterFile, is_ground, moved_grid
 
 # Bytes of a virtual raster at most.
 _MAX_BYTES = 4 * 2**20
+# Elements by which a virtual raster makes other heights of those of its files.
+_COMPUTING = ("ScaleRatio", "ScaleOffset", "LUT", "Kernel", "PixelFunctionType")
 # Pixels by which a tile may lie off the grid of the first.
 OFF_GRID = 0.01
 
@@ -63,9 +65,10 @@ def _virtual_files(path: Path) -> list[Path]:
     sources = [element for element in root.iter("SourceFilename") if element.text]
     if root.tag != "VRTDataset" or not sources:
         raise TerrainError(f"{path}: not a virtual raster of other files: SourceFilename is missing", file=path)
-    if root.get("subClass") is not None:
-        message = f"{path}: a {root.get('subClass')} computes its pixels: only a mosaic of files is read"
-        raise TerrainError(message, file=path)
+    for element in root.iter():
+        computes = element.get("subClass") or (element.tag if element.tag in _COMPUTING else None)
+        if computes is not None:
+            raise TerrainError(f"{path}: {computes} computes its pixels: only a mosaic of files is read", file=path)
     found, folder = [], os.path.normpath(path.parent.absolute())
     for element in sources:
         name = str(element.text).strip()

@@ -37,8 +37,9 @@ EXTRAS = {
             "campaigns",
             "campaigns need",
             "`planfly campaign` and `planfly winds`",
-            ("cryptography", "dask", "distributed", "scipy"),
+            ("scipy",),
         ),
+        Extra("cluster", "a cluster needs", "`--scheduler` of `campaign` and `winds`", ("dask", "distributed")),
         Extra(
             "live",
             "MAVLink needs",

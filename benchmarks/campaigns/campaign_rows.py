@@ -14,13 +14,13 @@ from typing import Any
 
 from benchmarks.campaigns.client_memory import client_memory
 from benchmarks.campaigns.compare_step_rates import compare_all
-from benchmarks.campaigns.tls_cost import tls_cost
 from benchmarks.campaigns.winds_reference import winds_row
 from flight.simulation.simulate import Flight, fly_to_end
 from planfly.campaigns.campaign_base import CampaignBase, open_campaign, vary
 from planfly.campaigns.dispersions import default_dispersions, draw_flight
+from planfly.campaigns.flight_requests import FlightRequest
 from planfly.campaigns.flight_row import fly_one
-from planfly.campaigns.worker_pool import FlightRequest, Workers, worker_pool
+from planfly.campaigns.worker_pool import Workers, worker_pool
 from world.scenario import Scenario, load_scenario, with_wind
 
 FLIGHTS, ROUNDS = 90, 3
@@ -103,7 +103,6 @@ def run(most: int = FLIGHTS, *, whole: bool = False) -> dict[str, Any]:
             "flights a minute, 13 km, two workers": statistics.median(two),
             "two workers / one": statistics.median(a / b for a, b in zip(two, one, strict=True)),
             "a campaign's flight / simulate alone": over_simulate(base, min(20, most)),
-            **tls_cost(base, ROUNDS, most),
             f"--prove {share} on the demo: flights": flights,
             f"--prove {share} on the demo: seconds": seconds,
         }

@@ -18,7 +18,7 @@ from planfly.campaigns.flight_row import STATIONS, FlightRow
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.report import finish_campaign
 from planfly.campaigns.statistics.decision import Goal
-from planfly.campaigns.worker_pool import Workers, in_own_process
+from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.made_campaigns import made_flight
 
 # Waypoints whose crossings a row of the demo holds.
@@ -36,7 +36,7 @@ def large_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) 
 
 def lead(flights: int, folder: Path) -> None:
     """Lead a campaign of so many flights, from its first to its report."""
-    base = in_own_process(open_campaign, "jacksboro-air", default_dispersions(), seed=1)
+    base = open_campaign("jacksboro-air", default_dispersions(), seed=1)
     goal = Goal(None, False, flights, 0.95)
     with open_store(base, goal, folder, resume=False) as store:
         estimate = fly_campaign(base, goal, Workers(1), store, fly=large_flight)

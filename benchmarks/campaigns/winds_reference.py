@@ -35,9 +35,10 @@ from benchmarks.campaigns.sobol_samples import SOBOL_FLIGHTS, fly_sobol
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, open_campaign
 from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, find_winds, open_winds_store
+from planfly.campaigns.flight_requests import FlightRequest, FlyOne
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.statistics.decision import Estimator, Goal, Tally
-from planfly.campaigns.worker_pool import FlightRequest, FlyOne, Workers, worker_pool
+from planfly.campaigns.worker_pool import Workers, worker_pool
 
 REFERENCE = Path(__file__).parents[2] / "tests" / "authorities" / "winds_reference.json"
 GOAL = WindsGoal(0.99, 0.95, 16, 20.0, 5000)

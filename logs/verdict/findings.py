@@ -8,20 +8,20 @@ from logs.verdict.places import Place, Suggestion
 from logs.verdict.wording import place_text, suggestions_text
 from world.json_schema import DocumentConfig
 
-# The check of a finding that is not judged because the aircraft is not known well enough.
+# Checks of findings that are not judged, so that the verdict is left open.
+# The aircraft is not known well enough.
 UNKNOWN_AIRCRAFT = "unknown aircraft"
-# And of one whose way a flight tells, and geometry does not.
+# Only a flight shows the flown path.
 UNKNOWN_WAY = "unknown way"
-# And of a way from the ground or to it that may not be free.
+# The path from the ground or to it may not be free.
 GROUND_WAY = "ground way"
-# And of an item that changes the flight path and is not flown as the autopilot would, or of parameters that contradict
-# one another, where nothing is flown.
+# An item that changes the flight path is not flown as the autopilot would fly it, or parameters contradict one another.
 NOT_FLOWN = "not flown"
-# And of returns or glides that a scenario requires, which are not known well enough.
+# Returns or glides that a scenario requires are not known well enough.
 UNKNOWN_RETURN = "unknown return"
-# What stands beside the flight and no flight shows: a flight may go well all the same.
-BESIDE_FLIGHT = (GROUND_WAY, UNKNOWN_RETURN)
-_OPEN = (UNKNOWN_AIRCRAFT, UNKNOWN_WAY, NOT_FLOWN, *BESIDE_FLIGHT)
+# Checks that no flight shows: a flight may pass all the same.
+APART_FROM_FLIGHT = (GROUND_WAY, UNKNOWN_RETURN)
+_UNDECIDED = (UNKNOWN_AIRCRAFT, UNKNOWN_WAY, NOT_FLOWN, *APART_FROM_FLIGHT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,9 +85,9 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A statement of a rule: in full, and how it begins, which is what a headline takes.
+    """A message of a rule: the full text, and its brief beginning for a headline.
 
-    placed: whether it begins with the finding's place.
+    placed: True if the message begins with the finding's place.
     """
 
     text: str
@@ -96,7 +96,7 @@ class Message:
 
 
 def message(brief: str, more: str = "", *, placed: bool = False) -> Message:
-    """Make a statement of its beginning and the rest.
+    """Make a message from its brief beginning and the rest.
 
     >>> message("overshoots its arc by 8 m", " (at most 5 m)").text
     'overshoots its arc by 8 m (at most 5 m)'
@@ -104,20 +104,21 @@ def message(brief: str, more: str = "", *, placed: bool = False) -> Message:
     return Message(brief + more, brief, placed)
 
 
-def left_open(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """The findings that are not judged because the aircraft or a way is not known well enough.
+def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return the findings that leave the verdict open: the aircraft or a path is not known well enough.
 
-    >>> left_open([make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)])[0].place.index
-    1
+    >>> slope = make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)
+    >>> undecided_findings([slope]) == (slope,)
+    True
     """
-    return tuple(item for item in findings if item.ok is None and item.check in _OPEN)
+    return tuple(item for item in findings if item.ok is None and item.check in _UNDECIDED)
 
 
 def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:
-    """Of one rule's findings the failed one that is furthest beyond its limit, else the one closest to it.
+    """Return the failed finding of a rule that is furthest beyond its limit, else the finding closest to its limit.
 
-    A finding that fails by other evidence than its number has no margin and comes after failed ones that have one.
-    None where nothing was judged by a number.
+    A finding that fails by other evidence than its number has no margin and is ranked after failed findings with one.
+    None if no finding failed or was judged by a number.
 
     >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
     >>> failed = make_finding("slope", Place("leg", 2), ok=False, reason="too slow", margin=5.0)
@@ -185,7 +186,7 @@ def _plain(value: float | None) -> float | None:
 
 
 def badness(item: Finding) -> tuple[int, float]:
-    """Order of findings from the worst: failed, open, passed, and by margin.
+    """Return the sort key of a finding, the worst first: failed, not judged, passed, and by margin.
 
     >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
     >>> badness(near) < badness(far)
@@ -195,7 +196,7 @@ def badness(item: Finding) -> tuple[int, float]:
 
 
 def reason_of(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
-    """Faults with the facts in brackets after them, or the facts alone.
+    """Join faults with the facts in brackets after them, or return the facts alone.
 
     >>> reason_of([message("bank 40.0° beyond 35.0°")], ["turns 62.0°", "radius 76 m"])
     'bank 40.0° beyond 35.0° (turns 62.0°; radius 76 m)'

@@ -1,7 +1,7 @@
-"""Judge whether a flight shows that its plan is flyable.
+"""Is this flight evidence that its plan is flyable?  Every number is worked out again from the track.
 
-Every number is computed again from the track.  Records of guidance (leg, cross-track, height error, clearance) and
-recorded verdicts are not read.
+What guidance noted about itself (leg, cross-track, height error, clearance) and any verdict that was recorded are
+not read.
 """
 
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.conditions import setup_conditions
-from logs.verdict.findings import Finding, left_open
+from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.imported.judge_imported_flight import judge_imported_flight
 from logs.verdict.judge_geometry import (
     deciding_items,
@@ -42,12 +42,11 @@ def judge_flight(
 ) -> Verdict:
     """Judge a flown track: level "flown".
 
-    Any track is judged, however short or damaged: missing data makes the verdict incomplete.  A track without a row is
-    a flight that never began: its route is judged, level "geometric".  An imported flight is judged as far as its log
-    goes.
+    Any track is judged, however short or damaged: what cannot be known makes it incomplete.  One without a row is a
+    flight that never began: its route is judged, level "geometric".  An imported one is judged as far as its log goes.
 
-    ended: how the flight ended, "completed" or the reason for its end.  log_complete: the record has its end.
-    envelope: False to ignore the aircraft's envelope and judge by the flown evidence alone.
+    ended: how the flight ended, "completed" or what stopped it.  log_complete: the record has its end.
+    envelope: whether the aircraft's envelope counts beside what the flight showed, and not that alone.
     reference: the results of reference flights.  requirements: the setup's route requirements if already known.
 
     >>> from aircraft.catalog import find_aircraft
@@ -95,35 +94,34 @@ def judge_flight(
 def _levels(
     requirements: RouteRequirements, flown: tuple[Finding, ...], flyable: bool, reference: ReferenceFlights | None
 ) -> tuple[LevelAnswer, ...]:
-    """Return the answers of geometry and of the reference flight, and the flight's own answer.
+    """What geometry and the airframe's reference flight say, where each differs, and the flight's own answer.
 
-    The first two come with their disagreements with the flight.  Without the envelope there is the flight's own answer
-    alone.
+    Without the envelope there is the flight's own answer alone.
     """
     levels, source = [], requirements.setup.envelope.source
     if requirements.envelope:
         predicted = (*deciding_items(requirements.setup), *geometric_findings(requirements, flown))
         fails = any(item.ok is False for item in predicted)
-        passes = not fails and not left_open(predicted)
-        differing = _disagreements("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
+        passes = not fails and not undecided_findings(predicted)
+        differing = _differing("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
         said = headline(predicted, passes, source)
         levels.append(LevelAnswer("geometry", passes, said, differing, undecided=not passes and not fails))
     if requirements.envelope and reference is not None and reference.airframe is not None:
         airframe = reference.airframe
         passed = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}
-        differing = _disagreements("airframe", passed, flown)
-        # Not flyable without a failed finding means undecided.
+        differing = _differing("airframe", passed, flown)
+        # What is not flyable although nothing of it failed was left open.
         unsure = not airframe.flyable and not airframe.failed
         levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing, undecided=unsure))
-    undecided = bool(left_open(flown)) and not any(item.ok is False for item in flown)
+    undecided = bool(undecided_findings(flown)) and not any(item.ok is False for item in flown)
     own = LevelAnswer(flown_level(requirements.setup), flyable, headline(flown, flyable, source), undecided=undecided)
     return (*levels, own)
 
 
-def _disagreements(
+def _differing(
     level: str, outcomes: Mapping[tuple[str, Place], bool | None], flown: tuple[Finding, ...]
 ) -> tuple[Disagreement, ...]:
-    """Return the places where a level and the flight judge differently, in the level's order."""
+    """Where a level and the flight judge differently, in the level's order."""
     judged = {(item.rule, item.place): item.ok for item in flown}
     out = []
     for (rule, place), there in outcomes.items():

@@ -1,4 +1,4 @@
-"""Judge without a flight: a route, a flight that never began, and a plan that was not feasible."""
+"""Verdicts without a flight: of a route, of a flight that never began, and of a plan that was not feasible."""
 
 import math
 from collections.abc import Sequence
@@ -12,10 +12,10 @@ from logs.verdict.findings import (
     UNKNOWN_AIRCRAFT,
     Finding,
     badness,
-    left_open,
     make_finding,
     message,
     reason_of,
+    undecided_findings,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -32,51 +32,51 @@ from planner.plan import Plan, Violation
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """Return findings on the mission's items alone, for any autopilot."""
+    """Findings of the mission's items alone, whoever flies them."""
     return [item for rule in RULES.values() if rule.judge_items is not None for item in rule.judge_items(setup)]
 
 
 def deciding_items(setup: FlightSetup) -> list[Finding]:
-    """Return findings on a mission's items that fail or are undecided.
+    """Return what of a mission fails or stays open by its items alone.
 
-    The items of a plan are planfly's own, so only PX4's requirements on them are checked.
+    Items of a plan are planfly's own, but for what PX4 asks of them.
     """
-    rule_findings = setup.plan is None or setup.autopilot.refuses
-    found = mission_findings(setup) if rule_findings else []
-    return [item for item in found if item.ok is False or left_open([item])]
+    asked = setup.plan is None or setup.autopilot.refuses
+    found = mission_findings(setup) if asked else []
+    return [item for item in found if item.ok is False or undecided_findings([item])]
 
 
 def geometric_findings(requirements: RouteRequirements, flown: Sequence[Finding] | None = None) -> tuple[Finding, ...]:
-    """Return findings on a route's geometry against the aircraft's envelope.
+    """Findings of a route's geometry against the aircraft's envelope.
 
-    flown: findings of its flight, which are reused for rules that give the same result for both.
+    flown: those of its flight, from which rules that say the same of both are taken.
     """
-    return _judge_by_rules(requirements, None, (), geometric=True, flown=flown)
+    return _judged(requirements, None, (), geometric=True, flown=flown)
 
 
 def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
-    """Return the `geometric_findings` on legs, corners, threats or zones."""
-    return _judge_by_rules(requirements, None, (), geometric=True, whole=False)
+    """Those of `geometric_findings` that say something of legs, corners, threats or zones."""
+    return _judged(requirements, None, (), geometric=True, whole=False)
 
 
 def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
-    """Return findings on a flown track against its route and the envelope, except on how the flight ended."""
-    return (*deciding_items(requirements.setup), *_judge_by_rules(requirements, aligned, (), geometric=False))
+    """Findings of a flown track against its route and the aircraft's envelope, but for how the flight ended."""
+    return (*deciding_items(requirements.setup), *_judged(requirements, aligned, (), geometric=False))
 
 
 def flown_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
 ) -> tuple[Finding, ...]:
-    """Return findings on a flight: on its track, and on how it ended.
+    """Findings of a flight: of its track, and of how it ended.
 
-    ended: "completed" or the reason for its end.  log_complete: the record has its end.
+    ended: "completed" or what stopped it.  log_complete: the record has its end.
     """
     ends = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
     at_end = tuple(item for judge in ends for item in judge(requirements, aligned, ended, log_complete))
-    return (*deciding_items(requirements.setup), *_judge_by_rules(requirements, aligned, at_end, geometric=False))
+    return (*deciding_items(requirements.setup), *_judged(requirements, aligned, at_end, geometric=False))
 
 
-def _judge_by_rules(
+def _judged(
     requirements: RouteRequirements,
     aligned: AlignedTrack | None,
     at_end: Sequence[Finding],
@@ -85,12 +85,12 @@ def _judge_by_rules(
     whole: bool = True,
     flown: Sequence[Finding] | None = None,
 ) -> tuple[Finding, ...]:
-    """Return the findings of all rules, then the findings on how the flight ended, merged.
+    """Findings of all rules, and then those of how the flight ended, merged.
 
-    whole: True to include rules that judge the flight as a whole.  flown: as in `geometric_findings`.
+    whole: whether those count that judge the flight as one.  flown: as of `geometric_findings`.
     """
 
-    def rule_findings(rule: Rule, judge: Judge) -> Sequence[Finding]:
+    def asked(rule: Rule, judge: Judge) -> Sequence[Finding]:
         if rule.of_route and flown is not None:
             return [item for item in flown if item.rule == rule.name]
         return judge(requirements, aligned, geometric=geometric)
@@ -99,7 +99,7 @@ def _judge_by_rules(
         item
         for rule in RULES.values()
         if rule.judge is not None and (whole or not rule.whole)
-        for item in rule_findings(rule, rule.judge)
+        for item in asked(rule, rule.judge)
     )
     findings = (*findings, *at_end)
     for rule in RULES.values():
@@ -110,12 +110,12 @@ def _judge_by_rules(
     return findings
 
 
-# Rules that judge positions, and so depend on the side to which a reversal is turned.
+# Rules that judge where the aircraft is, and so depend on the side that a reversal is turned to.
 _RULES_OF_PLACE = ("clearance", "threat", "fence")
 
 
 def _other_sides(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
-    """Return undecided findings for course reversals that can be turned to either side, if one side fails.
+    """Return what stays open because a reversal of the course can be turned to either side and one side fails.
 
     A flight shows one side.  The navigation error of the day decides which: of 12 ArduPlane flights through a turn of
     180 degrees, 4 turned left.
@@ -146,7 +146,7 @@ def _other_sides(requirements: RouteRequirements, findings: Sequence[Finding]) -
 
 
 def one_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Reduce findings: keep the worst of each rule at the corners of one stop, or at its legs.
+    """Findings with those of a rule at the corners of one stop, or at its legs, replaced by the worst of them.
 
     >>> from logs.verdict.places import Place
     >>> legs = [Place("leg", k, to_item=4, number=2) for k in (2, 3, 4)]
@@ -168,17 +168,17 @@ def one_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 def with_suggestions(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Fill in ``suggestions`` of every failed or undecided finding that a change of the plan could fix.
+    """Fill in ``suggestions`` of every failed finding that a change of the plan could mend, and of what is left open.
 
-    The path of a return to launch is the autopilot's: its legs cannot be changed.
+    The way of a return to launch is the autopilot's: no change of its legs can be made.
     """
     out, first = [], requirements.setup.route.return_from
     last = min(requirements.legs, requirements.setup.route.return_until)
     back = {requirements.leg(i) for i in range(first, last)} if first >= 0 else set()
     for item in findings:
         suggest = RULES[item.rule].suggest
-        rule_findings = item.ok is False or (item.ok is None and item.check == UNKNOWN_AIRCRAFT)
-        if rule_findings and suggest is not None and item.place not in back:
+        asked = item.ok is False or (item.ok is None and item.check == UNKNOWN_AIRCRAFT)
+        if asked and suggest is not None and item.place not in back:
             item = replace(item, suggestions=suggest(requirements, aligned, item))
         out.append(item)
     return tuple(out)
@@ -235,14 +235,15 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
 
 
 def flown_level(setup: FlightSetup) -> LevelName:
-    """Return the level that a flight of a setup answers."""
+    """The level that a flight of a setup answers."""
     return setup.autopilot.level
 
 
 def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: bool = True) -> Verdict:
-    """Judge a flight without rows: its route's geometry, and why nothing was flown; never complete.
+    """Judge a flight of which there is no row: its route's geometry, and why nothing was flown; never complete.
 
-    ended: the reason.  log_complete: the record has its end.
+    ended: why not.  log_complete: the record has its end.
+
     >>> from logs.recording.example_log import example_log
     >>> verdict = judge_unflown(route_requirements(example_log().setup), "not started: no way made against the wind")
     >>> verdict.level, verdict.headline
@@ -268,7 +269,7 @@ def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: 
 def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict:
     """Judge a run that found no feasible plan, so that nothing was flown: level "plan", never complete.
 
-    conditions: the conditions of the plan.
+    conditions: what it was planned for.
 
     >>> import numpy as np
     >>> from planner.plan import Certificate

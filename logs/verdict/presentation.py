@@ -1,4 +1,4 @@
-"""Order a verdict for display: by rule, the failed findings first, and the undecided findings.
+"""A verdict in the order in which it is shown: by rule, the failed findings first, and the findings that leave it open.
 
 Terminal, report page, notebook, studio and JUnit read a `Presentation`, which `logs.verdict.verdict.Verdict.present`
 makes.  It holds data; `logs.verdict.wording` makes words of places and suggestions.
@@ -7,7 +7,7 @@ makes.  It holds data; `logs.verdict.wording` makes words of places and suggesti
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from logs.verdict.findings import Finding, closest_to_limit, left_open
+from logs.verdict.findings import Finding, closest_to_limit, undecided_findings
 from logs.verdict.rule_words import RULE_WORDS, RuleWords
 
 
@@ -63,16 +63,16 @@ class Presentation:
         return tuple(sorted(failed, key=lambda rule: -rule.words.urgency))
 
     @property
-    def left_open(self) -> tuple[Finding, ...]:
-        """The findings that are not judged, so that the verdict is left open."""
-        return left_open(self.findings)
+    def undecided(self) -> tuple[Finding, ...]:
+        """The findings that leave the verdict open."""
+        return undecided_findings(self.findings)
 
     def worth_listing(self, most: int) -> list[tuple[int, Finding]]:
-        """List findings with their numbers: failed or undecided ones, then the closest to its limit by rule.
+        """List findings with their numbers: those that failed or are left open, then the closest to its limit by rule.
 
         most: number of failed and open findings at most.
         """
-        is_open = {id(item) for item in self.left_open}
+        is_open = {id(item) for item in self.undecided}
         closest = {id(rule.closest) for rule in self.rules}
         numbered = list(enumerate(self.findings))
         first = [(k, item) for k, item in numbered if item.ok is False or id(item) in is_open]

@@ -1,4 +1,4 @@
-"""Summarize the verdict in a line, with the facts that a reader needs next to it."""
+"""The summary of a verdict: the headline, and the lines that a reader should know with it."""
 
 import math
 from collections.abc import Sequence
@@ -6,43 +6,48 @@ from collections.abc import Sequence
 from flight.autopilots.parameter_files import LONGEST_NAME
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line
-from logs.verdict.findings import BESIDE_FLIGHT, NOT_FLOWN, UNKNOWN_AIRCRAFT, UNKNOWN_WAY, Finding, left_open
+from logs.verdict.findings import (
+    APART_FROM_FLIGHT,
+    NOT_FLOWN,
+    UNKNOWN_AIRCRAFT,
+    UNKNOWN_WAY,
+    Finding,
+    undecided_findings,
+)
 from logs.verdict.measures.mission_ends import missing_ends_text
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule_words import RULE_WORDS, RuleWords
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
 
-# Largest number of failed findings in the first line.
-_MAX_NAMED = 4
-# Introductions of the other levels.
-_LEVEL_INTRODUCTIONS = {
+# Failed findings that the first line names.
+_NAMED = 4
+# How the other levels are introduced.
+_LEVELS = {
     "geometry": "By geometry alone",
     "airframe": "By the airframe (planfly's guidance, exact navigation)",
 }
 
 
 def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> str:
-    """Return the first line: the answer, and what failed, was not judged, or only just passed.
+    """Write the first line: the answer, and what failed, was not judged or only just passed.
 
-    source: the data from which an uncertain aircraft model was made.
+    source: the source of the aircraft's model, if the model is uncertain.
     """
     whose = [f"an aircraft from {source}"] if source else []
     if flyable:
-        silent = [_not_judged(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
+        silent = [_unjudged_text(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
         return "; ".join(["flyable", *filter(None, silent), *_near_miss_notes(findings), *whose])
-    failed = _sorted_failures(findings)
+    failed = _failed(findings)
     if not failed and (open_text := undecided_text(findings)):
         return "; ".join([f"not judged in full: {open_text}", *whose])
-    named = _headline_failures(failed)
+    named = _most_telling(failed)
     more = len(failed) - len(named)
     text = "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
     return "; ".join([text, *whose])
 
 
 def undecided_text(findings: Sequence[Finding]) -> str:
-    """Return what is undecided, "" for nothing.
-
-    By an uncertain aircraft, by paths that only a flight shows, or by hazards.
+    """Describe what leaves the verdict open, or return "" for nothing.
 
     >>> from logs.verdict.findings import UNKNOWN_AIRCRAFT, make_finding
     >>> from logs.verdict.places import Place
@@ -50,22 +55,22 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     >>> undecided_text([make_finding("slope", leg, ok=None, reason="", check=UNKNOWN_AIRCRAFT) for leg in legs])
     'slopes on leg 0, to item 1, and leg 1, to item 2, are within what is not known of the aircraft'
     """
-    open_findings = left_open(findings)
+    open_findings = undecided_findings(findings)
     ways = [
         f"{'the turn-around on' if item.place.kind == 'leg' else 'the circle at'} {place_text(item.place)}"
         for item in open_findings
         if item.check == UNKNOWN_WAY
     ]
-    circles = f"where {' and '.join(ways[:_MAX_NAMED])} is flown, only a flight tells" if ways else ""
-    known = _unknown_of_aircraft([item for item in open_findings if item.check == UNKNOWN_AIRCRAFT])
-    beside = [item.brief for item in open_findings if item.check in BESIDE_FLIGHT]
+    circles = f"where {' and '.join(ways[:_NAMED])} is flown, only a flight tells" if ways else ""
+    known = _unknown_aircraft_text([item for item in open_findings if item.check == UNKNOWN_AIRCRAFT])
+    beside = [item.brief for item in open_findings if item.check in APART_FROM_FLIGHT]
     items = [item.brief for item in open_findings if item.check == NOT_FLOWN]
-    more = [f"{len(items) - _MAX_NAMED} more items"] if len(items) > _MAX_NAMED else []
-    return "; ".join(filter(None, [known, circles, *items[:_MAX_NAMED], *more, *beside]))
+    more = [f"{len(items) - _NAMED} more items"] if len(items) > _NAMED else []
+    return "; ".join(filter(None, [known, circles, *items[:_NAMED], *more, *beside]))
 
 
-def _unknown_of_aircraft(every: Sequence[Finding]) -> str:
-    """Return which findings are undecided by uncertainty about the aircraft, in words; "" for nothing."""
+def _unknown_aircraft_text(every: Sequence[Finding]) -> str:
+    """Describe the findings for which the aircraft is not known well enough, or return "" for none."""
     found = [item for item in every if item.rule == "slope"]
     if len(found) < len(every):
         speeds = sum(item.rule == "speed" for item in every)
@@ -81,7 +86,7 @@ def _unknown_of_aircraft(every: Sequence[Finding]) -> str:
         return f"{listed} {are} within what is not known of the aircraft"
     if not found:
         return ""
-    if len(found) > _MAX_NAMED:
+    if len(found) > _NAMED:
         return f"slopes on {len(found)} legs are within what is not known of the aircraft"
     places = [place_text(item.place) + ("," if item.place.to_item is not None else "") for item in found]
     slopes, are = ("slopes", "are") if len(found) > 1 else ("slope", "is")
@@ -89,7 +94,7 @@ def _unknown_of_aircraft(every: Sequence[Finding]) -> str:
 
 
 def first_failed(findings: Sequence[Finding]) -> Finding | None:
-    """Return the failed finding that the first line names first, or None if nothing failed.
+    """Return the failed finding that the headline names first, or None if nothing failed.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import FLIGHT
@@ -98,19 +103,19 @@ def first_failed(findings: Sequence[Finding]) -> Finding | None:
     >>> first.rule
     'completion'
     """
-    failed = _sorted_failures(findings)
-    return _headline_failures(failed)[0] if failed else None
+    failed = _failed(findings)
+    return _most_telling(failed)[0] if failed else None
 
 
-def _sorted_failures(findings: Sequence[Finding]) -> list[Finding]:
-    """Return failed findings: first those that end a flight, then those a change of plan can fix."""
+def _failed(findings: Sequence[Finding]) -> list[Finding]:
+    """Return the failed findings by urgency, and in the order of the rules."""
     order = {name: k for k, name in enumerate(RULE_WORDS)}
     failed = (item for item in findings if item.ok is False)
     return sorted(failed, key=lambda item: (-RULE_WORDS[item.rule].urgency, order[item.rule]))
 
 
-def _not_judged(findings: Sequence[Finding], rule: RuleWords) -> str:
-    """Return how much of a rule was not judged, in words; "" for nothing."""
+def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
+    """Describe what of a rule was not judged, or return "" for nothing."""
     mine = [item for item in findings if item.rule == rule.name]
     silent = sum(item.ok is None for item in mine)
     if not silent:
@@ -119,7 +124,7 @@ def _not_judged(findings: Sequence[Finding], rule: RuleWords) -> str:
 
 
 def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
-    """Return notes on threats that the aircraft missed by less than its navigation error."""
+    """Name each threat that the aircraft missed by less than its navigation error."""
     out = []
     for item in findings:
         facts = {fact.what: fact.value for fact in item.facts if item.rule == "threat" and item.ok}
@@ -128,20 +133,20 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
     return out
 
 
-def _headline_failures(failed: list[Finding]) -> list[Finding]:
-    """Return at most four findings: the worst of each rule before the second worst of any."""
+def _most_telling(failed: list[Finding]) -> list[Finding]:
+    """Return at most four findings: the worst of each rule before the second worst of any rule."""
     margins = [0.0 if item.margin is None else item.margin for item in failed]
     by_margin = sorted(range(len(failed)), key=margins.__getitem__)
     count: dict[str, int] = {}
     rank = {}
     for k in by_margin:
         rank[k] = count[failed[k].rule] = count.get(failed[k].rule, 0) + 1
-    chosen = sorted(range(len(failed)), key=lambda k: (rank[k], k))[:_MAX_NAMED]
+    chosen = sorted(range(len(failed)), key=lambda k: (rank[k], k))[:_NAMED]
     return [failed[k] for k in sorted(chosen)]
 
 
 def _phrase(item: Finding) -> str:
-    """Describe one failed finding in a few words."""
+    """Describe a failed finding in a few words."""
     words = RULE_WORDS[item.rule]
     return words.phrase(words.word, item)
 
@@ -154,9 +159,9 @@ def summary_lines(
     conditions: Conditions,
     deciding: DecidingParameter | None = None,
 ) -> tuple[str, ...]:
-    """Return the summary: answer, airframe or autopilot, start, conditions, not judged, levels.
+    """Write the summary: answer, airframe or autopilot, start, conditions, autopilot, what was not judged, levels.
 
-    levels: the verdict's own level last, with the headline.
+    levels: the verdict's own last, with the headline.
     """
     *others, own = levels
     lines = [own.headline, *_airframe_or_autopilot_lines(levels, deciding, setup)]
@@ -169,7 +174,7 @@ def summary_lines(
         if item.ok is None and RULE_WORDS[item.rule].explained:
             silent.setdefault(item.rule, item.reason)
     lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in silent.items()]
-    # Limits of the PX4 autopilot alone, which say nothing about the aircraft.
+    # Limits of that autopilot's own, which say nothing of the aircraft.
     lines += [
         f"PX4 would not take it: {item.reason}"
         for item in findings
@@ -192,19 +197,19 @@ def summary_lines(
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
     for other in others:
         agreement = f"; {_agreement(other)}" if level == "flown" else ""
-        lines.append(f"{_LEVEL_INTRODUCTIONS[other.name]}: {other.headline}{agreement}")
+        lines.append(f"{_LEVELS[other.name]}: {other.headline}{agreement}")
     return tuple(lines)
 
 
 def _airframe_or_autopilot_lines(
     levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, setup: FlightSetup
 ) -> list[str]:
-    """If the airframe can fly the mission but the autopilot cannot, name the limiting parameter."""
+    """If the airframe can fly the mission but the autopilot cannot, say so and name the parameter that decides."""
     answers = {level.name: level.flyable for level in levels}
     if answers.get("autopilot") is not False or not answers.get("airframe") or levels[-1].undecided:
         return []
     whose = "" if setup.autopilot.parameters is None else " with these parameters"
-    # Other parameters are flown by the simulated control law, even if the real autopilot flew.
+    # Other parameters are flown by the law, whoever flew.
     by_law = setup.autopilot.program is not None
     why = "" if by_law or not whose else ": no single parameter that was tried would pass"
     if deciding is not None:
@@ -213,9 +218,9 @@ def _airframe_or_autopilot_lines(
 
 
 def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
-    """Return the origin of the parameters, if a file states any, and which of the file's are not used.
+    """Describe the source of the parameters if a file states any, and the names in the file that have no effect.
 
-    Without a flight only errors in the file are reported.
+    Without a flight only what is wrong with the file is said.
     """
     parameters = setup.autopilot.parameters
     if parameters is None or not parameters.source:
@@ -228,7 +233,7 @@ def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
     by_length = sorted(parameters.unused, key=lambda name: len(name) <= LONGEST_NAME)
     unused = [
         name if len(name) <= LONGEST_NAME else f"{name} (longer than {LONGEST_NAME} characters)"
-        for name in by_length[:_MAX_NAMED]
+        for name in by_length[:_NAMED]
     ]
     more = len(parameters.unused) - len(unused)
     said = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
@@ -245,7 +250,7 @@ def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
 
 
 def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
-    """Return a line if the autopilot has no parameter for a return setting of the scenario."""
+    """Name the settings of the scenario's returns for which the autopilot has no parameter."""
     returns, parameters = setup.scenario.returns, setup.autopilot.parameters
     if returns is None or returns.rtl_autoland is None or parameters is None or hasattr(parameters, "rtl_autoland"):
         return []
@@ -253,7 +258,7 @@ def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
 
 
 def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """Return the lowest clearance less the terrain's stated error, if one is stated."""
+    """Subtract the terrain's stated error, if any, from the lowest clearance."""
     error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
     heights = [
         item.planned if item.flown is None else item.flown
@@ -270,10 +275,10 @@ def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> lis
 
 
 def _agreement(other: LevelAnswer) -> str:
-    """Return where the verdict and another level differ, in words."""
+    """Describe where the verdict and another level differ."""
     differing = other.disagreements
     if not differing:
         geometry = other.name == "geometry"
         return "flight and geometry agree on every finding that both have" if geometry else "both flights agree"
-    more = f", +{len(differing) - _MAX_NAMED} more" if len(differing) > _MAX_NAMED else ""
-    return "; ".join(map(disagreement_text, differing[:_MAX_NAMED])) + more
+    more = f", +{len(differing) - _NAMED} more" if len(differing) > _NAMED else ""
+    return "; ".join(map(disagreement_text, differing[:_NAMED])) + more

@@ -25,14 +25,14 @@ from planfly.campaigns.report import OutputDirectory, campaign_folder, finish_ca
 from planfly.campaigns.statistics.decision import Goal
 from planfly.campaigns.summary import summarise
 from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, read_table
-from planfly.campaigns.worker_pool import Workers, in_own_process
+from planfly.campaigns.worker_pool import Workers, checked_address
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH
 from planfly.open_mission import FencePaths, read_named_fences
 from planfly.stages import stage
 from planner.plan import Plan
 from world.errors import PlanflyError
-from world.extras import needs_extra
+from world.extras import need_extra, needs_extra
 from world.scenario_tables import Guidance, Navigation
 
 
@@ -65,7 +65,7 @@ class _Asked:
     def _opened(self, dispersions: Dispersions, planned: Path | None) -> CampaignBase:
         """The mission, planned if it is a scenario and there is no plan of it."""
         opened = partial(
-            in_own_process, open_campaign, self.target, dispersions, planned=planned, scenario_name=self.scenario,
+            open_campaign, self.target, dispersions, planned=planned, scenario_name=self.scenario,
             terrain=self.terrain, seed=self.seed, change=partial(changed_scenario, **self.flown),
             fences=read_named_fences(self.fence),
         )  # fmt: skip
@@ -96,6 +96,15 @@ def _asked(
 ) -> _Asked:
     world, ground = (None if name is None else str(name) for name in (scenario, terrain))
     return _Asked(target if isinstance(target, Plan) else str(target), world, ground, fence, seed, flown)
+
+
+def _workers(count: int | None, scheduler: str | None, seed: int | None) -> Workers:
+    """Return where to fly.  Raises PlanflyError, before anything is planned, for a scheduler that may not be used."""
+    check_arguments(workers=count, seed=seed)
+    if scheduler is not None:
+        checked_address(scheduler)
+        need_extra("cluster", "--scheduler needs")
+    return Workers(count, scheduler)
 
 
 def _dispersions(file: str | Path | None) -> Dispersions:
@@ -167,7 +176,7 @@ def campaign(
     ...
     world.errors.ArgumentError: prove 1.5: at least 0.5 and below 1 is expected
     """
-    check_arguments(workers=workers, seed=seed)
+    place_of_work = _workers(workers, scheduler, seed)
     goal = make_goal(flights, prove, at_least, confidence)
     asked = _asked(
         target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
@@ -178,7 +187,7 @@ def campaign(
             goal = continued_goal(place.folder, flights, prove, at_least, confidence)
         base = asked.open(_dispersions(spread), place)
         line = campaign_line(asked.name(place.folder), goal, asked.options(base, spread))
-        return _flown(base, goal, Workers(workers, scheduler), place, line, keep=out is not None)
+        return _flown(base, goal, place_of_work, place, line, keep=out is not None)
 
 
 def _flown(
@@ -304,7 +313,7 @@ def winds(
     world.errors.ArgumentError: directions 3: 4 to 72 is expected
     """
     check_arguments(prove=prove, confidence=confidence, directions=directions, most=most, flights=flights)
-    check_arguments(workers=workers, seed=seed)
+    place_of_work = _workers(workers, scheduler, seed)
     asked = _asked(
         target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
         turbulence=turbulence, at=at, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
@@ -314,7 +323,7 @@ def winds(
         goal = WindsGoal(prove, confidence, directions, most, asked_flights(flights, folder, resume=resume))
         base = asked.open(_dispersions(spread).without(ASKED), place)
         with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
-            found = find_winds(base, goal, Workers(workers, scheduler), store, advance)
+            found = find_winds(base, goal, place_of_work, store, advance)
         if out is not None:
             write_winds(folder, base, found, winds_line(asked.name(place.folder), goal, asked.options(base, spread)))
     return found

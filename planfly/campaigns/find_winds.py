@@ -11,10 +11,11 @@ from logs.verdict.conditions import Conditions
 from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.dispersions import standard_draws, standard_population
+from planfly.campaigns.flight_requests import FlightRequest, FlyOne, code_hash
 from planfly.campaigns.flight_row import FlightRow, fly_one
 from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, WindBoundary, needs_more, next_flights
 from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, FlownFlight, StoreError, WindsStore, kept_settings
-from planfly.campaigns.worker_pool import FlightRate, FlightRequest, FlyOne, WorkerPool, Workers, code_hash, worker_pool
+from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
 
 # Half of the interval's width that is flown for, m/s, and the fewest flights of a direction: where none of so many
 # fails, one in fifty does at most (95 %); and with fewer a fit is surer of itself than it may be.

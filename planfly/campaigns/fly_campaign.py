@@ -5,10 +5,11 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
 from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.flight_requests import FlightRequest, FlyOne, code_hash
 from planfly.campaigns.flight_row import FlightRow, fly_one
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally
 from planfly.campaigns.tables import DATABASE, Store, StoreError, kept_settings
-from planfly.campaigns.worker_pool import FlightRate, FlightRequest, FlyOne, WorkerPool, Workers, code_hash, worker_pool
+from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
 
 Advance = Callable[[float, float, str], None]
 

@@ -40,7 +40,6 @@ from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_b
 from planfly.campaigns.statistics.wind_boundary import needs_more
 from planfly.campaigns.summary import CampaignSummary, campaign_lines, closest_text, log_name, summarise, summary_json
 from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, Store, refuse_held, same_flight
-from planfly.campaigns.worker_pool import in_own_process
 from planfly.make_plan import Advance, make_setup
 from planner.plan import plan_json
 from world.errors import ArgumentError, PlanflyError
@@ -416,7 +415,7 @@ def wind_lines(found: WindsFound) -> list[str]:
 
 
 # ----------------------------------------------------------------------
-# The end of a campaign, in a process of its own.
+# The end of a campaign.
 
 
 def finish_campaign(
@@ -425,14 +424,8 @@ def finish_campaign(
     """Sum a campaign up from the table in its folder, which nobody holds, and write its files.
 
     command: the line that repeats it, for the report.
-    Raises what the other process raised: a `world.errors.PlanflyError`, or OSError for a full disk.
+    Raises a `world.errors.PlanflyError`, or OSError for a full disk.
     """
-    return in_own_process(_finish, base, goal, estimate, folder, command, advance=advance)
-
-
-def _finish(
-    base: CampaignBase, goal: Goal, estimate: Estimate, folder: Path, command: str, advance: Advance
-) -> CampaignSummary:
     with open_store(base, goal, folder, resume=True) as store:
         summary = summarise(base, goal, estimate, store)
         write_files(folder, base, summary, store, command, advance)

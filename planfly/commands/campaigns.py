@@ -97,7 +97,9 @@ def _shared_options(parser: CommandParser) -> None:
     parser.add_argument(
         "--workers", metavar="N", type=number("workers"), help="processes on this machine (default: one a core)"
     )
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="fly on a running dask cluster: tls://HOST:PORT")
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="fly on a running dask cluster: tls://HOST:PORT; needs planfly[cluster]"
+    )
     parser.add_argument("--resume", action="store_true", help="continue the campaign in --out")
     result_options(parser, "where the files go (default: runs/<name>-<command>, kept)")
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from logs.recording.reader import FlightLog, LogChannel, LogMessage, log_channels, log_messages
 from logs.recording.state_channel import EPOCH_NS
-from planfly.certificates import temporary_certificate
+from planfly.replays.certificates import temporary_certificate
 from planfly.replays.origin_gate import HOST, VIEWERS, OriginGate
 from world.errors import FlightError
 from world.running_clock import RunningClock

@@ -13,7 +13,7 @@ import ssl
 import threading
 from collections.abc import Callable, Collection
 
-from planfly.certificates import Certificate
+from planfly.replays.certificates import Certificate
 
 HOST = "127.0.0.1"
 _NAMES = (HOST, "localhost")

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from logs.verdict.findings import Finding, left_open
+from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.tolerances import ROUNDING
@@ -59,7 +59,7 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
     corners: dict[int, State] = {}
     threats: set[int] = set()
     zones: set[int] = set()
-    is_open = {id(item) for item in left_open(findings)}
+    is_open = {id(item) for item in undecided_findings(findings)}
     for item in findings:
         state = state_of(item, unjudged=id(item) in is_open)
         if state is None:

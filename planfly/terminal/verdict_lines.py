@@ -23,9 +23,9 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
     lines = [coloured(shown.headline, "good" if shown.state == "ok" else "bad"), *shown.details]
     for rule in shown.failed_rules:
         lines += _failed_lines(rule)
-    lines += [f"  open    {rule_word(one.rule)} at {one.where}: {one.reason}" for one in shown.left_open[: 2 * _LISTED]]
+    lines += [f"  open    {rule_word(one.rule)} at {one.where}: {one.reason}" for one in shown.undecided[: 2 * _LISTED]]
     # One flight decides all findings with the same suggestion.
-    deciding_flights = dict.fromkeys(one.suggestion for one in shown.left_open if one.suggestions)
+    deciding_flights = dict.fromkeys(one.suggestion for one in shown.undecided if one.suggestions)
     lines += [coloured("          would tell: ", "hint") + text for text in deciding_flights]
     for rule in shown.rules:
         count = f"{shown.zones:,} zones; " if rule.words.name == "fence" and shown.zones > 1 else ""

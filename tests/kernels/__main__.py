@@ -14,7 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from planfly.campaigns.worker_pool import code_hash
+from planfly.campaigns.flight_requests import code_hash
 from planfly.first_start import compile_units
 from planfly.kernel_units.ready_kernels import MISSION
 from planfly.kernel_units.unit_kernels import BOTH, GLIDING

@@ -135,6 +135,7 @@ def serve(tmp_path: Path) -> Iterator[Callable[..., Served]]:
 @pytest.fixture(scope="module")
 def scheduler() -> Iterator[str]:
     """The address of a dask scheduler whose worker is a thread of this process: none has to start for it."""
+    pytest.importorskip("distributed")
     from distributed import LocalCluster
 
     with LocalCluster(

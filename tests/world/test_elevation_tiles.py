@@ -163,7 +163,17 @@ VIRTUAL = {
     "entities": (b'<!DOCTYPE a [<!ENTITY b "c">]><VRTDataset/>', "a document type is declared"),
     "a warped one": (
         b'<VRTDataset subClass="VRTWarpedDataset"><SourceFilename>a.tif</SourceFilename></VRTDataset>',
-        "a VRTWarpedDataset computes its pixels",
+        "VRTWarpedDataset computes its pixels",
+    ),
+    "a scaled one": (
+        b"<VRTDataset><ComplexSource><SourceFilename>a.tif</SourceFilename><ScaleRatio>2</ScaleRatio></ComplexSource>"
+        b"</VRTDataset>",
+        "ScaleRatio computes its pixels",
+    ),
+    "a function": (
+        b"<VRTDataset><VRTRasterBand subClass='VRTDerivedRasterBand'><SourceFilename>a.tif</SourceFilename>"
+        b"</VRTRasterBand></VRTDataset>",
+        "VRTDerivedRasterBand computes its pixels",
     ),
     "a URL": (b"<VRTDataset><SourceFilename>http://x/a.tif</SourceFilename></VRTDataset>", "only local .tif"),
     "a virtual path": (b"<VRTDataset><SourceFilename>/vsizip/a.tif</SourceFilename></VRTDataset>", "only local .tif"),

@@ -7,7 +7,7 @@ from typing import Literal
 
 from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import MissionStretch
-from logs.verdict.findings import Finding, left_open
+from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.places import DecidingParameter, Suggestion
 from logs.verdict.presentation import RuleFindings, findings_by_rule
@@ -342,7 +342,7 @@ def rule_rows(findings: Sequence[Finding]) -> list[RuleRow]:
 
 def _rule_row(rule: RuleFindings) -> RuleRow:
     failed, judged = len(rule.failed), rule.judged
-    state = "fail" if failed else "pass" if judged and not left_open(rule.findings) else "unjudged"
+    state = "fail" if failed else "pass" if judged and not undecided_findings(rule.findings) else "unjudged"
     parts: list[str] = [f"{failed} of {judged} fail" if failed else f"{judged} ok"] if judged else []
     if judged < len(rule.findings):
         parts.append(f"{len(rule.findings) - judged} not judged")

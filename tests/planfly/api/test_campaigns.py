@@ -11,13 +11,14 @@ from planfly.api import campaigns
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import default_dispersions, draw_flight
 from planfly.campaigns.find_winds import WindsFound, WindsGoal
+from planfly.campaigns.flight_requests import FlyOne
 from planfly.campaigns.flight_row import FlightRow, fly_one
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.report import OutputDirectory
 from planfly.campaigns.statistics.decision import Estimate, Goal
 from planfly.campaigns.statistics.wind_boundary import Direction
 from planfly.campaigns.tables import DATABASE, AskedFlight, Store, WindsStore
-from planfly.campaigns.worker_pool import FlyOne, Workers
+from planfly.campaigns.worker_pool import Workers
 from planfly.stages import Advance
 from tests.planfly.campaigns.made_campaigns import all_fly, short_base, table, write_short
 from tests.planfly.campaigns.statistics.made_directions import no_numbers

@@ -47,14 +47,9 @@ def spawned_processes() -> list[int]:
     for one in psutil.Process().children(recursive=True):
         # Those that were killed a moment ago have no command line any more.
         with contextlib.suppress(psutil.NoSuchProcess):
-            if "spawn_main" in " ".join(one.cmdline()) or is_fork_server(one.parent()):
+            if "spawn_main" in " ".join(one.cmdline()):
                 found.append(one.pid)
     return found
-
-
-def is_fork_server(process: psutil.Process | None) -> bool:
-    """Whether a process is the one that a campaign's processes are forked from."""
-    return process is not None and "forkserver import main" in " ".join(process.cmdline())
 
 
 @contextlib.contextmanager

@@ -10,8 +10,9 @@ import pytest
 from planfly.campaigns import find_winds as find_winds_module
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_winds import WindsFound, WindsGoal, find_winds, open_winds_store
+from planfly.campaigns.flight_requests import FlightRequest, Flown, FlyOne
 from planfly.campaigns.tables import WINDS_DATABASE, WINDS_KIND, AskedFlight, narrow_passes_of, row_of
-from planfly.campaigns.worker_pool import FlightRequest, Flown, FlyOne, Workers
+from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.made_campaigns import made_flight, table
 from tests.soak import SOAK
 

@@ -24,10 +24,11 @@ from planfly.campaigns.find_winds import (
     find_winds,
     open_winds_store,
 )
+from planfly.campaigns.flight_requests import FlyOne
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.report import wind_lines
 from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, FlownFlight, StoreError
-from planfly.campaigns.worker_pool import FlyOne, Workers
+from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
     deadly_in_the_east,

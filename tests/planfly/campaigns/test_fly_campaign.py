@@ -1,5 +1,6 @@
 """The table does not depend on who flew, in which order, or how often it was interrupted."""
 
+import json
 import os
 import random
 import signal
@@ -15,12 +16,13 @@ from typing import Any, cast
 import pytest
 
 from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.flight_requests import FlightRequest, FlyOne
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.fly_campaign import _Book, _fly_rest, _Pace, fly_campaign, open_store, resumed_goal
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally, lower_bound
 from planfly.campaigns.summary import summarise
 from planfly.campaigns.tables import DATABASE, StoreError, kept_settings, read_table
-from planfly.campaigns.worker_pool import FlightRequest, FlyOne, WorkerPool, Workers
+from planfly.campaigns.worker_pool import WorkerPool, Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, start_client, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
     all_fly,
@@ -164,12 +166,7 @@ def test_real_flights_are_the_same_on_any_workers(base: CampaignBase, tmp_path: 
     note("campaign: real flights on 1, 2 and 4 workers", flights=20, other=0)
 
 
-def test_a_deadly_flight_is_named_and_counts_against(
-    base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if not SOAK:
-        # Given up with the second worker, not with the third: workers take their time to start.
-        monkeypatch.setattr("planfly.campaigns.worker_pool.ALLOWED_FAILURES", 1)
+def test_a_deadly_flight_is_named_and_counts_against(base: CampaignBase, tmp_path: Path) -> None:
     goal, count = Goal(None, False, 12), 12
     found = flown(base, goal, tmp_path, Workers(2), deadly_flight)
     others = [row for row in expected(base, tmp_path / "one", count) if row[0] != 5]
@@ -182,7 +179,7 @@ def test_a_deadly_flight_is_named_and_counts_against(
     assert found.lower == lower_bound(Tally(flyable, 12 - flyable))
 
 
-@pytest.mark.skipif(not SOAK, reason="a cluster for what its book is asked above: in make soak")
+@pytest.mark.skipif(not SOAK, reason="two processes for what its book is asked above: in make soak")
 def test_prove_keeps_the_flights_that_decide_and_no_more(base: CampaignBase, tmp_path: Path) -> None:
     goal = Goal(0.9, True, 500)
     found = flown(base, goal, tmp_path / "p", Workers(2), all_fly)
@@ -192,10 +189,10 @@ def test_prove_keeps_the_flights_that_decide_and_no_more(base: CampaignBase, tmp
 
 @pytest.mark.skipif(not SOAK, reason="stopped for twelve seconds: in make soak")
 def test_a_sleeping_laptop_costs_no_worker(tmp_path: Path) -> None:
-    """All processes are stopped for longer than a scheduler would wait for a worker's sign of life."""
+    """All processes are stopped for a while."""
     folder, count = tmp_path / "slept", 150
     folder.mkdir()
-    client = start_client("campaign", folder, count, DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL="1s")
+    client = start_client("campaign", folder, count)
     # It is under way.
     for _ in range(4):
         assert client.stdout is not None
@@ -231,7 +228,7 @@ def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
 
 def test_a_killed_worker_loses_no_flight(base: CampaignBase, tmp_path: Path) -> None:
     kills, count = scaled(20, 2), scaled(1200, 70)
-    # Seventy flights of two workers sleep for 1.75 s.
+    # A process takes some seconds to start, and the other one flies on.
     pause = (0.3, 1.2) if SOAK else (0.1, 0.4)
     begun, goal = threading.Event(), Goal(None, False, count)
     with open_store(base, goal, tmp_path, resume=False) as store, workers_killed(kills, begun, pause=pause) as killed:
@@ -241,26 +238,45 @@ def test_a_killed_worker_loses_no_flight(base: CampaignBase, tmp_path: Path) -> 
     note("campaign: kill -9 of its workers", kills=kills, flights=count, lost=0)
 
 
-@pytest.mark.skipif(
-    not SOAK, reason="three more processes of dask; what is sent to a scheduler is the same: in make soak"
-)
-def test_a_real_scheduler_gives_the_same_table(base: CampaignBase, tmp_path: Path) -> None:
-    count = 400 if SOAK else 12
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[tuple[str, "subprocess.Popen[bytes]"]]:
+    """A scheduler of its own with two workers: its address, and the second worker's process."""
+    pytest.importorskip("distributed")
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(Path.cwd()), *sys.path])}
-    dask = [sys.executable, "-m", "dask"]
-    scheduler = subprocess.Popen(
-        [*dask, "scheduler", "--host", "127.0.0.1", "--port", "18786", "--no-dashboard"], env=environment
-    )
-    line = [*dask, "worker", "tcp://127.0.0.1:18786", "--nthreads", "1", "--host", "127.0.0.1", "--no-dashboard"]
-    workers = [subprocess.Popen(line, env=environment) for _ in range(2 if SOAK else 1)]
-    keep(base, tmp_path / "part", (0, 3, 4))
+    dask, file = [sys.executable, "-m", "dask"], tmp_path / "scheduler.json"
+    found = ["--scheduler-file", str(file), "--no-dashboard", "--host", "127.0.0.1"]
+    started = [subprocess.Popen([*dask, "scheduler", *found, "--port", "0"], env=environment)]
     try:
-        for name in ("far", "part") if SOAK else ("part",):
-            flown(base, Goal(None, False, count), tmp_path / name, Workers(None, "tcp://127.0.0.1:18786"))
+        while not file.exists():
+            assert started[0].poll() is None
+            time.sleep(0.05)
+        line = [*dask, "worker", *found, "--nthreads", "1", "--no-nanny"]
+        started += [subprocess.Popen(line, env=environment) for _ in range(2)]
+        yield json.loads(file.read_text(encoding="utf-8"))["address"], started[-1]
     finally:
-        for process in (*workers, scheduler):
+        for process in reversed(started):
             process.terminate()
             process.wait()
-    want = expected(base, tmp_path / "one", count)
-    assert not SOAK or table(tmp_path / "far" / DATABASE) == want
-    assert table(tmp_path / "part" / DATABASE) == want
+
+
+def test_a_real_scheduler_with_a_worker_killed_gives_the_same_table(
+    base: CampaignBase, tmp_path: Path, cluster: tuple[str, "subprocess.Popen[bytes]"]
+) -> None:
+    count = scaled(400, 40)
+    address, worker = cluster
+    goal, want = Goal(None, False, count), expected(base, tmp_path / "one", count)
+    rows: list[str] = []
+
+    def kill_one(done: float, *_: object) -> None:
+        if done >= 6.0 and worker.poll() is None:
+            worker.kill()
+            worker.wait()
+
+    for name, flights in (("whole", ()), ("part", (0, 3, 4))):
+        keep(base, tmp_path / name, flights)
+        with open_store(base, goal, tmp_path / name, resume=True) as store:
+            fly_campaign(base, goal, Workers(None, address), store, kill_one, fly=slow_flight)
+        assert table(tmp_path / name / DATABASE) == want
+        rows += read_table(tmp_path / name / DATABASE)["worker"].tolist()
+    assert worker.poll() is not None
+    assert {row.partition("://")[0] for row in rows if "://" in row} == {"tcp"}

@@ -128,7 +128,7 @@ FLIGHTS = 40
 
 @pytest.mark.skipif(not SOAK, reason="half a minute; set PLANFLY_SOAK=1")
 def test_a_campaign_survives_a_clock_that_is_set_back_and_forth(tmp_path: Path) -> None:
-    """Of its client, its scheduler and its workers: no flight is lost, and none took an hour."""
+    """Of its process and its workers: no flight is lost, and none took an hour."""
     for name in ("site", "out"):
         (tmp_path / name).mkdir()
     (tmp_path / "field.toml").write_text(FIELD, encoding="utf-8")

@@ -1,7 +1,6 @@
 """Every socket on which planfly waits for somebody, as the system lists them, against the table of the network page."""
 
 import re
-import stat
 import subprocess
 import sys
 import time
@@ -15,10 +14,8 @@ from flight.autopilots.arduplane_sitl.physics import PhysicsPort
 from flight.autopilots.px4_sitl.physics import SimulatorPort
 from flight.autopilots.sitl.link import TcpLink, UdpLink
 from logs.recording.example_log import write_example_log
-from planfly.campaigns.worker_pool import Workers, child_processes, child_start_method, connected
 from planfly.cli import main
 from planfly.commands.registry import build_parser
-from tests.planfly.campaigns.kills import is_fork_server
 from tests.planfly.conftest import FIELD
 from tests.soak.test_hostile_files import WPL
 
@@ -32,9 +29,6 @@ HOLD = {
     # Of both; it also asks the system for ports that are free, and closes them.
     "flight/autopilots/sitl/link.py": "`fly`, `run` with `--autopilot`",
     "flight/live/link.py": "`serve`",
-    # Looks at the sockets that its process was given.
-    "planfly/campaigns/fork_server.py": "`campaign`, `winds`",
-    "planfly/campaigns/worker_pool.py": "`campaign`, `winds`",
     "planfly/replays/foxglove_server.py": "`replay --foxglove`",
     "planfly/replays/origin_gate.py": "`replay --foxglove`",
     "planfly/studio/open_studio.py": "`studio`",
@@ -61,23 +55,6 @@ def listening(pid: int) -> Counter[str]:
             if connection.status in (psutil.CONN_LISTEN, psutil.CONN_NONE):
                 found[f"{'TCP' if connection.status == psutil.CONN_LISTEN else 'UDP'} {connection.laddr.ip}"] += 1
     return found
-
-
-def test_a_campaign(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = listening(psutil.Process().pid)
-    with connected(Workers(1)) as client:
-        assert len(client.nthreads()) == 1
-        assert listening(psutil.Process().pid) - before == table()["`campaign`, `winds`"]
-
-
-@pytest.mark.skipif(child_start_method() != "forkserver", reason="processes are forked on Linux alone")
-def test_only_its_user_reaches_a_campaigns_fork_server() -> None:
-    child_processes()
-    (server,) = [one for one in psutil.Process().children() if is_fork_server(one)]
-    (path,) = [one.laddr for one in server.net_connections(kind="unix") if one.laddr]
-    # No abstract name, which has no owner, but a file; who may not enter the folder may not speak.
-    assert stat.S_IMODE(Path(path).stat().st_mode) == 0o600
-    assert stat.S_IMODE(Path(path).parent.stat().st_mode) == 0o700
 
 
 @pytest.mark.parametrize("command", ["`replay --to`", "`replay --foxglove`"])

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from planfly.certificates import temporary_certificate
+from planfly.replays.certificates import temporary_certificate
 from planfly.replays.origin_gate import VIEWERS, OriginGate, refusal
 
 

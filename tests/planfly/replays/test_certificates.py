@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from cryptography import x509
 
-from planfly.certificates import Certificate, temporary_certificate
+from planfly.replays.certificates import Certificate, temporary_certificate
 
 
 def context(kind: int, held: Certificate, trusted: Certificate, folder: Path) -> ssl.SSLContext:

@@ -1,0 +1,149 @@
+"""Workers of a running dask cluster that fly a campaign.  Nothing else of planfly imports dask.
+
+Each worker proves by its fingerprint that it flies what this process would, takes the campaign once, and is sent as
+many flights at a time as it has threads.
+"""
+
+import contextlib
+import itertools
+import logging
+import uuid
+from collections import Counter
+from collections.abc import Callable, Iterator
+from typing import Any, cast
+
+import distributed
+from distributed import CancelledError, KilledWorker, WorkerPlugin, get_worker
+
+from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.flight_requests import (
+    LOST,
+    MAX_FAILURES,
+    CampaignCopy,
+    FlightRequest,
+    Flown,
+    FlyOne,
+    fingerprint,
+)
+from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
+from world.errors import PlanflyError
+from world.interruption import Interrupted
+
+_CONNECT_SECONDS = 20
+# Names of tasks, of which dask keeps the last 100,000: so many that one is long forgotten when it comes again.
+_NAMES = 4096
+
+
+def connect(address: str) -> Any:
+    """Return a `distributed.Client` of a scheduler, with the security of dask's own configuration.
+
+    Raises OSError and ValueError where no scheduler answers.
+    """
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    # It states no types.
+    client: Any = distributed.Client
+    return client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
+
+
+class CampaignPlugin(WorkerPlugin):
+    """A campaign on a worker: on each, also on one that comes late or takes a dead one's place.
+
+    name: of the campaign on its scheduler.
+    """
+
+    def __init__(self, name: str, copy: CampaignCopy) -> None:
+        self.name, self.copy = name, copy
+
+
+def fly_task(campaign: str, request: FlightRequest) -> FlightRow:
+    """Fly a flight on the worker that this runs on."""
+    worker = get_worker()
+    plugin = worker.plugins[campaign]
+    if not isinstance(plugin, CampaignPlugin):
+        raise TypeError(f"{campaign} is not a campaign of this worker")
+    return plugin.copy.fly(request, worker.address)
+
+
+class DaskPool:
+    """Workers of a cluster that fly the flights of a campaign.  client: a `distributed.Client`."""
+
+    def __init__(self, client: Any, base: CampaignBase, fly: FlyOne = fly_one) -> None:
+        self._client, self._base = client, base
+        self._name = f"planfly-{uuid.uuid4().hex[:12]}"
+        self._numbers = itertools.cycle(range(_NAMES))
+        copy = CampaignCopy(base, fingerprint(base.scenario.flight.aircraft), fly)
+        client.register_plugin(CampaignPlugin(self._name, copy))
+
+    def close(self) -> None:
+        """Let the workers forget the campaign; one that dies meanwhile has nothing to forget."""
+        with contextlib.suppress(OSError):
+            self._client.unregister_worker_plugin(self._name)
+
+    def _threads(self) -> int:
+        """Return the number of flights that the workers can fly at a time, at least 1."""
+        threads: dict[str, int] = self._client.nthreads()
+        return max(1, sum(threads.values()))
+
+    def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
+        """Fly requests as they are asked for, and yield each when it is done, in any order.
+
+        following: gives the next request, None for none at present; asked again after each flight.
+        Raises the `world.errors.PlanflyError` of a flight, and OSError where the scheduler is lost.
+        """
+        flying: dict[tuple[str, int], FlightRequest] = {}
+        given_up: Counter[FlightRequest] = Counter()
+        done: Any = cast("Any", distributed.as_completed)(loop=self._client.loop)
+
+        def send(request: FlightRequest) -> None:
+            # A tuple: dask takes its first word for the kind of task, and keeps something of each kind for good.
+            key = next(key for number in self._numbers if (key := (self._name, number)) not in flying)
+            flying[key] = request
+            done.add(self._client.submit(fly_task, self._name, request, key=key, pure=False))
+
+        def send_following() -> None:
+            while len(flying) < min(_NAMES, self._threads()) and (request := following()) is not None:
+                send(request)
+
+        try:
+            send_following()
+            while flying:
+                future = next(done)
+                request = flying.pop(future.key)
+                row = self._row(future, request)
+                if row is None:
+                    given_up[request] += 1
+                if row is None and given_up[request] < MAX_FAILURES:
+                    send(request)
+                else:
+                    yield Flown(request, row or lost_row(self._base, request.index, LOST))
+                    send_following()
+                # After the next was sent: of a kind without any task dask makes a new record with the next one.
+                future.release()
+        except Interrupted:
+            # No time to wait for an answer: these flights end with the client.
+            flying.clear()
+            raise
+        finally:
+            if flying:
+                self._client.cancel(list(done.futures), force=True)
+
+    def _row(self, future: Any, request: FlightRequest) -> FlightRow | None:
+        """Return the row of a flight; None where dask gave it up, as workers died on it.
+
+        Raises OSError where the scheduler is lost.
+        """
+        if future.status == "finished":
+            # A result goes with its worker until it is fetched, and is made again: that may be given up, too.
+            with contextlib.suppress(KilledWorker, CancelledError):
+                row: FlightRow = future.result()
+                return row
+        elif future.status == "error":
+            error = future.exception()
+            if isinstance(error, PlanflyError):
+                raise error
+            if not isinstance(error, KilledWorker):
+                raise RuntimeError(f"flight {request.index}: {type(error).__name__}: {error}") from error
+        # On a loaded machine dask was seen to cancel a flight whose worker was killed.
+        if self._client.status != "running":
+            raise OSError(0, "the scheduler was lost; the flights before are kept, --resume goes on", "--scheduler")
+        return None

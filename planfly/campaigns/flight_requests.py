@@ -1,0 +1,126 @@
+"""Flights that a campaign asks its workers for, what a worker holds of the campaign, and which workers may fly it."""
+
+import hashlib
+import pickle
+import platform
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import metadata, resources
+from pathlib import Path
+from typing import NamedTuple
+
+from aircraft.catalog import find_aircraft, model_hash
+from planfly._version import __version__
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind
+from planfly.campaigns.flight_row import FlightRow, fly_one
+from world.errors import PlanflyError
+
+# Flies flight k of a base, in this wind; `fly_one` in all campaigns.
+FlyOne = Callable[[CampaignBase, int, GivenWind | None], FlightRow]
+
+# How a flight ended that could not be flown.
+LOST = "lost: its workers died"
+# Deaths of workers on one flight before it is lost: the first ones may have had another cause.
+MAX_FAILURES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class FlightRequest:
+    """A flight to fly: its index, and the mean wind that takes the scenario's place, None for none."""
+
+    index: int
+    wind: GivenWind | None = None
+
+
+class Flown(NamedTuple):
+    """A request, and its row."""
+
+    request: FlightRequest
+    row: FlightRow
+
+
+# ----------------------------------------------------------------------
+# Workers that differ in what they fly with may not fly flights of one campaign.
+
+# Packages whose version may move a bit of a flight.
+_PACKAGES = ("jsbsim", "numba", "numpy", "scipy")
+_OURS = ("aircraft", "flight", "logs", "planfly", "planner", "world")
+
+
+class WorkerError(PlanflyError):
+    """A worker does not fly what the campaign flies."""
+
+
+@cache
+def code_hash() -> str:
+    """Return a hash of planfly's own sources, as installed here."""
+    digest = hashlib.sha256()
+    for package in _OURS:
+        root = Path(str(resources.files(package)))
+        for file in sorted(root.rglob("*.py")):
+            digest.update(str(file.relative_to(root)).encode())
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def fingerprint(aircraft: str) -> dict[str, str]:
+    """Return what decides a flight of this aircraft on this machine, by name.
+
+    >>> sorted(fingerprint("aerosonde"))
+    ['jsbsim', 'model', 'numba', 'numpy', 'planfly', 'python', 'scipy', 'sources']
+    """
+    try:
+        model = model_hash(find_aircraft(aircraft))
+    except PlanflyError as error:
+        model = f"none: {error}"
+    return {
+        "planfly": __version__,
+        "sources": code_hash(),
+        "model": model,
+        "python": ".".join(platform.python_version_tuple()[:2]),
+        **{name: metadata.version(name) for name in _PACKAGES},
+    }
+
+
+def refuse_different(mine: dict[str, str], theirs: dict[str, str], worker: str) -> None:
+    """Raise WorkerError, with the worker and the first difference, unless it flies as this process would.
+
+    >>> refuse_different({"planfly": "0.1.0"}, {"planfly": "0.0.9"}, "tls://10.0.0.7:4000")
+    Traceback (most recent call last):
+    ...
+    planfly.campaigns.flight_requests.WorkerError: worker tls://10.0.0.7:4000: planfly 0.0.9, not 0.1.0 as here
+    """
+    for name, value in mine.items():
+        if theirs.get(name) != value:
+            found, allowed = theirs.get(name), f"not {value} as here"
+            message = f"worker {worker}: {name} {found or 'missing'}, {allowed}"
+            raise WorkerError(message, file=f"worker {worker}", field=name, value=found, allowed=allowed)
+
+
+class CampaignCopy:
+    """A campaign as its workers get it: packed, and unpacked once by each.
+
+    mine: `fingerprint` of the process that leads the campaign.
+    """
+
+    def __init__(self, base: CampaignBase, mine: dict[str, str], fly: FlyOne = fly_one) -> None:
+        self._packed = pickle.dumps((base, fly))
+        self._aircraft = base.scenario.flight.aircraft
+        self._mine = mine
+        self._unpacked: tuple[CampaignBase, FlyOne] | None = None
+
+    def fly(self, request: FlightRequest, worker: str) -> FlightRow:
+        """Fly a flight on this worker.  Raises WorkerError for a worker that would fly it otherwise."""
+        base, fly = self.unpacked(worker)
+        return replace(fly(base, request.index, request.wind), worker=worker)
+
+    def unpacked(self, worker: str) -> tuple[CampaignBase, FlyOne]:
+        """Return the campaign and the function that flies it.  Raises WorkerError as `fly`."""
+        if self._unpacked is None:
+            refuse_different(self._mine, fingerprint(self._aircraft), worker)
+            base, fly = pickle.loads(self._packed)
+            # The same model, wherever this machine has it.
+            airframe = replace(base.airframe, aircraft=find_aircraft(self._aircraft))
+            self._unpacked = replace(base, airframe=airframe), fly
+        return self._unpacked

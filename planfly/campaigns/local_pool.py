@@ -1,0 +1,154 @@
+"""Processes of this machine that fly a campaign: plain ones, each with one flight at a time, which open no socket."""
+
+import errno
+import os
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from typing import TYPE_CHECKING
+
+from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.flight_requests import (
+    LOST,
+    MAX_FAILURES,
+    CampaignCopy,
+    FlightRequest,
+    Flown,
+    FlyOne,
+    fingerprint,
+)
+from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
+from world.errors import PlanflyError
+from world.interruption import children_ignore_sigint, end_children, end_with_parent, uninterrupted
+
+if TYPE_CHECKING:
+    from multiprocessing.process import BaseProcess
+
+# Processes that end while they start, one after the other, before the pool gives up.
+MAX_FAILED_STARTS = 10
+
+# The campaign of a worker process.
+_copies: list[CampaignCopy] = []
+
+
+def _begin(copy: CampaignCopy) -> None:
+    """Take the campaign into a worker process."""
+    _copies.append(copy)
+
+
+def _fly(request: FlightRequest) -> FlightRow:
+    """Fly a flight in a worker process."""
+    return _copies[0].fly(request, f"process {os.getpid()}")
+
+
+class _Worker:
+    """A process that flies one flight at a time.  One that has died is replaced with the next flight."""
+
+    def __init__(self, copy: CampaignCopy) -> None:
+        self._copy = copy
+        self._pool: ProcessPoolExecutor | None = None
+        self._started: Future[None] = Future()
+
+    def send(self, request: FlightRequest) -> Future[FlightRow]:
+        """Have a flight flown."""
+        # Ctrl-C reaches every process of a terminal: workers leave it to this one, which ends them.
+        with children_ignore_sigint(), uninterrupted():
+            try:
+                return self._submit(request)
+            except BrokenProcessPool:
+                # The process has died since its last flight.
+                _end([self])
+                return self._submit(request)
+
+    def _submit(self, request: FlightRequest) -> Future[FlightRow]:
+        if self._pool is None:
+            # A pool of one: where a process dies, it is known on which flight.
+            self._pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=end_with_parent)
+            # Not as an argument of the process: its start would wait until it has imported all that this takes.
+            self._started = self._pool.submit(_begin, self._copy)
+        return self._pool.submit(_fly, request)
+
+    @property
+    def has_started(self) -> bool:
+        """True where the last process has come to its first flight."""
+        return self._started.done() and self._started.exception() is None
+
+    def leave(self) -> "list[BaseProcess]":
+        """Send the process no more flights, and return it where there is one: the caller ends it."""
+        if self._pool is None:
+            return []
+        # Python 3.14 has a method for it.
+        processes: list[BaseProcess] = list((self._pool._processes or {}).values())
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        self._pool = None
+        return processes
+
+
+def _end(workers: Iterable[_Worker]) -> None:
+    """End the processes of workers, whatever they do."""
+    end_children([process for worker in workers for process in worker.leave()])
+
+
+class LocalPool:
+    """Processes of this machine that fly the flights of a campaign.  count: of them."""
+
+    def __init__(self, count: int, base: CampaignBase, fly: FlyOne = fly_one) -> None:
+        self._base = base
+        copy = CampaignCopy(base, fingerprint(base.scenario.flight.aircraft), fly)
+        self._workers = [_Worker(copy) for _ in range(count)]
+        self._failed_starts = 0
+
+    def close(self) -> None:
+        """End all processes."""
+        _end(self._workers)
+
+    def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
+        """Fly requests as they are asked for, and yield each when it is done, in any order.
+
+        following: gives the next request, None for none at present; asked again after each flight.
+        Raises the `world.errors.PlanflyError` of a flight, and OSError where no process can be started.
+        """
+        idle = list(self._workers)
+        flying: dict[Future[FlightRow], tuple[_Worker, FlightRequest]] = {}
+        again: deque[FlightRequest] = deque()
+        deaths: Counter[FlightRequest] = Counter()
+        try:
+            while True:
+                while idle and (request := again.popleft() if again else following()) is not None:
+                    worker = idle.pop()
+                    flying[worker.send(request)] = worker, request
+                if not flying:
+                    return
+                for future in wait(flying, return_when=FIRST_COMPLETED).done:
+                    worker, request = flying.pop(future)
+                    idle.append(worker)
+                    row = self._row(future, worker, request)
+                    if row is None:
+                        deaths[request] += worker.has_started
+                        _end([worker])
+                        if deaths[request] < MAX_FAILURES:
+                            again.append(request)
+                            continue
+                        row = lost_row(self._base, request.index, LOST)
+                    yield Flown(request, row)
+        finally:
+            _end(worker for worker, _ in flying.values())
+
+    def _row(self, future: Future[FlightRow], worker: _Worker, request: FlightRequest) -> FlightRow | None:
+        """Return the row of a flight; None where its process has died.  Raises as `fly`."""
+        try:
+            row = future.result()
+        except BrokenProcessPool:
+            self._failed_starts = 0 if worker.has_started else self._failed_starts + 1
+            if self._failed_starts == MAX_FAILED_STARTS:
+                workers = f"{len(self._workers)} workers"
+                raise OSError(errno.EIO, "could not be started: their processes end at once", workers) from None
+            return None
+        except PlanflyError:
+            raise
+        except Exception as error:
+            raise RuntimeError(f"flight {request.index}: {type(error).__name__}: {error}") from error
+        self._failed_starts = 0
+        return row
