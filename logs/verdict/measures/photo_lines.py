@@ -38,7 +38,7 @@ class LineMeasure:
     late, early: m from the line's start to the first good place, and from the last good place to its end.
     aside: greatest distance from the line where it was flown along, m; off: greatest height error, m, above positive.
     photos, missed: number planned, and how many of them were not taken; 0 if the distance between photos is not stated.
-    allowed_aside: m.  allowed_off: least height error that is allowed anywhere along the line, m.
+    allowed_aside: m.  allowed_off: smallest height tolerance anywhere along the line, m.
     lost: stretches that cannot be used, each from and to, m from the line's start.
     """
 
@@ -224,7 +224,7 @@ class OverlapMeasure:
 
     camera: the camera that takes them.
     front: overlap with the next photo on the line; None if the distance between photos is not stated, or none is
-    usable.
+        usable.
     line, apart, height, slow: where that is: the line's number from 0, m between photos, m above ground, and True if
         the camera cannot take them any sooner.
     side: overlap with the photos of the neighbouring line; None if no two usable lines are next to each other.
@@ -246,7 +246,8 @@ class OverlapMeasure:
 class _Strip(NamedTuple):
     """Points of a photo line, and whether they are usable.
 
-    places: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s."""
+    places: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s.
+    """
 
     places: Floats
     heights: Floats

@@ -66,10 +66,8 @@ def look_at_zone(
 def beyond_limit(exclusion: bool, away: float, off: float) -> float:  # pragma: no cover - compiled
     """Return how far beyond a zone's limit a place is, m.
 
-    This is the shortest move, level or vertical, to comply again.
-
-    Negative for a place that complies: the shortest move to the limit.  away, off: from `look_at_zone`.  NaN if the
-    answer depends on ground that is not known.
+    This is the shortest move, level or vertical, to comply again; negative for a place that complies, the
+    shortest move to the limit.  away, off: from `look_at_zone`.  NaN if the answer depends on ground that is not known.
     """
     if off != off:
         # Outside the zone's shape the place is outside the zone whatever the ground.
