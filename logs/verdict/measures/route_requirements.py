@@ -452,8 +452,8 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
 def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
     """Return the surveys of a setup's mission that are judged by their lines.
 
-    A plan made by planfly has none.  Its surveys are those whose camera is switched, or, if the scenario asks for "lines", all legs
-    with the form of a survey.
+    A plan made by planfly has none.  Its surveys are those whose camera is switched, or, if the scenario asks for
+    "lines", all legs with the form of a survey.
     """
     asked = setup.scenario.limits.surveys
     if setup.plan is not None or asked == "path":

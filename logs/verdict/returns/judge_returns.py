@@ -83,7 +83,7 @@ TOUCHING = 10.0
 # A return from higher up is left out if it hits the ground or gets low within this run, m, because it sinks by the rest
 # of that fraction.
 _SINK_RUN_M = 500.0
-# Bank beyond which a JSBSim flight cannot begin at a start, rad: the start is approached in straight flight.
+# Bank beyond which a JSBSim flight cannot begin at a start, rad, because it approaches the start straight.
 _MAX_START_BANK_RAD = math.radians(10.0)
 
 

@@ -259,7 +259,8 @@ def _simulate(
 ) -> list[_Aborted]:
     """Simulate go-arounds from places on the glide that are above the ground.
 
-    height: above home, m.  places: m before the landing point."""
+    height: above home, m.  places: m before the landing point.
+    """
     top = landing.home + height
     begins = [(float(before), landing.place(float(before))) for before in places]
     over = [up - float(ground.height(east, north)) for _, (east, north, up) in begins]
