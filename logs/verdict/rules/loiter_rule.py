@@ -205,7 +205,7 @@ def _loiter_finding(
 def _flown_radii(aligned: AlignedTrack, circle: Circle) -> Floats:
     """Return distances from a loiter's center from first to last corner, (n,) m.
 
-    Empty if not flown to its end.
+    Empty if the loiter was not flown to its end.
     """
     first, last = int(aligned.rows[circle.first]), int(aligned.rows[circle.last])
     if not aligned.passed[circle.last] or last <= first:
@@ -227,7 +227,8 @@ def _uses_parameter_radius(requirements: RouteRequirements, circle: Circle) -> b
 def _bank_held(requirements: RouteRequirements, circle: Circle, tightest: float, at: list[Finding]) -> float:
     """Return the bank with which a loiter tighter than the bank limit's radius (m) was held, rad.
 
-    The largest mean over a second.  Without a flight or a measurement, the bank needed to hold it, up to the autopilot's limit.
+    The largest mean over a second.  Without a flight or a measurement, the bank needed to hold it, up to the
+    autopilot's limit.
     """
     measured = [fact.value for item in at for fact in item.facts if fact.what == "bank"]
     if measured:

@@ -32,8 +32,8 @@ from world.scenario_tables import ReturnDemand
 
 # Largest number of returns that are simulated if all have to be safe: one a second up to this, 2 ms each.
 _MAX_RETURNS = 3000
-# Angle by which a logged loiter may fall short of a full lap, rad: rows may miss a second at either end (26 m/s, 260
-# m).
+# Angle by which a logged loiter may fall short of a full lap, rad: its rows may miss up to a second at either end, at
+# 26 m/s on 260 m.
 _LAP_TOLERANCE_RAD = 0.1
 # Rules that hold a flight to its legs.
 _LEG_RULES = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})

@@ -221,14 +221,14 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
 def _too_tight(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[Message]:
     """Return a fault if a turn was tighter than the bank limit's arc, by the distance from its waypoint.
 
-    Legs too short for their turn are joined by a tighter arc, and a flight that follows it has used more
-    bank than it has, or slowed down.
+    Legs too short for their turn are joined by a tighter arc, and a flight that follows it has used more bank
+    than it has, or slowed down.
     """
     turn, setup = abs(float(requirements.turns[i])), requirements.setup
     tightest = float(requirements.tightest[i])
     # Guidance's own limit: a sharper corner has no arc to follow if its legs are short.
     least = fly_by_offset(turn, tightest) if turn < SHARPEST_FLY_BY else math.inf
-    # A real autopilot does not follow the arc, and may pass the waypoint at any distance.
+    # An autopilot that does not follow the arc may pass the waypoint at any distance.
     followed = setup.autopilot.keeps_to_arcs and setup.source is None and not setup.route.fly_over[i]
     if measure.passed is None or not math.isfinite(least) or not followed:
         return []
