@@ -106,8 +106,8 @@ def _levels(
         fails = any(item.ok is False for item in predicted)
         passes = not fails and not left_open(predicted)
         differing = _disagreements("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
-        said = headline(predicted, passes, source)
-        levels.append(LevelAnswer("geometry", passes, said, differing, undecided=not passes and not fails))
+        answer = headline(predicted, passes, source)
+        levels.append(LevelAnswer("geometry", passes, answer, differing, undecided=not passes and not fails))
     if requirements.envelope and reference is not None and reference.airframe is not None:
         airframe = reference.airframe
         passed = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}

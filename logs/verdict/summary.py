@@ -26,17 +26,17 @@ def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> st
 
     source: the data from which an uncertain aircraft model was made.
     """
-    whose = [f"an aircraft from {source}"] if source else []
+    qualifier = [f"an aircraft from {source}"] if source else []
     if flyable:
-        silent = [_not_judged(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
-        return "; ".join(["flyable", *filter(None, silent), *_near_miss_notes(findings), *whose])
+        unjudged = [_not_judged(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
+        return "; ".join(["flyable", *filter(None, unjudged), *_near_miss_notes(findings), *qualifier])
     failed = _sorted_failures(findings)
     if not failed and (open_text := undecided_text(findings)):
-        return "; ".join([f"not judged in full: {open_text}", *whose])
+        return "; ".join([f"not judged in full: {open_text}", *qualifier])
     named = _headline_failures(failed)
     more = len(failed) - len(named)
     text = "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
-    return "; ".join([text, *whose])
+    return "; ".join([text, *qualifier])
 
 
 def undecided_text(findings: Sequence[Finding]) -> str:
@@ -58,10 +58,10 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     ]
     circles = f"where {' and '.join(ways[:_MAX_NAMED])} is flown, only a flight tells" if ways else ""
     known = _unknown_of_aircraft([item for item in open_findings if item.check == UNKNOWN_AIRCRAFT])
-    beside = [item.brief for item in open_findings if item.check in BESIDE_FLIGHT]
+    outside_flight = [item.brief for item in open_findings if item.check in BESIDE_FLIGHT]
     items = [item.brief for item in open_findings if item.check == NOT_FLOWN]
     more = [f"{len(items) - _MAX_NAMED} more items"] if len(items) > _MAX_NAMED else []
-    return "; ".join(filter(None, [known, circles, *items[:_MAX_NAMED], *more, *beside]))
+    return "; ".join(filter(None, [known, circles, *items[:_MAX_NAMED], *more, *outside_flight]))
 
 
 def _unknown_of_aircraft(every: Sequence[Finding]) -> str:
@@ -111,11 +111,13 @@ def _sorted_failures(findings: Sequence[Finding]) -> list[Finding]:
 
 def _not_judged(findings: Sequence[Finding], rule: RuleWords) -> str:
     """Return how much of a rule was not judged, in words; "" for nothing."""
-    mine = [item for item in findings if item.rule == rule.name]
-    silent = sum(item.ok is None for item in mine)
-    if not silent:
+    rule_findings = [item for item in findings if item.rule == rule.name]
+    unjudged = sum(item.ok is None for item in rule_findings)
+    if not unjudged:
         return ""
-    return f"{rule.unjudged} not judged" + ("" if silent == len(mine) else f" on {silent} {rule.unjudged_of}")
+    return f"{rule.unjudged} not judged" + (
+        "" if unjudged == len(rule_findings) else f" on {unjudged} {rule.unjudged_of}"
+    )
 
 
 def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
@@ -164,11 +166,11 @@ def summary_lines(
     lines += [*condition_lines(conditions), autopilot_line(conditions, flown=level == "flown")]
     lines += _parameter_lines(setup, flown=level == "flown")
     lines += _ignored_settings_lines(setup)
-    silent: dict[str, str] = {}
+    unjudged: dict[str, str] = {}
     for item in findings:
         if item.ok is None and RULE_WORDS[item.rule].explained:
-            silent.setdefault(item.rule, item.reason)
-    lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in silent.items()]
+            unjudged.setdefault(item.rule, item.reason)
+    lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in unjudged.items()]
     # Limits of the PX4 autopilot alone, which say nothing about the aircraft.
     lines += [
         f"PX4 would not take it: {item.reason}"
@@ -203,13 +205,13 @@ def _airframe_or_autopilot_lines(
     answers = {level.name: level.flyable for level in levels}
     if answers.get("autopilot") is not False or not answers.get("airframe") or levels[-1].undecided:
         return []
-    whose = "" if setup.autopilot.parameters is None else " with these parameters"
+    qualifier = "" if setup.autopilot.parameters is None else " with these parameters"
     # Other parameters are flown by the simulated control law, even if the real autopilot flew.
     by_law = setup.autopilot.program is not None
-    why = "" if by_law or not whose else ": no single parameter that was tried would pass"
+    why = "" if by_law or not qualifier else ": no single parameter that was tried would pass"
     if deciding is not None:
         why = f": {deciding_text(deciding)}{', by the flight of its law' if by_law else ''}"
-    return [f"The aircraft can, {setup.autopilot.title}{whose} cannot{why}"]
+    return [f"The aircraft can, {setup.autopilot.title}{qualifier} cannot{why}"]
 
 
 def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
@@ -231,15 +233,15 @@ def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
         for name in by_length[:_MAX_NAMED]
     ]
     more = len(parameters.unused) - len(unused)
-    said = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
+    notes = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
     returns = [name for name in parameters.not_flown if name in parameters.by_origin("file")]
-    said += f"; read, not flown: {', '.join(returns)}" if returns else ""
-    said += f"; beyond {setup.autopilot.title}'s documented ranges, flown: {', '.join(parameters.beyond)}" * bool(
+    notes += f"; read, not flown: {', '.join(returns)}" if returns else ""
+    notes += f"; beyond {setup.autopilot.title}'s documented ranges, flown: {', '.join(parameters.beyond)}" * bool(
         parameters.beyond
     )
     return [
         f"Parameters: {names['file']} of the file, {names['aircraft']} of the aircraft,"
-        f" {names['default']} {setup.autopilot.title}'s defaults{said}",
+        f" {names['default']} {setup.autopilot.title}'s defaults{notes}",
         *misfits,
     ]
 

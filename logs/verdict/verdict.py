@@ -96,8 +96,8 @@ class Verdict:
         >>> verdict.flies, replace(verdict, complete=False).flies
         (True, False)
         """
-        beside = all(item.check in BESIDE_FLIGHT for item in left_open(self.findings))
-        return self.flyable or (self.complete and self.undecided and beside)
+        outside_flight = all(item.check in BESIDE_FLIGHT for item in left_open(self.findings))
+        return self.flyable or (self.complete and self.undecided and outside_flight)
 
     @property
     def headline(self) -> str:

@@ -102,12 +102,12 @@ def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
     """Return a line for each rule that was not judged, with the reason and, if partial, the numbers."""
     lines = []
     for rule in RULE_WORDS.values():
-        mine = [item for item in findings if item.rule == rule.name]
-        silent = [item for item in mine if item.ok is None]
-        if not silent:
+        rule_findings = [item for item in findings if item.rule == rule.name]
+        unjudged = [item for item in rule_findings if item.ok is None]
+        if not unjudged:
             continue
-        where = "" if len(silent) == len(mine) else f" on {len(silent)} of {len(mine)}"
-        lines.append(f"Not judged: {rule.title}{where} ({silent[0].brief})")
+        where = "" if len(unjudged) == len(rule_findings) else f" on {len(unjudged)} of {len(rule_findings)}"
+        lines.append(f"Not judged: {rule.title}{where} ({unjudged[0].brief})")
     return lines
 
 
@@ -119,8 +119,8 @@ def heights_text(source: ImportedLog) -> str:
     'POS, above mean sea level, as the log has it; at the start GPS.Alt -0.1 m of it'
     """
     offsets = ", ".join(f"{one.name} {one.offset:+.1f} m" for one in source.heights.offsets)
-    beside = f"; at the start {offsets} of it" if offsets else ""
-    return f"{source.heights.source}, {_DATUM_TEXTS[source.heights.datum]}{beside}"
+    offset_text = f"; at the start {offsets} of it" if offsets else ""
+    return f"{source.heights.source}, {_DATUM_TEXTS[source.heights.datum]}{offset_text}"
 
 
 def rows_text(faults: RowFaults, gaps: int) -> str:
@@ -241,8 +241,8 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     flyable = bool(flown) and not failed and not unjudged
     complete = not unjudged and all(item.ok is True for item in findings if item.rule == "completion")
     answer = [headline(findings, flyable).replace("flyable", "flown as planned", 1)] if failed or not unjudged else []
-    said = "; ".join([*answer, *filter(None, [unjudged])])
-    own = LevelAnswer(setup.autopilot.level, flyable, said, undecided=bool(unjudged) and not failed)
+    answer_text = "; ".join([*answer, *filter(None, [unjudged])])
+    own = LevelAnswer(setup.autopilot.level, flyable, answer_text, undecided=bool(unjudged) and not failed)
     conditions = setup_conditions(setup)
     lines = imported_lines(findings, setup, own, flown, conditions)
     return Verdict(

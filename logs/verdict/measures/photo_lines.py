@@ -153,9 +153,9 @@ def _height_errors(
     requirements: RouteRequirements, axis: LineAxis, position: Floats, along: Floats
 ) -> tuple[Floats, Floats]:
     """Return each row's error from the planned height above ground, m, and its tolerance."""
-    asked = over_ground(requirements, axis.at(along))
-    allowed = np.maximum(MIN_PHOTO_HEIGHT, PHOTO_HEIGHT * asked)
-    return over_ground(requirements, position) - asked, allowed
+    planned = over_ground(requirements, axis.at(along))
+    allowed = np.maximum(MIN_PHOTO_HEIGHT, PHOTO_HEIGHT * planned)
+    return over_ground(requirements, position) - planned, allowed
 
 
 def over_ground(requirements: RouteRequirements, places: Floats) -> Floats:
@@ -184,8 +184,8 @@ def _camera_on(
         away = np.hypot(*(position[:, :2] - requirements.points[waypoint, :2]).T)
         # An autopilot that follows a path is at a waypoint where the path passes it.
         near = 0.0 if follows else reach(requirements, waypoint).radius
-        there = np.flatnonzero(((away <= near) | (along >= from_along)) & ahead & (rows >= after))
-        return int(there[0]) if there.size else len(along)
+        indices = np.flatnonzero(((away <= near) | (along >= from_along)) & ahead & (rows >= after))
+        return int(indices[0]) if indices.size else len(along)
 
     begins = reached(line.first, 0.0) if line.switched_on else 0
     ends = reached(line.last, length, begins) if line.switched_off else len(along)

@@ -455,16 +455,16 @@ def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
     A plan made by planfly has none.  Its surveys are those whose camera is switched, or, if the scenario asks for
     "lines", all legs with the form of a survey.
     """
-    asked = setup.scenario.limits.surveys
-    if setup.plan is not None or asked == "path":
+    mode = setup.scenario.limits.surveys
+    if setup.plan is not None or mode == "path":
         return ()
     beyond = [(one.photo, one.turn_around) for one in setup.mission.survey_plans if one.photo is not None]
     camera = camera_spacing(setup.mission, setup.route)
-    if asked != "lines" and not camera.any():
+    if mode != "lines" and not camera.any():
         # If no item switches the camera, no line takes photos.
         return ()
     found = find_surveys(setup.route, camera, beyond)
-    return tuple(one for one in found if asked == "lines" or one.takes_photos())
+    return tuple(one for one in found if mode == "lines" or one.takes_photos())
 
 
 @functools.lru_cache(maxsize=8)

@@ -120,9 +120,9 @@ def _add_sphere(made: GlideMap, centre: Floats, radius: float) -> None:
     shape = made.floor[rows, columns].shape
     norths = made.south + made.cell * (rows.start + np.arange(shape[0]))
     easts = made.west + made.cell * (columns.start + np.arange(shape[1]))
-    beside = np.maximum(0.0, np.abs(easts[None, :] - centre[0]) - 0.5 * made.cell)
+    across = np.maximum(0.0, np.abs(easts[None, :] - centre[0]) - 0.5 * made.cell)
     along = np.maximum(0.0, np.abs(norths[:, None] - centre[1]) - 0.5 * made.cell)
-    away = np.hypot(beside, along)
+    away = np.hypot(across, along)
     half = np.sqrt(np.maximum(0.0, radius * radius - away**2))
     inside = away < radius
     low, high = made.low[rows, columns], made.high[rows, columns]
@@ -387,11 +387,11 @@ def _lifted(
         i, j = row + cell.north, column + cell.east
         # Height lost from the step's start to this cell.
         lost = (1.0 - cell.share) * loss
-        there = _out_of_spheres(max(wanted - lost, floor[i, j]), low[i, j], high[i, j])
+        altitude = _out_of_spheres(max(wanted - lost, floor[i, j]), low[i, j], high[i, j])
         # NaN, for unknown ground, fails the comparison.
-        if not floor[i, j] <= there:
+        if not floor[i, j] <= altitude:
             return math.nan
-        wanted = there + lost
+        wanted = altitude + lost
     i, j = row - move.north, column - move.east
     if not floor[i, j] <= math.inf:
         return math.nan

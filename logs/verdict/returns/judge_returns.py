@@ -198,8 +198,8 @@ class Returns:
     @property
     def undecided(self) -> bool:
         """True if no return is known to be unsafe, but some are unknown."""
-        wrong = bool(self.unsafe) or self.count("low") > 0
-        return not wrong and (bool(self.open) or self.count("unknown") > 0 or self.count("unsure") > 0)
+        has_failures = bool(self.unsafe) or self.count("low") > 0
+        return not has_failures and (bool(self.open) or self.count("unknown") > 0 or self.count("unsure") > 0)
 
     @property
     def lands(self) -> bool:
@@ -427,11 +427,13 @@ def judge_returns(
             continue
         ends = [world.target(row, way) for row in starts.rows]
         flown, paths = fly_home(world, starts, ends)
-        asked = floors(world, starts)
+        floor_heights = floors(world, starts)
         ones = []
         for k, row in enumerate(flown):
             advance(number * len(starts) + k, total)
-            ones.append(_judge_return(world, starts, k, ends[k], row, paths[k] if paths else _NO_WAY, float(asked[k])))
+            ones.append(
+                _judge_return(world, starts, k, ends[k], row, paths[k] if paths else _NO_WAY, float(floor_heights[k]))
+            )
         if fly_again is not None and way == "circle":
             ones, apart = _recheck_in_jsbsim(world, starts, ones, flown, fly_again, most)
             again += apart

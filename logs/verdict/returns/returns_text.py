@@ -87,16 +87,16 @@ def measured_text(one: ReturnFlown, limit: float, scenario: Scenario) -> str:
     """
     east, north, _ = one.clearance_at
     where = f"{east:.0f} m east, {north:.0f} m north"
-    said = [f"to {one.target.name}", outcome_text(one, limit)]
+    parts = [f"to {one.target.name}", outcome_text(one, limit)]
     if one.kind == "ground":
-        said[-1] += f" at {where}"
+        parts[-1] += f" at {where}"
     elif not math.isnan(one.clearance):
-        said.append(f"{one.clearance:.0f} m above ground at the least at {where}")
+        parts.append(f"{one.clearance:.0f} m above ground at the least at {where}")
     if one.threat >= 0 and one.outside <= 0.0:
-        said.append(f"{-one.outside:.0f} m inside the sphere of {scenario.threats.names[one.threat]}")
+        parts.append(f"{-one.outside:.0f} m inside the sphere of {scenario.threats.names[one.threat]}")
     elif math.isfinite(one.outside):
-        said.append(f"{one.outside:.0f} m outside every missile's sphere")
-    return ", ".join(said)
+        parts.append(f"{one.outside:.0f} m outside every missile's sphere")
+    return ", ".join(parts)
 
 
 def counts_text(returns: Returns) -> str:
@@ -124,10 +124,10 @@ def headline(returns: Returns) -> str:
 
 
 def _judged(returns: Returns) -> str:
-    total, wrong = len(returns.each), counts_text(returns)
-    if wrong:
+    total, failures = len(returns.each), counts_text(returns)
+    if failures:
         safe = returns.count("safe")
-        return f"of {total} returns {wrong}; {safe} {'is' if safe == 1 else 'are'} safe"
+        return f"of {total} returns {failures}; {safe} {'is' if safe == 1 else 'are'} safe"
     # Returns that begin below the limit, as after a take-off, say nothing about the path home.
     aloft = [one for one in returns.each if not one.floor < returns.limit] or returns.each
     lowest = min(aloft, key=lambda one: one.clearance)

@@ -121,12 +121,12 @@ def _zone_finding(requirements: RouteRequirements, z: int, planned: Record, flow
     ok: bool | None = visit.depth <= ROUNDING
     if ok and visit.unknown:
         ok = None
-    wrong, stay = ("inside", "enters it") if zone.kind == "exclusion" else ("outside", "leaves it")
+    side_text, stay = ("inside", "enters it") if zone.kind == "exclusion" else ("outside", "leaves it")
     faults, notes = [], []
     if visit.depth > ROUNDING:
         faults.append(
             message(
-                f"{visit.depth:.1f} m {wrong}",
+                f"{visit.depth:.1f} m {side_text}",
                 f" at {_where(requirements, visit, 'at')}, for {visit.beyond:.1f} s in all:"
                 f" {stay} at {_where(requirements, visit, 'entry')}"
                 f" and is back at {_where(requirements, visit, 'exit')}"
@@ -138,7 +138,7 @@ def _zone_finding(requirements: RouteRequirements, z: int, planned: Record, flow
     if visit.unknown:
         notes.append("the ground that it counts from is not known all along")
     if flown is not None and planned.depth > ROUNDING:
-        notes.append(f"the planned path is {planned.depth:.1f} m {wrong} at {_where(requirements, planned, 'at')}")
+        notes.append(f"the planned path is {planned.depth:.1f} m {side_text} at {_where(requirements, planned, 'at')}")
     return make_finding(
         "fence",
         airspace.place(z),

@@ -96,17 +96,17 @@ def fold_loiters(
             kept[at[0][0]] = _loiter_finding(requirements, aligned, circle, [item for _, item in at])
         legs = [requirements.leg(leg) for leg in range(circle.first, circle.last)]
         for rule in ("slope", "speed", "clearance", "corridor"):
-            mine = left((rule,), legs)
-            if at_once and any(item.ok is not None for _, item in mine):
+            rule_findings = left((rule,), legs)
+            if at_once and any(item.ok is not None for _, item in rule_findings):
                 # The loiter was left before the other legs: only the flown ones are judged.
-                for k, item in mine:
+                for k, item in rule_findings:
                     kept[k] = item if item.ok is not None else None
-                mine = [one for one in mine if one[1].ok is not None]
-            if len(mine) > 1:
-                at_worst, worst = min(mine, key=lambda one: badness(one[1]))
-                for k, _ in mine:
+                rule_findings = [one for one in rule_findings if one[1].ok is not None]
+            if len(rule_findings) > 1:
+                at_worst, worst = min(rule_findings, key=lambda one: badness(one[1]))
+                for k, _ in rule_findings:
                     kept[k] = None
-                reason = f"{worst.reason}; the worst of the circle's {len(mine)} legs"
+                reason = f"{worst.reason}; the worst of the circle's {len(rule_findings)} legs"
                 kept[at_worst] = replace(worst, reason=reason)
     return tuple(item for item in kept if item is not None)
 
@@ -118,10 +118,10 @@ def end_findings(
 
     aligned: not read.
     """
-    beside = beside_end(requirements) if geometric else None
-    if beside is None:
+    hazards = beside_end(requirements) if geometric else None
+    if hazards is None:
         return []
-    reach, found = beside
+    reach, found = hazards
     reason = f"after it {requirements.setup.autopilot.title} circles, up to {reach:.0f} m from it"
     if found:
         reason += f": {', '.join(found)}: only a flight tells how near it comes"
@@ -220,8 +220,8 @@ def _uses_parameter_radius(requirements: RouteRequirements, circle: Circle) -> b
     The item then states none that the autopilot reads.
     """
     rules, seq = requirements.setup.autopilot.loiter_rules, int(requirements.setup.route.items[circle.first])
-    asked = next((loiter_of(item) for item in requirements.setup.mission.items if item.seq == seq), None)
-    return rules.lines_up and rules.radius != 0.0 and asked is not None and rules.radius_of(asked) == 0.0
+    loiter = next((loiter_of(item) for item in requirements.setup.mission.items if item.seq == seq), None)
+    return rules.lines_up and rules.radius != 0.0 and loiter is not None and rules.radius_of(loiter) == 0.0
 
 
 def _bank_held(requirements: RouteRequirements, circle: Circle, tightest: float, at: list[Finding]) -> float:

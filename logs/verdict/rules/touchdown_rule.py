@@ -130,15 +130,15 @@ def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[M
     open_ = [] if faults else _undecided_messages(approach, landing, gusts=gusts)
     if not faults and not open_ and math.isnan(landing.room):
         open_ = [message("the ground below the final is not known")]
-    said = faults or open_
+    messages = faults or open_
     inside = 0.5 * approach.strip.length - TOUCH_ERROR
     farthest = max(landing.stop[0], abs(landing.touch[0]))
     return make_finding(
         "touchdown",
         place,
         ok=False if faults else None if open_ else True,
-        reason=reason_of(said, _description(approach, landing)),
-        faults=said,
+        reason=reason_of(messages, _description(approach, landing)),
+        faults=messages,
         flown=farthest,
         limit=inside,
         source="scenario",

@@ -59,11 +59,11 @@ def _judge(
         [f"turns {math.degrees(planned):.1f}°" + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")],
     )
     if planned > limit + PLAN_TOLERANCE:
-        beside = negligible_kink(requirements, i)
-        if beside is None:
+        lateral = negligible_kink(requirements, i)
+        if lateral is None:
             faults.append(_too_sharp(requirements, i, planned, limit, source))
         else:
-            facts.append(f"a negligible kink: the way without it passes it at {beside:.1f} m and can be flown")
+            facts.append(f"a negligible kink: the way without it passes it at {lateral:.1f} m and can be flown")
     facts += _flown_over(requirements, i, planned)
     method, angle, tolerance = "route", None, PLAN_TOLERANCE
     if measure is not None:
@@ -125,10 +125,10 @@ def _flown_over(requirements: RouteRequirements, i: int, turn: float) -> list[st
     offset = fly_by_offset(turn, radius)
     if offset <= acceptance:
         return []
-    beside = radius * (1.0 - math.cos(turn))
+    lateral = radius * (1.0 - math.cos(turn))
     return [
         f"flown over, because its arc would pass at {offset:.0f} m and its acceptance is {acceptance:.0f} m;"
-        f" that leads up to {beside:.0f} m beside the next leg"
+        f" that leads up to {lateral:.0f} m beside the next leg"
     ]
 
 
