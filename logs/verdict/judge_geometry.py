@@ -106,7 +106,7 @@ def _judge_by_rules(
         if rule.merge is not None:
             findings = rule.merge(requirements, aligned, findings)
     if whole:
-        findings = (*one_per_stop(findings), *_other_sides(requirements, findings))
+        findings = (*one_per_stop(findings), *_reversal_findings(requirements, findings))
     return findings
 
 
@@ -114,7 +114,7 @@ def _judge_by_rules(
 _RULES_OF_PLACE = ("clearance", "threat", "fence")
 
 
-def _other_sides(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
+def _reversal_findings(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
     """Return undecided findings for course reversals that can be turned to either side, if one side fails.
 
     A flight shows one side.  The navigation error of the day decides which: of 12 ArduPlane flights through a turn of
@@ -213,7 +213,7 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
     findings = (
         *mission_findings(setup),
         *with_suggestions(requirements, None, geometric_findings(requirements)),
-        *([_not_feasible(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
+        *([_infeasible_finding(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
     )
     complete = setup.plan is None or setup.plan.feasible
     unjudged, fails = undecided_text(findings), any(item.ok is False for item in findings)
@@ -307,12 +307,12 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
                 method="certificate",
             )
         )
-    findings.append(_not_feasible(plan))
+    findings.append(_infeasible_finding(plan))
     lines = _plan_lines(findings, plan, conditions)
     return Verdict(tuple(findings), False, False, lines, "plan", conditions=conditions)
 
 
-def _not_feasible(plan: Plan) -> Finding:
+def _infeasible_finding(plan: Plan) -> Finding:
     problems = plan.certificate.problems or ("the search still counts violations",)
     first, *others = problems
     fault = message(f"no feasible plan was found: {first}", "".join(f"; {problem}" for problem in others))

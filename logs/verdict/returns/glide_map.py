@@ -348,11 +348,11 @@ def _search(
     flat = need.ravel()
     for k in range(flat.size):
         if flat[k] <= top:
-            _put(k, int((flat[k] - lowest) / band), heads, links)
+            _insert(k, int((flat[k] - lowest) / band), heads, links)
     for b in range(heads.size):
         while heads[b] >= 0:
             k = heads[b]
-            _take(k, b, heads, links)
+            _remove(k, b, heads, links)
             row, column = k // columns, k % columns
             here = flat[k]
             x = min(slopes.shape[1] - 1.001, max(0.0, (here - slopes_low) / pitch))
@@ -365,18 +365,18 @@ def _search(
                 loss = cell * move.length * (slopes[m, h] + (x - h) * (slopes[m, h + 1] - slopes[m, h]))
                 if not here + loss < need[i, j]:
                     continue
-                wanted = _lifted(floor, low, high, between, move, row, column, here, loss)
+                wanted = _step_start_altitude(floor, low, high, between, move, row, column, here, loss)
                 if not (wanted < need[i, j] and wanted <= top):
                     continue
                 other = i * columns + j
                 if need[i, j] <= top:
-                    _take(other, int((need[i, j] - lowest) / band), heads, links)
+                    _remove(other, int((need[i, j] - lowest) / band), heads, links)
                 need[i, j], origin[i, j], onward[i, j] = wanted, origin[row, column], m
-                _put(other, int((wanted - lowest) / band), heads, links)
+                _insert(other, int((wanted - lowest) / band), heads, links)
 
 
 @inner
-def _lifted(
+def _step_start_altitude(
     floor: Floats, low: Floats, high: Floats, between: Records, move: Record, row: int, column: int, here: float,
     loss: float,
 ) -> float:  # pragma: no cover - compiled  # fmt: skip
@@ -406,7 +406,7 @@ def _out_of_spheres(up: float, low: float, high: float) -> float:  # pragma: no 
 
 
 @inner
-def _put(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
+def _insert(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
     """Insert a cell at the head of a band."""
     first = heads[band]
     links[cell, 0], links[cell, 1] = -1, first
@@ -416,7 +416,7 @@ def _put(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: n
 
 
 @inner
-def _take(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
+def _remove(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
     """Remove a cell from its band, if it is in it."""
     before, after = links[cell, 0], links[cell, 1]
     if before >= 0:

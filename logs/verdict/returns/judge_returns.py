@@ -432,7 +432,7 @@ def judge_returns(
         for k, row in enumerate(flown):
             advance(number * len(starts) + k, total)
             ones.append(
-                _judge_return(world, starts, k, ends[k], row, paths[k] if paths else _NO_WAY, float(floor_heights[k]))
+                _judge_return(world, starts, k, ends[k], row, paths[k] if paths else _NO_PATH, float(floor_heights[k]))
             )
         if fly_again is not None and way == "circle":
             ones, apart = _recheck_in_jsbsim(world, starts, ones, flown, fly_again, most)
@@ -472,7 +472,7 @@ def sinks_down(one: ReturnFlown, height: float) -> bool:
     return one.kind in ("ground", "low", "unsure") and sinks and run <= _SINK_RUN_M
 
 
-_NO_WAY: Floats = np.zeros((0, 3))
+_NO_PATH: Floats = np.zeros((0, 3))
 
 
 def fly_home(

@@ -344,13 +344,13 @@ class _Search:
 
     def find(self, asked: NDArray[np.intp], chosen: list[int]) -> list[int]:
         """Return candidates that are good for as many of the starts as possible; chosen: the initial set."""
-        self._fly(asked[~self._known[asked]])
+        self._simulate_candidates(asked[~self._known[asked]])
         while len(chosen) < _MAX_POINTS and self._count(asked, chosen) < len(asked):
             more = self._with_best_addition(asked, chosen)
             if self._count(asked, more) <= self._count(asked, chosen):
                 break
-            chosen = self._swapped(asked, more)
-        return self._pruned(asked, chosen)
+            chosen = self._with_swaps(asked, more)
+        return self._without_superfluous(asked, chosen)
 
     def _with_best_addition(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
         """Return the set with the best point added; or the best two if one alone gains nothing."""
@@ -361,7 +361,7 @@ class _Search:
         first = np.argsort(counts, kind="stable")[::-1][:_PAIR_SEEDS].tolist()
         return max(([*chosen, a, c] for a in first for c in every), key=lambda more: self._count(searched, more))
 
-    def _fly(self, searched: NDArray[np.intp]) -> None:
+    def _simulate_candidates(self, searched: NDArray[np.intp]) -> None:
         """Simulate returns from starts to their nearest candidates; all other candidates are rated as bad."""
         pairs = [
             (k, int(c))
@@ -391,7 +391,7 @@ class _Search:
         good = np.where(goes_home, self._home[searched], self._good[searched, np.array(chosen)[nearest]])
         return int(good.sum())
 
-    def _swapped(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
+    def _with_swaps(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
         """Return the same number of points, each swapped for a better one while there is one."""
         best, improved = self._count(searched, chosen), True
         while improved:
@@ -404,7 +404,7 @@ class _Search:
                         best, chosen, improved = count, other, True
         return chosen
 
-    def _pruned(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
+    def _without_superfluous(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
         """Return the set without superfluous points."""
         for c in list(chosen):
             fewer = [one for one in chosen if one != c]

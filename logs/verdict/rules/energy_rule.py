@@ -26,7 +26,7 @@ def energy_findings(
     setup = requirements.setup
     usable = (1.0 - RESERVE) * setup.battery
     predicted, peak = predicted_energy(requirements)
-    faults = [_never_ends(requirements, usable)] if setup.route.endless >= 0 else []
+    faults = [_endless_jump_message(requirements, usable)] if setup.route.endless >= 0 else []
     guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     used, current = predicted, peak
     if not geometric:
@@ -73,7 +73,7 @@ def energy_findings(
     ]
 
 
-def _never_ends(requirements: RouteRequirements, usable: float) -> Message:
+def _endless_jump_message(requirements: RouteRequirements, usable: float) -> Message:
     """Report that an endless jump is flown until the energy is used up, and how many rounds that lasts."""
     route = requirements.setup.route
     last = len(route.items) - 1

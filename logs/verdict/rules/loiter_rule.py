@@ -166,7 +166,7 @@ def _loiter_finding(
         else:
             facts.append(f"{name}, held with {math.degrees(bank):.0f}° of bank")
     if aligned is not None and bad:
-        faults.append(_not_held(circle, bad))
+        faults.append(_unheld_corners_message(circle, bad))
     elif bad and not faults:
         first = bad[0]
         text, placed = f"{place_text(first.place)}: {first.reason}", first.place == requirements.waypoint(circle.first)
@@ -269,7 +269,7 @@ def _too_small(requirements: RouteRequirements, circle: Circle, tightest: float)
     return [message(f"radius {circle.radius:.0f} m where {needs} in this wind")]
 
 
-def _not_held(circle: Circle, bad: list[Finding]) -> Message:
+def _unheld_corners_message(circle: Circle, bad: list[Finding]) -> Message:
     """Return the number of corners that were not held, and the worst of them."""
     worst = min(bad, key=badness)
     corners = len({item.place for item in bad})
