@@ -64,7 +64,7 @@ class Presentation:
 
     @property
     def left_open(self) -> tuple[Finding, ...]:
-        """The findings that are not judged, so that the verdict is left open."""
+        """Findings that are not judged, so that the verdict is undecided."""
         return left_open(self.findings)
 
     def worth_listing(self, most: int) -> list[tuple[int, Finding]]:
