@@ -105,13 +105,13 @@ def _levels(
         predicted = (*deciding_items(requirements.setup), *geometric_findings(requirements, flown))
         fails = any(item.ok is False for item in predicted)
         passes = not fails and not left_open(predicted)
-        differing = _disagreements("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
-        answer = headline(predicted, passes, source)
-        levels.append(LevelAnswer("geometry", passes, answer, differing, undecided=not passes and not fails))
+        differing = _differing("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
+        said = headline(predicted, passes, source)
+        levels.append(LevelAnswer("geometry", passes, said, differing, undecided=not passes and not fails))
     if requirements.envelope and reference is not None and reference.airframe is not None:
         airframe = reference.airframe
         passed = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}
-        differing = _disagreements("airframe", passed, flown)
+        differing = _differing("airframe", passed, flown)
         # Not flyable without a failed finding means undecided.
         unsure = not airframe.flyable and not airframe.failed
         levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing, undecided=unsure))
@@ -120,7 +120,7 @@ def _levels(
     return (*levels, own)
 
 
-def _disagreements(
+def _differing(
     level: str, outcomes: Mapping[tuple[str, Place], bool | None], flown: tuple[Finding, ...]
 ) -> tuple[Disagreement, ...]:
     """Return the places where a level and the flight judge differently, in the level's order."""

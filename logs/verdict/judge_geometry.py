@@ -41,8 +41,8 @@ def deciding_items(setup: FlightSetup) -> list[Finding]:
 
     The items of a plan are planfly's own, so only PX4's requirements on them are checked.
     """
-    rule_findings = setup.plan is None or setup.autopilot.refuses
-    found = mission_findings(setup) if rule_findings else []
+    asked = setup.plan is None or setup.autopilot.refuses
+    found = mission_findings(setup) if asked else []
     return [item for item in found if item.ok is False or left_open([item])]
 
 

@@ -1,4 +1,4 @@
-"""Order a verdict for display: by rule, the failed findings first, and the undecided findings.
+"""A verdict in the order in which it is shown: by rule, the failed findings first, and the findings that are left open.
 
 Terminal, report page, notebook, studio and JUnit read a `Presentation`, which `logs.verdict.verdict.Verdict.present`
 makes.  It holds data; `logs.verdict.wording` makes words of places and suggestions.
@@ -64,7 +64,7 @@ class Presentation:
 
     @property
     def left_open(self) -> tuple[Finding, ...]:
-        """Findings that are not judged, so that the verdict is undecided."""
+        """The findings that are not judged, so that the verdict is left open."""
         return left_open(self.findings)
 
     def worth_listing(self, most: int) -> list[tuple[int, Finding]]:

@@ -1,4 +1,4 @@
-"""Summarize the verdict in a line, with the facts that a reader needs next to it."""
+"""The verdict in a line, and what a reader should know beside it."""
 
 import math
 from collections.abc import Sequence
@@ -12,37 +12,35 @@ from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule_words import RULE_WORDS, RuleWords
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
 
-# Largest number of failed findings in the first line.
-_MAX_NAMED = 4
-# Introductions of the other levels.
-_LEVEL_INTRODUCTIONS = {
+# Failed findings that the first line names.
+_NAMED = 4
+# How the other levels are introduced.
+_LEVELS = {
     "geometry": "By geometry alone",
     "airframe": "By the airframe (planfly's guidance, exact navigation)",
 }
 
 
 def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> str:
-    """Return the first line: the answer, and what failed, was not judged, or only just passed.
+    """First line: the answer, and what failed, or was not judged or only just passed.
 
-    source: the data from which an uncertain aircraft model was made.
+    source: what the aircraft's model was made from, where it is not known for certain.
     """
-    qualifier = [f"an aircraft from {source}"] if source else []
+    whose = [f"an aircraft from {source}"] if source else []
     if flyable:
-        unjudged = [_not_judged(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
-        return "; ".join(["flyable", *filter(None, unjudged), *_near_miss_notes(findings), *qualifier])
-    failed = _sorted_failures(findings)
+        silent = [_not_judged(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
+        return "; ".join(["flyable", *filter(None, silent), *_by_luck(findings), *whose])
+    failed = _failed(findings)
     if not failed and (open_text := undecided_text(findings)):
-        return "; ".join([f"not judged in full: {open_text}", *qualifier])
-    named = _headline_failures(failed)
+        return "; ".join([f"not judged in full: {open_text}", *whose])
+    named = _most_telling(failed)
     more = len(failed) - len(named)
     text = "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
-    return "; ".join([text, *qualifier])
+    return "; ".join([text, *whose])
 
 
 def undecided_text(findings: Sequence[Finding]) -> str:
-    """Return what is undecided, "" for nothing.
-
-    By an uncertain aircraft, by paths that only a flight shows, or by hazards.
+    """What the aircraft is not known well enough for, only a flight tells, or may be in the way; "" for nothing.
 
     >>> from logs.verdict.findings import UNKNOWN_AIRCRAFT, make_finding
     >>> from logs.verdict.places import Place
@@ -56,16 +54,16 @@ def undecided_text(findings: Sequence[Finding]) -> str:
         for item in open_findings
         if item.check == UNKNOWN_WAY
     ]
-    circles = f"where {' and '.join(ways[:_MAX_NAMED])} is flown, only a flight tells" if ways else ""
+    circles = f"where {' and '.join(ways[:_NAMED])} is flown, only a flight tells" if ways else ""
     known = _unknown_of_aircraft([item for item in open_findings if item.check == UNKNOWN_AIRCRAFT])
-    outside_flight = [item.brief for item in open_findings if item.check in BESIDE_FLIGHT]
+    beside = [item.brief for item in open_findings if item.check in BESIDE_FLIGHT]
     items = [item.brief for item in open_findings if item.check == NOT_FLOWN]
-    more = [f"{len(items) - _MAX_NAMED} more items"] if len(items) > _MAX_NAMED else []
-    return "; ".join(filter(None, [known, circles, *items[:_MAX_NAMED], *more, *outside_flight]))
+    more = [f"{len(items) - _NAMED} more items"] if len(items) > _NAMED else []
+    return "; ".join(filter(None, [known, circles, *items[:_NAMED], *more, *beside]))
 
 
 def _unknown_of_aircraft(every: Sequence[Finding]) -> str:
-    """Return which findings are undecided by uncertainty about the aircraft, in words; "" for nothing."""
+    """What of some findings the aircraft is not known well enough for, in words; "" for nothing."""
     found = [item for item in every if item.rule == "slope"]
     if len(found) < len(every):
         speeds = sum(item.rule == "speed" for item in every)
@@ -81,7 +79,7 @@ def _unknown_of_aircraft(every: Sequence[Finding]) -> str:
         return f"{listed} {are} within what is not known of the aircraft"
     if not found:
         return ""
-    if len(found) > _MAX_NAMED:
+    if len(found) > _NAMED:
         return f"slopes on {len(found)} legs are within what is not known of the aircraft"
     places = [place_text(item.place) + ("," if item.place.to_item is not None else "") for item in found]
     slopes, are = ("slopes", "are") if len(found) > 1 else ("slope", "is")
@@ -89,7 +87,7 @@ def _unknown_of_aircraft(every: Sequence[Finding]) -> str:
 
 
 def first_failed(findings: Sequence[Finding]) -> Finding | None:
-    """Return the failed finding that the first line names first, or None if nothing failed.
+    """The failed finding that the first line names first; None where nothing failed.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import FLIGHT
@@ -98,30 +96,28 @@ def first_failed(findings: Sequence[Finding]) -> Finding | None:
     >>> first.rule
     'completion'
     """
-    failed = _sorted_failures(findings)
-    return _headline_failures(failed)[0] if failed else None
+    failed = _failed(findings)
+    return _most_telling(failed)[0] if failed else None
 
 
-def _sorted_failures(findings: Sequence[Finding]) -> list[Finding]:
-    """Return failed findings: first those that end a flight, then those a change of plan can fix."""
+def _failed(findings: Sequence[Finding]) -> list[Finding]:
+    """What failed: what ends a flight first, then what a plan may be mended by, then in the verdict's order."""
     order = {name: k for k, name in enumerate(RULE_WORDS)}
     failed = (item for item in findings if item.ok is False)
     return sorted(failed, key=lambda item: (-RULE_WORDS[item.rule].urgency, order[item.rule]))
 
 
 def _not_judged(findings: Sequence[Finding], rule: RuleWords) -> str:
-    """Return how much of a rule was not judged, in words; "" for nothing."""
-    rule_findings = [item for item in findings if item.rule == rule.name]
-    unjudged = sum(item.ok is None for item in rule_findings)
-    if not unjudged:
+    """What of a rule was not judged, in words; "" for nothing."""
+    mine = [item for item in findings if item.rule == rule.name]
+    silent = sum(item.ok is None for item in mine)
+    if not silent:
         return ""
-    return f"{rule.unjudged} not judged" + (
-        "" if unjudged == len(rule_findings) else f" on {unjudged} {rule.unjudged_of}"
-    )
+    return f"{rule.unjudged} not judged" + ("" if silent == len(mine) else f" on {silent} {rule.unjudged_of}")
 
 
-def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
-    """Return notes on threats that the aircraft missed by less than its navigation error."""
+def _by_luck(findings: Sequence[Finding]) -> list[str]:
+    """Threats that the aircraft missed by less than it may have been off, in words."""
     out = []
     for item in findings:
         facts = {fact.what: fact.value for fact in item.facts if item.rule == "threat" and item.ok}
@@ -130,20 +126,20 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
     return out
 
 
-def _headline_failures(failed: list[Finding]) -> list[Finding]:
-    """Return at most four findings: the worst of each rule before the second worst of any."""
+def _most_telling(failed: list[Finding]) -> list[Finding]:
+    """At most four findings: the worst of each rule before the second worst of any."""
     margins = [0.0 if item.margin is None else item.margin for item in failed]
     by_margin = sorted(range(len(failed)), key=margins.__getitem__)
     count: dict[str, int] = {}
     rank = {}
     for k in by_margin:
         rank[k] = count[failed[k].rule] = count.get(failed[k].rule, 0) + 1
-    chosen = sorted(range(len(failed)), key=lambda k: (rank[k], k))[:_MAX_NAMED]
+    chosen = sorted(range(len(failed)), key=lambda k: (rank[k], k))[:_NAMED]
     return [failed[k] for k in sorted(chosen)]
 
 
 def _phrase(item: Finding) -> str:
-    """Describe one failed finding in a few words."""
+    """One failed finding in a few words."""
     words = RULE_WORDS[item.rule]
     return words.phrase(words.word, item)
 
@@ -156,22 +152,22 @@ def summary_lines(
     conditions: Conditions,
     deciding: DecidingParameter | None = None,
 ) -> tuple[str, ...]:
-    """Return the summary: answer, airframe or autopilot, start, conditions, not judged, levels.
+    """Lines of the summary: the answer; whose fault it is; start, conditions, autopilot; what was not judged; levels.
 
-    levels: the verdict's own level last, with the headline.
+    levels: the verdict's own last, with the headline.
     """
     *others, own = levels
-    lines = [own.headline, *_airframe_or_autopilot_lines(levels, deciding, setup)]
+    lines = [own.headline, *_whose_fault(levels, deciding, setup)]
     lines.append(f"Start: {setup.started}" if setup.started else "Start: not stated")
     lines += [*condition_lines(conditions), autopilot_line(conditions, flown=level == "flown")]
     lines += _parameter_lines(setup, flown=level == "flown")
-    lines += _ignored_settings_lines(setup)
-    unjudged: dict[str, str] = {}
+    lines += _unheeded_lines(setup)
+    silent: dict[str, str] = {}
     for item in findings:
         if item.ok is None and RULE_WORDS[item.rule].explained:
-            unjudged.setdefault(item.rule, item.reason)
-    lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in unjudged.items()]
-    # Limits of the PX4 autopilot alone, which say nothing about the aircraft.
+            silent.setdefault(item.rule, item.reason)
+    lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in silent.items()]
+    # Limits of that autopilot's own, which say nothing of the aircraft.
     lines += [
         f"PX4 would not take it: {item.reason}"
         for item in findings
@@ -185,7 +181,7 @@ def summary_lines(
         for item in findings
         if RULE_WORDS[item.rule].warns and item.ok is None
     ]
-    lines += _terrain_error_lines(findings, setup)
+    lines += _less_error(findings, setup)
     if setup.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.notes)}")
     if level == "flown":
@@ -194,30 +190,28 @@ def summary_lines(
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
     for other in others:
         agreement = f"; {_agreement(other)}" if level == "flown" else ""
-        lines.append(f"{_LEVEL_INTRODUCTIONS[other.name]}: {other.headline}{agreement}")
+        lines.append(f"{_LEVELS[other.name]}: {other.headline}{agreement}")
     return tuple(lines)
 
 
-def _airframe_or_autopilot_lines(
-    levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, setup: FlightSetup
-) -> list[str]:
-    """If the airframe can fly the mission but the autopilot cannot, name the limiting parameter."""
+def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, setup: FlightSetup) -> list[str]:
+    """Where the aircraft can what the autopilot cannot: that it is so, and the parameter that decides."""
     answers = {level.name: level.flyable for level in levels}
     if answers.get("autopilot") is not False or not answers.get("airframe") or levels[-1].undecided:
         return []
-    qualifier = "" if setup.autopilot.parameters is None else " with these parameters"
-    # Other parameters are flown by the simulated control law, even if the real autopilot flew.
+    whose = "" if setup.autopilot.parameters is None else " with these parameters"
+    # Other parameters are flown by the law, whoever flew.
     by_law = setup.autopilot.program is not None
-    why = "" if by_law or not qualifier else ": no single parameter that was tried would pass"
+    why = "" if by_law or not whose else ": no single parameter that was tried would pass"
     if deciding is not None:
         why = f": {deciding_text(deciding)}{', by the flight of its law' if by_law else ''}"
-    return [f"The aircraft can, {setup.autopilot.title}{qualifier} cannot{why}"]
+    return [f"The aircraft can, {setup.autopilot.title}{whose} cannot{why}"]
 
 
 def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
-    """Return the origin of the parameters, if a file states any, and which of the file's are not used.
+    """Return where the parameters are from, if a file states any, and which of the file's have no use here.
 
-    Without a flight only errors in the file are reported.
+    Without a flight only what is wrong with the file is said.
     """
     parameters = setup.autopilot.parameters
     if parameters is None or not parameters.source:
@@ -230,32 +224,32 @@ def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
     by_length = sorted(parameters.unused, key=lambda name: len(name) <= LONGEST_NAME)
     unused = [
         name if len(name) <= LONGEST_NAME else f"{name} (longer than {LONGEST_NAME} characters)"
-        for name in by_length[:_MAX_NAMED]
+        for name in by_length[:_NAMED]
     ]
     more = len(parameters.unused) - len(unused)
-    notes = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
+    said = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
     returns = [name for name in parameters.not_flown if name in parameters.by_origin("file")]
-    notes += f"; read, not flown: {', '.join(returns)}" if returns else ""
-    notes += f"; beyond {setup.autopilot.title}'s documented ranges, flown: {', '.join(parameters.beyond)}" * bool(
+    said += f"; read, not flown: {', '.join(returns)}" if returns else ""
+    said += f"; beyond {setup.autopilot.title}'s documented ranges, flown: {', '.join(parameters.beyond)}" * bool(
         parameters.beyond
     )
     return [
         f"Parameters: {names['file']} of the file, {names['aircraft']} of the aircraft,"
-        f" {names['default']} {setup.autopilot.title}'s defaults{notes}",
+        f" {names['default']} {setup.autopilot.title}'s defaults{said}",
         *misfits,
     ]
 
 
-def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
-    """Return a line if the autopilot has no parameter for a return setting of the scenario."""
+def _unheeded_lines(setup: FlightSetup) -> list[str]:
+    """What the scenario asks of returns and this autopilot has no parameter for."""
     returns, parameters = setup.scenario.returns, setup.autopilot.parameters
     if returns is None or returns.rtl_autoland is None or parameters is None or hasattr(parameters, "rtl_autoland"):
         return []
     return [f"Not used: rtl_autoland of [returns], for which {setup.autopilot.title} has no parameter"]
 
 
-def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """Return the lowest clearance less the terrain's stated error, if one is stated."""
+def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
+    """The lowest clearance less the terrain's stated error, where one is stated."""
     error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
     heights = [
         item.planned if item.flown is None else item.flown
@@ -272,10 +266,10 @@ def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> lis
 
 
 def _agreement(other: LevelAnswer) -> str:
-    """Return where the verdict and another level differ, in words."""
+    """Where the verdict and another level differ, in words."""
     differing = other.disagreements
     if not differing:
         geometry = other.name == "geometry"
         return "flight and geometry agree on every finding that both have" if geometry else "both flights agree"
-    more = f", +{len(differing) - _MAX_NAMED} more" if len(differing) > _MAX_NAMED else ""
-    return "; ".join(map(disagreement_text, differing[:_MAX_NAMED])) + more
+    more = f", +{len(differing) - _NAMED} more" if len(differing) > _NAMED else ""
+    return "; ".join(map(disagreement_text, differing[:_NAMED])) + more

@@ -1,4 +1,4 @@
-"""Represent a verdict: its findings, whether the plan is flyable, and whether it was flown to its end."""
+"""The verdict: findings, and the two questions that they answer, is the plan flyable and was it flown to its end."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -24,26 +24,26 @@ from world.extras import need_extra
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Verdict:
-    """Verdict on whether a plan really flies.
+    """Whether a plan really flies.
 
     flyable: complete, and no finding failed.
     complete: the plan was feasible, flown to its end, and recorded whole (at the geometric level: feasible, or a
-        mission from the user).
-    lines: the summary for a person; the first line, the headline, answers the question.
+    mission that a person brought).
+    lines: the summary for a person, of which the first, the headline, answers the question.
     level: "flown", "geometric" (from the envelope, without a flight) or "plan" (no feasible plan, so nothing was
     flown).
-    levels: the answer of each level that was judged, geometry first, the verdict's own last; empty for a plan that was
-        not flown.
-    deciding: the decisive autopilot parameter, if the flight fails because of it and the airframe passes.
-    notes: differences between the mission and its flight; the lines state them too.
-    leg_ends: for a flown verdict, when the flight passed each waypoint between its ends, s, and inf from the first one
-        that it did not reach; empty if too little was recorded.
-    program: for a flown verdict, the real autopilot that flew, or None.
-    parameters: for a flown verdict, the parameters of ArduPlane, simulated or real, that flew; None without ArduPlane.
+    levels: what each level says that was asked, geometry first, the verdict's own last; none of a plan that was not
+    flown.
+    deciding: the autopilot's parameter that decides, where the flight fails by one and the aircraft passes.
+    notes: what is not flown as the mission has it; the lines say it too.
+    leg_ends: of a flown verdict, when the flight passed each waypoint between its ends, s, and inf from the first that
+    it did not get to; empty where too little was recorded to tell.
+    program: of a flown verdict, the real autopilot that flew, None where none did.
+    parameters: of a flown verdict, those of the ArduPlane that flew, by its law or itself; None where none did.
     unjudged: what was not judged, so that the flight is not flyable although nothing failed; "" for nothing: items that
-        the log of an imported flight lacks, its end, or slopes within the uncertainty about the aircraft.
-    imported: True for a flight that another program logged, which was flown as planned or was not.
-    conditions: aircraft, speed, weather, navigation, autopilot, ground; the lines state them too.
+    the log of an imported flight lacks, its end, or slopes that the aircraft is not known well enough for.
+    imported: of a flight that another program logged, which was flown as planned or was not.
+    conditions: what it is for: aircraft, speed, weather, navigation, autopilot, ground; the lines say it too.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
@@ -81,12 +81,12 @@ class Verdict:
 
     @property
     def undecided(self) -> bool:
-        """True if nothing failed, but a part of the mission was not judged."""
+        """Whether nothing failed, and a part of the mission was not judged."""
         return bool(self.unjudged) and not self.failed
 
     @property
     def flies(self) -> bool:
-        """True if flyable, apart from undecided departures, approaches and returns outside the flight itself.
+        """Whether it is flyable, but for ways from and to the ground and returns that are left open beside the flight.
 
         >>> from dataclasses import replace
         >>> from logs.verdict.findings import GROUND_WAY, make_finding
@@ -96,12 +96,12 @@ class Verdict:
         >>> verdict.flies, replace(verdict, complete=False).flies
         (True, False)
         """
-        outside_flight = all(item.check in BESIDE_FLIGHT for item in left_open(self.findings))
-        return self.flyable or (self.complete and self.undecided and outside_flight)
+        beside = all(item.check in BESIDE_FLIGHT for item in left_open(self.findings))
+        return self.flyable or (self.complete and self.undecided and beside)
 
     @property
     def headline(self) -> str:
-        """Answer in a line."""
+        """The answer in a line."""
         return self.lines[0] if self.lines else ""
 
     @property
@@ -111,14 +111,14 @@ class Verdict:
 
     @property
     def failed(self) -> tuple[Finding, ...]:
-        """Findings that failed."""
+        """The findings that fail."""
         return tuple(finding for finding in self.findings if finding.ok is False)
 
     @property
     def closest(self) -> dict[str, Finding]:
-        """The worst failed finding of each rule, or if none failed the one closest to its limit.
+        """By rule the failed finding that is furthest beyond its limit, else the one closest to it.
 
-        Rules without a failed finding or one judged by a number are left out.
+        Rules without a finding that failed or was judged by a number are left out.
 
         >>> from logs.verdict.findings import make_finding
         >>> from logs.verdict.places import Place
@@ -131,13 +131,14 @@ class Verdict:
         return {name: finding for name, finding in closest.items() if finding is not None}
 
     def to_pandas(self) -> Any:
-        """Return a `pandas.DataFrame`: a row for each finding, in verdict order, NaN for missing numbers.
+        """A `pandas.DataFrame`: a row a finding, in the verdict's order, NaN for numbers that it has none of.
 
         Columns: rule, place and index (of the leg, turn or threat), then as in `Finding`: planned, flown, limit,
-        tolerance, margin, unit, limit_source, method, ok (None if it was not judged) and reason.
+        tolerance, margin, unit, limit_source, method, ok (None where it was not judged) and reason.
+        Raises `planfly.MissingExtraError`, which is an ImportError, without the extra ``planfly[tables]``.
         """
         need_extra("tables", "to_pandas() needs")
-        # An extra that only this method needs.
+        # An extra: nobody else needs it.
         import pandas as pd
 
         numbers = ("planned", "flown", "limit", "tolerance", "margin")
@@ -183,11 +184,11 @@ class Verdict:
         )
 
     def to_junit(self, name: str) -> str:
-        """Return the verdict as JUnit XML for continuous integration.  name: of the judged plan or flight."""
+        """Write the verdict as JUnit XML, which continuous integration shows.  name: of what was judged."""
         return junit_text({name: self.present()})
 
     def _repr_html_(self) -> str:
-        """Return the verdict as a table for a notebook."""
+        """The verdict as a table for a notebook."""
         return verdict_html(self.present())
 
 
