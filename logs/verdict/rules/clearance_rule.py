@@ -110,7 +110,7 @@ class _Requirement(NamedTuple):
     def worst(self, low: Floats, points: Floats) -> tuple[float, float]:
         """Return the height above ground with the least margin, and its requirement, m.
 
-        low: heights (n,) at places (n, 3).  NaN for the height if one is unknown, or if there are none.
+        low: heights (n,) at places (n, 3).  NaN for the height if one is unknown, or without heights.
         """
         if not low.size or np.isnan(low).any():
             return math.nan, self.limit
@@ -129,8 +129,8 @@ class _Requirement(NamedTuple):
 def _near_ground(requirements: RouteRequirements) -> dict[int, tuple[tuple[float, float], ...]]:
     """Return homes and landing points, m, by the legs after a flown take-off and before a flown landing.
 
-    The legs before a landing are those from DO_LAND_START on, or else the last two; of them the final, and the legs
-    from the last waypoint that meets the limit on height above ground.
+    The legs before a landing begin at DO_LAND_START, or else are the last two.  Of them the final is included, and the
+    legs from the last waypoint that meets the limit on height above ground.
     """
     setup, ground = requirements.setup, requirements.ground
     ways = setup.ground_ways if ground is None else ground.ways

@@ -1,6 +1,6 @@
 """The fence rule: how far planned path and flight go into exclusion zones, or out of inclusion zones.
 
-The zones are the scenario's and the mission's own fence.  The path's line is judged, including its arcs, loiters and
+The zones are the zones of the scenario and the mission's own fence.  The path's line is judged, including its arcs, loiters and
 jumps; a corridor that reaches into a zone is only reported.
 """
 
@@ -47,7 +47,7 @@ def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
 def fence_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each zone that plan or flight violates, or report that none is; empty without zones."""
+    """Judge each zone that plan or flight violates, or report that no zone is violated; empty without zones."""
     airspace = requirements.airspace
     out = []
     if airspace.fault:

@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 class Circle:
     """One loiter of a route.
 
-    first, last: waypoints of its corners, none of them an end of the route: a loiter is joined and left there.
+    first, last: waypoints of its corners, not ends of the route: a loiter is joined and left there.
     middle: (2,) m, its center.
     radius: m.
     turns: number of laps.

@@ -6,7 +6,7 @@ These are PX4's own limits and say nothing about the aircraft: items that PX4 al
 if PX4 is to fly.  The landing that PX4 requires by default fails only if the user's parameter file requires it, because
 most missions have none and it takes one parameter to change that.  A command that neither PX4 nor ArduPlane supports
 fails for any autopilot, and so does a route beyond the mission's own fence.  Invalid latitudes, longitudes, frames and
-counts were refused when the file was read.
+numbers of items were refused when the file was read.
 """
 
 import itertools

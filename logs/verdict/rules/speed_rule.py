@@ -226,7 +226,7 @@ def _level_flight_range(
     """Return the range of level-flight speeds all along a leg, and faults of the commanded speed."""
     heights = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     speeds = [requirements.setup.envelope.level_speeds(up) for up in heights]
-    # Without level flight at one altitude there is none all along the leg: NaN remains.
+    # If level flight is impossible at one altitude, NaN remains for the whole leg.
     slowest, fastest = float(np.max([low for low, _ in speeds])), float(np.min([high for _, high in speeds]))
     faults = []
     if math.isnan(requirements.ground_speed[leg]):

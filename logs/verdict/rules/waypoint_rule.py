@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 def waypoint_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge how close the track came to each waypoint; ``geometric``: how close the planned path passes."""
+    """Judge how closely the track, or the planned path (``geometric``), passes each waypoint."""
     judged = [i for i in range(len(requirements.points)) if not requirements.turns_around(i)]
     if geometric:
         return [_planned(requirements, i) for i in judged]
