@@ -1,7 +1,7 @@
 """The fence rule: how far planned path and flight go into exclusion zones, or out of inclusion zones.
 
-The zones are the zones of the scenario and the mission's own fence.  The path's line is judged, including its arcs, loiters and
-jumps; a corridor that reaches into a zone is only reported.
+The zones are the zones of the scenario and the mission's own fence.  The path's line is judged, including its arcs,
+loiters and jumps; a corridor that reaches into a zone is only reported.
 """
 
 import math
