@@ -199,7 +199,7 @@ SLOWEST = 15.0
 SLOWEST_SHARE = 0.94
 # s.  A log with a pause this long between rows has lost rows.
 LONGEST_GAP = 0.5
-# Median steps between rows.  In a log with so few rows a second that `LONGEST_GAP` is an ordinary step, this many steps
+# Median steps between rows.  In a sparse log, where `LONGEST_GAP` is an ordinary step, this many steps
 # are a pause.
 GAP_STEPS = 5.0
 # m/s.  Largest disagreement between position and velocity in one tick; beyond it the record contradicts itself.

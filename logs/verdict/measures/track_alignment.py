@@ -39,7 +39,7 @@ class AlignedTrack:
 
     track: the usable rows.
     bad_rows: number of rows with non-finite or implausible numbers or a time not later than the row before.
-    first_bad: time of the first of them, s; NaN if there is none.
+    first_bad: time of the first of them, s; NaN without any.
     rows: (w,) the row nearest to each waypoint's apex, never decreasing; the last row for a waypoint that the flight
         did not reach.
     distance: (w,) m from there to the apex.

@@ -69,7 +69,7 @@ def flown_starts(setup: FlightSetup, track: Track, every: float) -> ReturnStarts
         return _no_starts(flown=True)
     time = track.time[known]
     wanted = np.arange(time[0], time[-1] + 1e-9, every)
-    # Take the nearest row; in a pause of the log there is none.
+    # Take the nearest row, except in a pause of the log.
     every_row = known[np.unique(np.searchsorted(time, wanted - 1e-9).clip(0, len(known) - 1))]
     near, slow = _low_and_slow_rows(setup, track, every_row)
     rows, low = every_row[~slow], near[~slow]

@@ -47,7 +47,7 @@ def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
 def fence_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each zone that plan or flight violates, or report that no zone is violated; empty without zones."""
+    """Judge each zone that plan or flight violates, or report that all are kept; empty without zones."""
     airspace = requirements.airspace
     out = []
     if airspace.fault:
