@@ -44,9 +44,9 @@ class FlownLegs:
 def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> FlownLegs | None:
     """Find the legs of a stretch, or return None without any.
 
-    A stretch has no legs if it reached at most one waypoint, or has fewer than two rows.  A flight begins with the first
-    waypoint that it passed: the path to that waypoint is no leg.  It ends with the last waypoint that it passed, or on
-    the leg from there, which was then flown in part.
+    A stretch has no legs if it reached at most one waypoint, or has fewer than two rows.  A flight begins with the
+    first waypoint that it passed: the path to that waypoint is no leg.  It ends with the last waypoint that it
+    passed, or on the leg from there, which was then flown in part.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()

@@ -3,7 +3,8 @@
 It judges the final's height above ground, the hazards that the final enters, and where the aircraft touches down and
 stops on the scenario's strip.  The sink rate towards the ground, which may rise before the aircraft, is reported: the
 simulation of ArduPlane's law is accurate down to the flare, but less so in the last metres (`docs/measured.md`).  So a
-sink rate beyond all measured ones leaves the landing undecided, and no sink rate passes or fails it.  A landing that is not flown is judged by the landing and approach rules, from the mission's items.
+sink rate beyond all measured ones leaves the landing undecided, and no sink rate passes or fails it.  A
+landing that is not flown is judged by the landing and approach rules, from the mission's items.
 """
 
 import math
