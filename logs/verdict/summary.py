@@ -154,7 +154,7 @@ def summary_lines(
 ) -> tuple[str, ...]:
     """Lines of the summary: the answer; whose fault it is; start, conditions, autopilot; what was not judged; levels.
 
-    levels: the verdict's own last, with the headline.
+    levels: the verdict's own level last, with the headline.
     """
     *others, own = levels
     lines = [own.headline, *_whose_fault(levels, deciding, setup)]
@@ -167,7 +167,7 @@ def summary_lines(
         if item.ok is None and RULE_WORDS[item.rule].explained:
             silent.setdefault(item.rule, item.reason)
     lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in silent.items()]
-    # Limits of that autopilot's own, which say nothing of the aircraft.
+    # Limits of the PX4 autopilot alone, which say nothing about the aircraft.
     lines += [
         f"PX4 would not take it: {item.reason}"
         for item in findings
@@ -200,7 +200,7 @@ def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | No
     if answers.get("autopilot") is not False or not answers.get("airframe") or levels[-1].undecided:
         return []
     whose = "" if setup.autopilot.parameters is None else " with these parameters"
-    # Other parameters are flown by the law, whoever flew.
+    # Other parameters are flown by the simulated control law, even if the real autopilot flew.
     by_law = setup.autopilot.program is not None
     why = "" if by_law or not whose else ": no single parameter that was tried would pass"
     if deciding is not None:
