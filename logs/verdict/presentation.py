@@ -13,14 +13,14 @@ from logs.verdict.rule_words import RULE_WORDS, RuleWords
 
 @dataclass(frozen=True, slots=True)
 class RuleFindings:
-    """The findings of one rule, in the verdict's order."""
+    """Findings of one rule, in the order of the verdict."""
 
     words: RuleWords
     findings: tuple[Finding, ...]
 
     @property
     def failed(self) -> tuple[Finding, ...]:
-        """The failed findings, the worst first."""
+        """Failed findings, the worst first."""
         return tuple(sorted((item for item in self.findings if item.ok is False), key=lambda item: item.margin or 0.0))
 
     @property
@@ -30,7 +30,7 @@ class RuleFindings:
 
     @property
     def closest(self) -> Finding | None:
-        """The failed finding that is furthest beyond its limit, else the finding closest to its limit."""
+        """Failed finding that is furthest beyond its limit, else the finding closest to its limit."""
         return closest_to_limit(self.findings)
 
     @property
@@ -58,7 +58,7 @@ class Presentation:
 
     @property
     def failed_rules(self) -> tuple[RuleFindings, ...]:
-        """The rules with failed findings, in the order of the headline."""
+        """Rules with failed findings, in the order of the headline."""
         failed = [rule for rule in self.rules if rule.failed]
         return tuple(sorted(failed, key=lambda rule: -rule.words.urgency))
 

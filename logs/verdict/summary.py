@@ -12,9 +12,9 @@ from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule_words import RULE_WORDS, RuleWords
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
 
-# Failed findings that the first line names.
+# Largest number of failed findings that the first line names.
 _NAMED = 4
-# How the other levels are introduced.
+# Introductions of the other levels.
 _LEVELS = {
     "geometry": "By geometry alone",
     "airframe": "By the airframe (planfly's guidance, exact navigation)",

@@ -1,4 +1,4 @@
-"""The verdict: findings, and the two questions that they answer, is the plan flyable and was it flown to its end."""
+"""Represent a verdict: its findings, whether the plan is flyable, and whether it was flown to its end."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -69,7 +69,7 @@ class Verdict:
 
     @property
     def answer(self) -> str:
-        """The verdict in a few words.
+        """Verdict in a few words.
 
         >>> Verdict((), flyable=False, complete=True, lines=(), level="flown", imported=True).answer
         'not flown as planned'
@@ -101,7 +101,7 @@ class Verdict:
 
     @property
     def headline(self) -> str:
-        """The answer in a line."""
+        """Answer in a line."""
         return self.lines[0] if self.lines else ""
 
     @property
@@ -111,12 +111,12 @@ class Verdict:
 
     @property
     def failed(self) -> tuple[Finding, ...]:
-        """The findings that fail."""
+        """Findings that failed."""
         return tuple(finding for finding in self.findings if finding.ok is False)
 
     @property
     def closest(self) -> dict[str, Finding]:
-        """By rule the failed finding that is furthest beyond its limit, else the one closest to it.
+        """Failed finding furthest beyond its limit, else the finding closest to its limit, by rule.
 
         Rules without a finding that failed or was judged by a number are left out.
 
@@ -184,11 +184,11 @@ class Verdict:
         )
 
     def to_junit(self, name: str) -> str:
-        """Write the verdict as JUnit XML, which continuous integration shows.  name: of what was judged."""
+        """Write the verdict as JUnit XML for continuous integration.  name: of the judged plan or flight."""
         return junit_text({name: self.present()})
 
     def _repr_html_(self) -> str:
-        """The verdict as a table for a notebook."""
+        """Return the verdict as a table for a notebook."""
         return verdict_html(self.present())
 
 
