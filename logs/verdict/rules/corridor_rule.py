@@ -68,8 +68,8 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
 def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, limit: float) -> slice:
     """Return a leg's rows; after a take-off, from where the aircraft first flies along it.
 
-    That is on the leg's course and within the limit (m) of its line.  A take-off ends on its launch course, whatever the
-    course of the leg from there.
+    That is on the leg's course and within the limit (m) of its line.  A take-off ends on its launch course, whatever
+    the course of the leg from there.
     """
     rows, ground = aligned.leg_rows(leg), requirements.ground
     if ground is None or ground.ways.take_off is None or ground.ways.take_off.waypoint != leg:
