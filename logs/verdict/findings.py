@@ -26,7 +26,7 @@ _UNDECIDED = (UNKNOWN_AIRCRAFT, UNKNOWN_WAY, NOT_FLOWN, *APART_FROM_FLIGHT)
 
 @dataclass(frozen=True, slots=True)
 class Fact(DocumentConfig):
-    """A number that a rule measured and does not judge."""
+    """Number that a rule measured and does not judge."""
 
     what: str
     """overshoot, settled, bank, radius, height error, slope error, throttle at full, nearest, ..."""
@@ -36,22 +36,22 @@ class Fact(DocumentConfig):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One rule at one place: what was planned, what was flown, what is allowed.
+    """Result of one rule at one place: the planned value, the flown value, and the limit.
 
     rule: a name of `logs.verdict.rule_words.RULE_WORDS`.
-    place: where.
-    planned, flown, limit, tolerance, margin: in `unit`, None where there is no such number.
-    margin: how far inside the limit (negative: beyond), tolerance not counted.
-    limit_source: "scenario", "aircraft", or what set it.
-    method: how the numbers were got.
-    ok: None where it was not judged.
-    reason: why, for a person to read; everything that a program needs of it stands in another field.
-    suggestions: of a failed finding, the smallest changes of the plan that would pass it, the least change first.
+    place: place of the finding.
+    planned, flown, limit, tolerance, margin: in `unit`, None if there is no such number.
+    margin: distance inside the limit (negative: beyond), without the tolerance.
+    limit_source: "scenario", "aircraft", or another source of the limit.
+    method: how the numbers were obtained.
+    ok: None if it was not judged.
+    reason: the reason for a person to read; everything that a program needs is in other fields.
+    suggestions: for a failed finding, the smallest changes of the plan with which it passes, the least change first.
     brief: the reason in a few words, for a headline.
-    placed: whether the reason begins with the place.
-    check: where a rule has several checks, which one; `UNKNOWN_AIRCRAFT`, `UNKNOWN_WAY`, `NOT_FLOWN`, `GROUND_WAY` or
-    `UNKNOWN_RETURN` of what those leave open; "" otherwise.
-    facts: what was measured beside it and is no fault.
+    placed: True if the reason begins with the place.
+    check: the check of a rule with several checks; `UNKNOWN_AIRCRAFT`, `UNKNOWN_WAY`, `NOT_FLOWN`, `GROUND_WAY` or
+        `UNKNOWN_RETURN` for what those leave undecided; "" otherwise.
+    facts: further measured numbers that are no faults.
     """
 
     rule: str
@@ -74,12 +74,12 @@ class Finding:
 
     @property
     def where(self) -> str:
-        """The place in words."""
+        """Place in words."""
         return place_text(self.place)
 
     @property
     def suggestion(self) -> str:
-        """The suggestions in words, "" for none."""
+        """Suggestions in words, "" without any."""
         return suggestions_text(self.suggestions)
 
 
@@ -147,12 +147,12 @@ def make_finding(
     check: str = "",
     facts: Sequence[Fact] = (),
 ) -> Finding:
-    """Make a finding of plain numbers: rounded to 1e-6, and None for what is not finite.
+    """Make a finding with numbers rounded to 1e-6, and None for non-finite numbers.
 
-    faults: what the reason begins with, where it begins with faults.
-    facts: measured beside it; one that is not a number is left out.
-    A finding that fails by other evidence than its number, which is within the limit and its tolerance, has no margin:
-    the reason says what failed.
+    faults: the beginning of the reason, if it begins with faults.
+    facts: further measured numbers; non-finite ones are left out.
+    A finding that fails by other evidence while its number is within the limit and its tolerance has no margin: the
+    reason says what failed.
 
     >>> make_finding("speed", Place("leg", 2), ok=False, reason="too slow", limit=16.0, margin=0.5).margin is None
     True

@@ -1,4 +1,4 @@
-"""A verdict as JUnit XML, which continuous integration shows: a case for each finding, one for the answer."""
+"""Write a verdict as JUnit XML for continuous integration: a case for each finding and the answer."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -10,10 +10,11 @@ from logs.verdict.rule_words import rule_word
 
 
 def junit_text(verdicts: Mapping[str, Presentation]) -> str:
-    """Write the text of the file, a test suite for each verdict.  verdicts: by the name of what was judged.
+    """Write the text of the file, a test suite for each verdict.
 
-    A finding that fails is a failure, and one that was not judged is skipped.  The case ``verdict`` fails where the
-    answer is not "flyable", also where nothing failed but a part was not judged.
+    verdicts: by the name of the judged plan or flight.  A finding that fails is a failure, and one that was not judged
+    is skipped.  The case ``verdict`` fails if the answer is not "flyable", even if nothing failed but a part was not
+    judged.
 
     `logs.verdict.verdict.Verdict.to_junit` writes one verdict.
     """
@@ -46,7 +47,7 @@ def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
     for finding in findings:
         place = _plain(finding.where)
         seen[finding.rule, place] += 1
-        # Names of cases are unique.
+        # Names of cases must be unique.
         number = seen[finding.rule, place]
         name = place if number == 1 else f"{place} ({number})"
         case = ElementTree.Element("testcase", classname=f"planfly.{finding.rule}", name=name)

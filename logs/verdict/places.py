@@ -1,4 +1,4 @@
-"""Where a finding lies, what of a plan could be changed, and the three levels of a verdict, as data."""
+"""Represent places of findings, changes of a plan, and the three levels of a verdict, as data."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -6,21 +6,21 @@ from typing import Literal
 from world.json_schema import DocumentConfig
 
 # ----------------------------------------------------------------------
-# Where a finding lies, what of a plan could be changed, and where two levels differ, as data.
+# Places of findings, changes of a plan, and disagreements between levels, as data.
 #
-# `logs.verdict.wording` makes words of it.
+# `logs.verdict.wording` writes them in words.
 
-# "flight", "mission" and "plan" are the whole of it; "missile" and "radar" are a threat's two spheres; "exclusion" and
-# "inclusion" are zones of airspace.
+# "flight", "mission" and "plan" are the whole of each; "missile" and "radar" are a threat's two spheres; "exclusion"
+# and "inclusion" are zones of airspace.
 PlaceKind = Literal[
     "flight", "mission", "plan", "leg", "waypoint", "missile", "radar", "exclusion", "inclusion"
 ]  # fmt: skip
 
-# What a change is of.  To another value: a leg's "length", its "rise" (negative: it falls), "airspeed", a "turn" at
-# most.  By a step: "height" or "descent" (higher, lower) of a leg, or of the path at a zone; "inset" of the path from
+# Quantity of a change.  To another value: a leg's "length", its "rise" (negative: it falls), "airspeed", the largest
+# "turn".  By a step: "height" or "descent" (higher, lower) of a leg, or of the path at a zone; "inset" of the path from
 # the area's edges, "distance" from a missile, "north", "east", "south" or "west" at a zone, "duration" of the flight.
-# By a factor: the "battery" or the "tank".  Not of a plan, but of what is known of the aircraft: so long a flight at
-# "full throttle" or with "no throttle" would tell.
+# By a factor: the "battery" or the "tank".  Not of a plan, but of the knowledge about the aircraft: the duration of a
+# flight at "full throttle" or with "no throttle" that measures its ability.
 Quantity = Literal[
     "length", "rise", "airspeed", "turn", "height", "descent", "inset", "distance", "north", "east", "south", "west",
     "duration", "battery", "tank", "full throttle", "no throttle",
@@ -29,10 +29,9 @@ Quantity = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Place(DocumentConfig):
-    """Where something was judged."""
+    """Place that was judged."""
 
-    # Which leg an item or a number names is no part of what makes two places the same: the index is enough, and older
-    # logs have neither.
+    # Two places are the same without regard to their item or number: the index is enough, and older logs have neither.
 
     kind: PlaceKind
     """flight, mission, plan, leg, waypoint, missile, radar, exclusion or inclusion."""
@@ -66,13 +65,13 @@ class Change(DocumentConfig):
     """The upper end of a range that passes, of which wanted is the lower end."""
 
 
-# Changes to make together; a finding holds alternatives of these, any of which would pass.
+# Changes to make together; a finding has alternatives of these, any of which would pass.
 Suggestion = tuple[Change, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Disagreement(DocumentConfig):
-    """A rule at a place that another level and the verdict judge differently."""
+    """Rule at a place that another level and the verdict judge differently."""
 
     rule: str
     place: Place
@@ -87,20 +86,20 @@ class Disagreement(DocumentConfig):
 # ----------------------------------------------------------------------
 # The three levels of a verdict, as data: geometry, airframe, autopilot.
 #
-# geometry: does the path ask for more than the envelope gives; nobody flies.  airframe: can this aircraft follow it at
-# all, flown by planfly's guidance that knows exactly where it is.  autopilot: does it go well with the autopilot that
-# will fly, its parameters and its error of navigation.  The verdict is that of the last one that was asked.
+# geometry: whether the path stays within the envelope, without a flight.  airframe: whether this aircraft can follow it
+# at all, with planfly's guidance and exact navigation.  autopilot: whether it passes with the autopilot that will fly,
+# its parameters and its navigation error.  The verdict is the answer of the last level that was judged.
 
 LevelName = Literal["geometry", "airframe", "autopilot"]
 
 
 @dataclass(frozen=True, slots=True)
 class LevelAnswer:
-    """What one level says.
+    """Answer of one level.
 
-    headline: its answer in a line.
-    disagreements: the findings that it and the verdict judge differently; none of the verdict's own level.
-    undecided: whether nothing failed, and something was not judged that had to be.
+    headline: the answer in a line.
+    disagreements: findings that this level and the verdict judge differently; empty for the verdict's own level.
+    undecided: True if nothing failed, but a required part was not judged.
     """
 
     name: LevelName
@@ -112,7 +111,7 @@ class LevelAnswer:
 
 @dataclass(frozen=True, slots=True)
 class AirframeAnswer:
-    """What the flight of the aircraft by planfly's guidance gave, as the log of the autopilot's flight carries it.
+    """Result of the reference flight by planfly's guidance, as stored in the log of the judged flight.
 
     failed: rule and place of each finding that failed.
     """
@@ -124,14 +123,12 @@ class AirframeAnswer:
 
 @dataclass(frozen=True, slots=True)
 class DecidingParameter:
-    """The one parameter of the autopilot by which a flight fails: with another value of it alone the flight passes.
+    """Autopilot parameter that decides: with another value of it alone the flight passes.
 
-    name: the autopilot's own.
-    current, passing: its values, in ``unit``: as flown, and the nearest to it with which the flight was flown and
-    passed.
+    name: the autopilot's own name.
+    current, passing: its values, in ``unit``: as flown, and the nearest value with which a flight passed.
     rule, place: of the finding that failed first with the current value.
-    off: how far off it was there, m: below (negative) or above for a height, aside for the corridor; None where no
-    such number is known.
+    off: error there, m: below (negative) or above for a height, to the side for the corridor; None if unknown.
     """
 
     name: str
@@ -145,10 +142,10 @@ class DecidingParameter:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceFlights:
-    """What other flights than the one that is judged have to say of it; they are not flown again to judge a log.
+    """Results of reference flights for the judged flight; they are stored, not flown again to judge a log.
 
-    airframe: None where it was not flown.
-    deciding: None where none decides, or none was looked for.
+    airframe: None if it was not flown.
+    deciding: None if no parameter decides, or none was looked for.
     """
 
     airframe: AirframeAnswer | None = None

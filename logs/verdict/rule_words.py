@@ -1,4 +1,4 @@
-"""The words of each rule of the verdict, and nothing that judges: name, title, question, unit, scale and urgency.
+"""Define the words of each rule, without any judging: name, title, question, unit, scale, urgency.
 
 `logs.verdict.rules.registry.RULES` holds how each rule judges.  Everything that shows a verdict reads this table.
 """

@@ -29,9 +29,9 @@ RADIUS_TOLERANCE = 0.02
 # Fraction.  The mean radius of a flown loiter may exceed its stated radius by this, in addition to `PASS`.
 WIDER_SHARE = 0.25
 # Radii of the bank limit's arc.  Distance from its center that an autopilot that steers to it may reach on a loiter too
-# tight for its bank: up to 2.09 on 20 flights of ArduPlane's law with circles of 10 to 100 m, in up to 12 m/s of wind.
+# tight for its bank: up to 2.09 on 20 flights of ArduPlane's law with loiters of 10 to 100 m, in up to 12 m/s of wind.
 # Also the distance from a mission's last waypoint that PX4, which loiters there, may reach, in radii of the wider of
-# that loiter and the bank limit: up to 2.06 in 54 ends of missions by its law, with circles of 80 and 200 m, in up to
+# that loiter and the bank limit: up to 2.06 in 54 ends of missions by its law, with loiters of 80 and 200 m, in up to
 # 12 m/s of wind.
 SWING = 2.25
 # m.  A leg shorter than this is a vertical climb, with no course of its own.
@@ -199,7 +199,7 @@ SLOWEST = 15.0
 SLOWEST_SHARE = 0.94
 # s.  A log with a pause this long between rows has lost rows.
 LONGEST_GAP = 0.5
-# Median steps between rows.  In a log with so few rows a second that `LONGEST_GAP` is an ordinary step, this many steps
+# Median steps between rows.  In a sparse log, where `LONGEST_GAP` is an ordinary step, this many steps
 # are a pause.
 GAP_STEPS = 5.0
 # m/s.  Largest disagreement between position and velocity in one tick; beyond it the record contradicts itself.

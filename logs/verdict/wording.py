@@ -153,7 +153,7 @@ def suggestions_text(suggestions: tuple[Suggestion, ...]) -> str:
 
 
 # How a level judges, after "passes" and "fails".
-_BY_LEVEL = {"geometry": "by geometry", "airframe": "with planfly's guidance", "autopilot": "with the autopilot"}
+_LEVEL_PHRASES = {"geometry": "by geometry", "airframe": "with planfly's guidance", "autopilot": "with the autopilot"}
 
 
 def disagreement_text(one: Disagreement) -> str:
@@ -164,7 +164,7 @@ def disagreement_text(one: Disagreement) -> str:
     """
     verbs = {True: "passes", False: "fails"}
     where = f"{one.rule} at {place_text_within(one.place)}"
-    return f"{where} {verbs[one.there]} {_BY_LEVEL[one.level]} and {verbs[one.here]} in flight"
+    return f"{where} {verbs[one.there]} {_LEVEL_PHRASES[one.level]} and {verbs[one.here]} in flight"
 
 
 def deciding_text(deciding: DecidingParameter) -> str:

@@ -42,11 +42,11 @@ class FlownLegs:
 
 
 def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> FlownLegs | None:
-    """Find the legs of a stretch, or None if there are none.
+    """Find the legs of a stretch, or return None without any.
 
-    There are none if it reached at most one waypoint, or has fewer than two rows.  A flight begins with the first
-    waypoint that it passed: the path to that waypoint is no leg.  It ends with the last waypoint that it passed, or on
-    the leg from there, which was then flown in part.
+    A stretch has no legs if it reached at most one waypoint, or has fewer than two rows.  A flight begins with the
+    first waypoint that it passed: the path to that waypoint is no leg.  It ends with the last waypoint that it
+    passed, or on the leg from there, which was then flown in part.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()

@@ -57,7 +57,7 @@ def imported_lines(
     if source is None:
         return (own.headline,)
     lines = [own.headline, *condition_lines(conditions)]
-    lines.append(f"{autopilot_line(conditions, flown=True)} ({source.format} {source.file}{_when(source)})")
+    lines.append(f"{autopilot_line(conditions, flown=True)} ({source.format} {source.file}{_start_time_text(source)})")
     lines += [*_judged_lines(source, flown, setup.route.leg_numbers.tolist()), *_unjudged_lines(findings)]
     lines += [line] if (line := corridor_line(setup)) else []
     if source.mission:
@@ -102,12 +102,12 @@ def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
     """Return a line for each rule that was not judged, with the reason and, if partial, the numbers."""
     lines = []
     for rule in RULE_WORDS.values():
-        mine = [item for item in findings if item.rule == rule.name]
-        silent = [item for item in mine if item.ok is None]
-        if not silent:
+        rule_findings = [item for item in findings if item.rule == rule.name]
+        unjudged = [item for item in rule_findings if item.ok is None]
+        if not unjudged:
             continue
-        where = "" if len(silent) == len(mine) else f" on {len(silent)} of {len(mine)}"
-        lines.append(f"Not judged: {rule.title}{where} ({silent[0].brief})")
+        where = "" if len(unjudged) == len(rule_findings) else f" on {len(unjudged)} of {len(rule_findings)}"
+        lines.append(f"Not judged: {rule.title}{where} ({unjudged[0].brief})")
     return lines
 
 
@@ -119,8 +119,8 @@ def heights_text(source: ImportedLog) -> str:
     'POS, above mean sea level, as the log has it; at the start GPS.Alt -0.1 m of it'
     """
     offsets = ", ".join(f"{one.name} {one.offset:+.1f} m" for one in source.heights.offsets)
-    beside = f"; at the start {offsets} of it" if offsets else ""
-    return f"{source.heights.source}, {_DATUM_TEXTS[source.heights.datum]}{beside}"
+    offset_text = f"; at the start {offsets} of it" if offsets else ""
+    return f"{source.heights.source}, {_DATUM_TEXTS[source.heights.datum]}{offset_text}"
 
 
 def rows_text(faults: RowFaults, gaps: int) -> str:
@@ -196,7 +196,7 @@ def damage_text(damage: Damage) -> str:
     return "; ".join(words) or "nothing"
 
 
-def _when(source: ImportedLog) -> str:
+def _start_time_text(source: ImportedLog) -> str:
     if not isfinite(source.utc_start) or not 0.0 <= source.utc_start < 4.1e9:
         return ""
     return f", its time 0 is {datetime.fromtimestamp(source.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
@@ -219,7 +219,7 @@ _DATUMS = {
     "pressure": "the log's heights are by pressure, above the level of 1013.25 hPa",
     "unstated": "the log does not say what its heights are above (--datum says it)",
 }
-_UNNAMED = "the aircraft is not named (--aircraft)"
+_UNNAMED_TEXT = "the aircraft is not named (--aircraft)"
 
 
 def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: bool) -> Verdict:
@@ -241,8 +241,8 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     flyable = bool(flown) and not failed and not unjudged
     complete = not unjudged and all(item.ok is True for item in findings if item.rule == "completion")
     answer = [headline(findings, flyable).replace("flyable", "flown as planned", 1)] if failed or not unjudged else []
-    said = "; ".join([*answer, *filter(None, [unjudged])])
-    own = LevelAnswer(setup.autopilot.level, flyable, said, undecided=bool(unjudged) and not failed)
+    answer_text = "; ".join([*answer, *filter(None, [unjudged])])
+    own = LevelAnswer(setup.autopilot.level, flyable, answer_text, undecided=bool(unjudged) and not failed)
     conditions = setup_conditions(setup)
     lines = imported_lines(findings, setup, own, flown, conditions)
     return Verdict(
@@ -298,7 +298,7 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     """Return the findings of one stretch, at the places of the whole route."""
     out = []
     for item in track_findings(legs.requirements, legs.aligned):
-        judged = _within_gaps(_without_missing_data(setup, legs, item), legs)
+        judged = _checked_for_gaps(_without_missing_data(setup, legs, item), legs)
         if legs.partial:
             judged = _partly_flown(judged, legs)
         out.append(_at_route_place(judged, legs.first, setup))
@@ -331,17 +331,17 @@ def _without_missing_data(setup: FlightSetup, legs: FlownLegs, item: Finding) ->
             stated = source.plan_heights or not needs.planned_heights
             reason = _DATUMS.get(source.heights.datum, "") if stated else "the plan states no heights"
         else:
-            reason = _missing(legs, quantity)
+            reason = _missing_values_text(legs, quantity)
         if reason:
             break
     if reason:
         return _unjudged(item, reason)
     if not source.aircraft_known and needs.aircraft and item.limit_source != "scenario":
-        return _unjudged(item, _UNNAMED, measured=bool(item.ok))
+        return _unjudged(item, _UNNAMED_TEXT, measured=bool(item.ok))
     return item
 
 
-def _missing(legs: FlownLegs, quantity: Quantity) -> str:
+def _missing_values_text(legs: FlownLegs, quantity: Quantity) -> str:
     """Return when a stretch lacks values of a quantity that the log has elsewhere, in words; "" for never."""
     values = getattr(legs.aligned.track, _COLUMNS[quantity])
     bad = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
@@ -358,7 +358,7 @@ def _unjudged(item: Finding, why: str, *, measured: bool = False) -> Finding:
     return replace(item, ok=None, reason=reason, brief=why, placed=False, margin=None, facts=facts, suggestions=())
 
 
-def _within_gaps(item: Finding, legs: FlownLegs) -> Finding:
+def _checked_for_gaps(item: Finding, legs: FlownLegs) -> Finding:
     """Mark a passed finding as not judged if the log has a pause in its leg."""
     if item.ok is not True or item.place.index is None or item.place.kind not in ("leg", "waypoint"):
         return item

@@ -91,8 +91,8 @@ def _missiles(requirements: RouteRequirements, middle: Floats, low: float, high:
     threats, found = scenario.threats, []
     for m, table in enumerate(scenario.spec.threats):
         radius, (east, north, up) = float(threats.kill_radius[m]), threats.position[m]
-        beside = max(0.0, math.hypot(east - middle[0], north - middle[1]) - reach)
-        if radius > 0.0 and math.hypot(beside, max(0.0, low - up, up - high)) <= radius:
+        horizontal = max(0.0, math.hypot(east - middle[0], north - middle[1]) - reach)
+        if radius > 0.0 and math.hypot(horizontal, max(0.0, low - up, up - high)) <= radius:
             found.append(f"the missile {threat_label(table.name or '', m)} reaches it")
     return found
 

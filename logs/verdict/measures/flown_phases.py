@@ -28,19 +28,19 @@ def flown_phases(whole: RouteRequirements, track: Track) -> tuple[RouteRequireme
     ways = whole.setup.ground_ways
     if not ways:
         return whole, align_track(whole, track)
-    begun = _takeoff_end_row(track, ways)
-    first = np.asarray(track.position[begun], dtype=np.float64) if ways.take_off is not None else None
+    start = _takeoff_end_row(track, ways)
+    first = np.asarray(track.position[start], dtype=np.float64) if ways.take_off is not None else None
     setup = whole.setup
     in_air = replace(setup, route=airborne_route(setup.route, ways, first))
     requirements = route_requirements(in_air, envelope=whole.envelope)
-    flying = track.rows(begun, len(track))
+    flying = track.rows(start, len(track))
     aligned, left = align_track(requirements, flying), len(track) - 1
     if ways.approach is not None and aligned is not None and aligned.passed[-1]:
         passed = float(aligned.track.time[aligned.rows[-1]])
         left = min(left, int(np.searchsorted(track.time, passed)))
         until = int(np.searchsorted(track.time, passed + _END_DELAY_S, side="right"))
-        aligned = align_track(requirements, track.rows(begun, until))
-    ground = FlownGround(ways, whole, track, begun, left)
+        aligned = align_track(requirements, track.rows(start, until))
+    ground = FlownGround(ways, whole, track, start, left)
     return replace(requirements, ground=ground), aligned
 
 

@@ -227,7 +227,7 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
 
     time: (t,) s.  position: (t, 3).  centre: (3,).  A point on the surface is inside.
     """
-    if not radius > 0.0 or _far(position, centre, radius):
+    if not radius > 0.0 or _is_outside(position, centre, radius):
         return []
     track, middle = read_only(np.ascontiguousarray(position)), read_only(np.ascontiguousarray(centre))
     closest, enter, leave = _windows(track, middle, float(radius))
@@ -246,7 +246,7 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
     return found
 
 
-def _far(position: Floats, centre: Floats, radius: float) -> bool:
+def _is_outside(position: Floats, centre: Floats, radius: float) -> bool:
     """Return True if the box around the track stays outside the sphere's box."""
     good = position[np.isfinite(position).all(axis=1)]
     if not len(good):

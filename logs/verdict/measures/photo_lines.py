@@ -38,7 +38,7 @@ class LineMeasure:
     late, early: m from the line's start to the first good place, and from the last good place to its end.
     aside: greatest distance from the line where it was flown along, m; off: greatest height error, m, above positive.
     photos, missed: number planned, and how many of them were not taken; 0 if the distance between photos is not stated.
-    allowed_aside: m.  allowed_off: least height error that is allowed anywhere along the line, m.
+    allowed_aside: m.  allowed_off: smallest height tolerance anywhere along the line, m.
     lost: stretches that cannot be used, each from and to, m from the line's start.
     """
 
@@ -153,9 +153,9 @@ def _height_errors(
     requirements: RouteRequirements, axis: LineAxis, position: Floats, along: Floats
 ) -> tuple[Floats, Floats]:
     """Return each row's error from the planned height above ground, m, and its tolerance."""
-    asked = over_ground(requirements, axis.at(along))
-    allowed = np.maximum(MIN_PHOTO_HEIGHT, PHOTO_HEIGHT * asked)
-    return over_ground(requirements, position) - asked, allowed
+    planned = over_ground(requirements, axis.at(along))
+    allowed = np.maximum(MIN_PHOTO_HEIGHT, PHOTO_HEIGHT * planned)
+    return over_ground(requirements, position) - planned, allowed
 
 
 def over_ground(requirements: RouteRequirements, places: Floats) -> Floats:
@@ -184,8 +184,8 @@ def _camera_on(
         away = np.hypot(*(position[:, :2] - requirements.points[waypoint, :2]).T)
         # An autopilot that follows a path is at a waypoint where the path passes it.
         near = 0.0 if follows else reach(requirements, waypoint).radius
-        there = np.flatnonzero(((away <= near) | (along >= from_along)) & ahead & (rows >= after))
-        return int(there[0]) if there.size else len(along)
+        indices = np.flatnonzero(((away <= near) | (along >= from_along)) & ahead & (rows >= after))
+        return int(indices[0]) if indices.size else len(along)
 
     begins = reached(line.first, 0.0) if line.switched_on else 0
     ends = reached(line.last, length, begins) if line.switched_off else len(along)
@@ -224,7 +224,7 @@ class OverlapMeasure:
 
     camera: the camera that takes them.
     front: overlap with the next photo on the line; None if the distance between photos is not stated, or none is
-    usable.
+        usable.
     line, apart, height, slow: where that is: the line's number from 0, m between photos, m above ground, and True if
         the camera cannot take them any sooner.
     side: overlap with the photos of the neighbouring line; None if no two usable lines are next to each other.
@@ -246,7 +246,8 @@ class OverlapMeasure:
 class _Strip(NamedTuple):
     """Points of a photo line, and whether they are usable.
 
-    places: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s."""
+    places: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s.
+    """
 
     places: Floats
     heights: Floats

@@ -452,19 +452,19 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
 def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
     """Return the surveys of a setup's mission that are judged by their lines.
 
-    A plan made by planfly has none.  Surveys whose camera is switched, or, if the scenario asks for "lines", all legs
-    with the form of a survey.
+    A plan made by planfly has none.  Its surveys are those whose camera is switched, or, if the scenario asks for
+    "lines", all legs with the form of a survey.
     """
-    asked = setup.scenario.limits.surveys
-    if setup.plan is not None or asked == "path":
+    mode = setup.scenario.limits.surveys
+    if setup.plan is not None or mode == "path":
         return ()
     beyond = [(one.photo, one.turn_around) for one in setup.mission.survey_plans if one.photo is not None]
     camera = camera_spacing(setup.mission, setup.route)
-    if asked != "lines" and not camera.any():
+    if mode != "lines" and not camera.any():
         # If no item switches the camera, no line takes photos.
         return ()
     found = find_surveys(setup.route, camera, beyond)
-    return tuple(one for one in found if asked == "lines" or one.takes_photos())
+    return tuple(one for one in found if mode == "lines" or one.takes_photos())
 
 
 @functools.lru_cache(maxsize=8)
@@ -576,10 +576,7 @@ def turn_limit(requirements: RouteRequirements, i: int) -> tuple[float, str]:
 
 
 def tighter_turn(requirements: RouteRequirements, i: int, aircraft: float) -> tuple[float, str]:
-    """Return the tighter of the scenario's limit and this aircraft limit at a waypoint, rad.
-
-    And the source of the limit.
-    """
+    """Return the tighter of the scenario's limit and an aircraft limit, rad, and its source."""
     fixed = requirements.limits.max_turn
     # A loiter has no angle: planfly made its corners.
     if fixed is not None and fixed <= aircraft and requirements.setup.route.arcs[i] == 0.0:

@@ -77,7 +77,6 @@ def straight_span(
     """Return the span of a leg (m from its start) that lies clear of the turns at its ends.
 
     clear: distance kept from the turns, m.
-
     level: exclude the blends of slope too.
     """
     start, end = clear, clear

@@ -28,7 +28,7 @@ Bytes = NDArray[np.uint8]
 
 
 # A waypoint was not passed if the route from the track's end to it is longer than its arrival distance and this, m.
-_STILL_AHEAD_M = 50.0
+_MISSED_MARGIN_M = 50.0
 # Largest number of cells in the assignment of rows to waypoints; the track is thinned to stay within it.
 _CELLS = 40_000_000
 
@@ -39,7 +39,7 @@ class AlignedTrack:
 
     track: the usable rows.
     bad_rows: number of rows with non-finite or implausible numbers or a time not later than the row before.
-    first_bad: time of the first of them, s; NaN if there is none.
+    first_bad: time of the first of them, s; NaN without any.
     rows: (w,) the row nearest to each waypoint's apex, never decreasing; the last row for a waypoint that the flight
         did not reach.
     distance: (w,) m from there to the apex.
@@ -110,7 +110,7 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     rows, distance = _passage_rows(clean, apexes, progress)
     off = np.hypot(*(clean.position[rows, :2] - requirements.points[:, :2]).T)
     # The flight is past a waypoint that it passed, or at the waypoint where it ended; it did not pass one far ahead.
-    ahead = progress.left > arrived + _STILL_AHEAD_M
+    ahead = progress.left > arrived + _MISSED_MARGIN_M
     ahead[-1] = False
     passed = ((rows < last) & ~ahead) | (off <= arrived)
     passed &= np.arange(len(rows)) <= progress.target

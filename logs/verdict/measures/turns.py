@@ -169,8 +169,8 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int)
     )
     end = _first_row(leaving & (along >= requirements.runs[i] - ahead), last - first)
     around = aligned.around(first + entry, first + max(entry, leave), 1.0)
-    held, radius = _second_by_second(aligned, around)
-    angle, tolerance, fitted = _angle(requirements, aligned, i)
+    held, radius = _bank_and_radius(aligned, around)
+    angle, tolerance, fitted = _course_change(requirements, aligned, i)
     watched = np.arange(position.shape[0]) <= max(leave, end)
     watched &= track.time[first : last + 1] <= track.time[first + leave] + WATCHED
     turned = abs(float(aligned.course[first + leave] - aligned.course[first + entry]))
@@ -182,7 +182,7 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int)
         held_bank=None if math.isnan(held) else held,
         radius=radius,
         overshoot=_overshoot(requirements, i, position[watched], before[watched], along[watched], across[watched]),
-        settled=_settled(requirements, aligned, i, first, end, along, across),
+        settled=_settled_distance(requirements, aligned, i, first, end, along, across),
         passed=float(approaches(position, requirements.points[i])[0].min()),
         full_circles=max(0, round((turned - abs(float(requirements.turns[i]))) / (2.0 * math.pi))),
         over=bool(aligned.passed[i + 1] or end < last - first or leave < last - first),
@@ -194,7 +194,9 @@ def _first_row(mask: NDArray[np.bool_], otherwise: int) -> int:
     return found if mask[found] else otherwise
 
 
-def _angle(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> tuple[float | None, float | None, bool]:
+def _course_change(
+    requirements: RouteRequirements, aligned: AlignedTrack, i: int
+) -> tuple[float | None, float | None, bool]:
     into, out = leg_course(requirements, aligned, i - 1), leg_course(requirements, aligned, i)
     if into is None or out is None:
         return None, None, False
@@ -202,7 +204,7 @@ def _angle(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> tu
     return change, into.tolerance + out.tolerance, into.fitted and out.fitted
 
 
-def _second_by_second(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
+def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
     """Return the largest mean bank (rad) and the least radius (m; inf for no turn), each over a second."""
     time = aligned.track.time[rows]
     bank = np.abs(aligned.track.attitude[rows, ROLL].astype(np.float64))
@@ -238,7 +240,7 @@ def _overshoot(
     return max(0.0, float(outside.max())) if outside.size else 0.0
 
 
-def _settled(
+def _settled_distance(
     requirements: RouteRequirements, aligned: AlignedTrack, i: int, first: int, end: int, along: Floats, across: Floats
 ) -> float:
     """Return the mean distance from the next leg's line in its last second before the next turn, m.

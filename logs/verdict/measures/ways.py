@@ -82,11 +82,11 @@ def entered_by_way(requirements: RouteRequirements, way: Way) -> str:
         visits = path_spheres(way.points, way.run, threats.position, threats.kill_radius, threats.kill_scale)
         for m in np.flatnonzero(visits.inside > 0.0).tolist():
             return place_text(Place("missile", m, name=scenario.spec.threats[m].name or ""))
-    asked = [z for z, zone in enumerate(airspace.zones) if zone.kind == "exclusion" or zone.floor is None]
-    if asked:
-        records = zone_records([airspace.zones[z] for z in asked])
+    relevant = [z for z, zone in enumerate(airspace.zones) if zone.kind == "exclusion" or zone.floor is None]
+    if relevant:
+        records = zone_records([airspace.zones[z] for z in relevant])
         met = path_zones(straight_moves(way.points, way.run), records, scenario.terrain)
-        for z, visit in zip(asked, met, strict=True):
+        for z, visit in zip(relevant, met, strict=True):
             if visit.depth > ROUNDING and visit.entry_time > 0.0:
                 return place_text(airspace.place(z))
     return ""

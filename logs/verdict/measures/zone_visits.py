@@ -66,10 +66,8 @@ def look_at_zone(
 def beyond_limit(exclusion: bool, away: float, off: float) -> float:  # pragma: no cover - compiled
     """Return how far beyond a zone's limit a place is, m.
 
-    This is the shortest move, level or vertical, to comply again.
-
-    Negative for a place that complies: the shortest move to the limit.  away, off: from `look_at_zone`.  NaN if the
-    answer depends on ground that is not known.
+    This is the shortest move, level or vertical, to comply again; negative for a place that complies, the
+    shortest move to the limit.  away, off: from `look_at_zone`.  NaN if the answer depends on ground that is not known.
     """
     if off != off:
         # Outside the zone's shape the place is outside the zone whatever the ground.
@@ -293,7 +291,7 @@ def _visit_block(
             records, z, heights, to_pixel, part.to_east, part.to_north, up
         )
         if turn == 0:
-            _deepen(moves[k], part, records.zones[z].exclusion, visit)
+            _update_depth(moves[k], part, records.zones[z].exclusion, visit)
         else:
             _bisect_move(moves[k], turn == 2, records, z, heights, to_pixel, steepest, known, parts, visit)
 
@@ -339,7 +337,7 @@ def _bisect_move(
             if ordered:
                 _add_part(move, part, exclusion, visit)
             else:
-                _deepen(move, part, exclusion, visit)
+                _update_depth(move, part, exclusion, visit)
             left -= 1
             continue
         earlier = parts[left + 1]
@@ -369,7 +367,7 @@ def _is_unknown(exclusion: bool, part: Record) -> bool:  # pragma: no cover - co
 
 
 @inner
-def _deepen(move: Record, part: Record, exclusion: bool, visit: Record) -> None:  # pragma: no cover - compiled
+def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) -> None:  # pragma: no cover - compiled
     """Update the deepest place of a visit with a part's ends, and note unknown ground."""
     for at_end in range(2):
         depth = beyond_limit(exclusion, part.away, part.off)

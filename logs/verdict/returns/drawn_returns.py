@@ -132,10 +132,10 @@ def plainly_drawn(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
 
 def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> tuple[WorstReturn, ...]:
     """Return the worst of each kind of failure, then the next worst; the lowest return if all are safe."""
-    wrong = [one for one in returns.ranges if not one.worst.safe]
-    firsts = {one.worst.kind: one for one in reversed(wrong)}
-    order = [one for one in wrong if firsts[one.worst.kind] is one]
-    order += [one for one in wrong if firsts[one.worst.kind] is not one]
+    unsafe = [one for one in returns.ranges if not one.worst.safe]
+    firsts = {one.worst.kind: one for one in reversed(unsafe)}
+    order = [one for one in unsafe if firsts[one.worst.kind] is one]
+    order += [one for one in unsafe if firsts[one.worst.kind] is not one]
     chosen = order[:MAX_WAYS] or list(returns.ranges[:1])
     rows = np.array([int(np.argmin(np.abs(starts.time - one.worst.time))) for one in chosen], dtype=np.intp)
     if not chosen:

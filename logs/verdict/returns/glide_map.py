@@ -120,9 +120,9 @@ def _add_sphere(made: GlideMap, centre: Floats, radius: float) -> None:
     shape = made.floor[rows, columns].shape
     norths = made.south + made.cell * (rows.start + np.arange(shape[0]))
     easts = made.west + made.cell * (columns.start + np.arange(shape[1]))
-    beside = np.maximum(0.0, np.abs(easts[None, :] - centre[0]) - 0.5 * made.cell)
+    across = np.maximum(0.0, np.abs(easts[None, :] - centre[0]) - 0.5 * made.cell)
     along = np.maximum(0.0, np.abs(norths[:, None] - centre[1]) - 0.5 * made.cell)
-    away = np.hypot(beside, along)
+    away = np.hypot(across, along)
     half = np.sqrt(np.maximum(0.0, radius * radius - away**2))
     inside = away < radius
     low, high = made.low[rows, columns], made.high[rows, columns]
@@ -348,11 +348,11 @@ def _search(
     flat = need.ravel()
     for k in range(flat.size):
         if flat[k] <= top:
-            _put(k, int((flat[k] - lowest) / band), heads, links)
+            _insert(k, int((flat[k] - lowest) / band), heads, links)
     for b in range(heads.size):
         while heads[b] >= 0:
             k = heads[b]
-            _take(k, b, heads, links)
+            _remove(k, b, heads, links)
             row, column = k // columns, k % columns
             here = flat[k]
             x = min(slopes.shape[1] - 1.001, max(0.0, (here - slopes_low) / pitch))
@@ -365,18 +365,18 @@ def _search(
                 loss = cell * move.length * (slopes[m, h] + (x - h) * (slopes[m, h + 1] - slopes[m, h]))
                 if not here + loss < need[i, j]:
                     continue
-                wanted = _lifted(floor, low, high, between, move, row, column, here, loss)
+                wanted = _step_start_altitude(floor, low, high, between, move, row, column, here, loss)
                 if not (wanted < need[i, j] and wanted <= top):
                     continue
                 other = i * columns + j
                 if need[i, j] <= top:
-                    _take(other, int((need[i, j] - lowest) / band), heads, links)
+                    _remove(other, int((need[i, j] - lowest) / band), heads, links)
                 need[i, j], origin[i, j], onward[i, j] = wanted, origin[row, column], m
-                _put(other, int((wanted - lowest) / band), heads, links)
+                _insert(other, int((wanted - lowest) / band), heads, links)
 
 
 @inner
-def _lifted(
+def _step_start_altitude(
     floor: Floats, low: Floats, high: Floats, between: Records, move: Record, row: int, column: int, here: float,
     loss: float,
 ) -> float:  # pragma: no cover - compiled  # fmt: skip
@@ -387,11 +387,11 @@ def _lifted(
         i, j = row + cell.north, column + cell.east
         # Height lost from the step's start to this cell.
         lost = (1.0 - cell.share) * loss
-        there = _out_of_spheres(max(wanted - lost, floor[i, j]), low[i, j], high[i, j])
+        altitude = _out_of_spheres(max(wanted - lost, floor[i, j]), low[i, j], high[i, j])
         # NaN, for unknown ground, fails the comparison.
-        if not floor[i, j] <= there:
+        if not floor[i, j] <= altitude:
             return math.nan
-        wanted = there + lost
+        wanted = altitude + lost
     i, j = row - move.north, column - move.east
     if not floor[i, j] <= math.inf:
         return math.nan
@@ -406,7 +406,7 @@ def _out_of_spheres(up: float, low: float, high: float) -> float:  # pragma: no 
 
 
 @inner
-def _put(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
+def _insert(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
     """Insert a cell at the head of a band."""
     first = heads[band]
     links[cell, 0], links[cell, 1] = -1, first
@@ -416,7 +416,7 @@ def _put(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: n
 
 
 @inner
-def _take(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
+def _remove(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
     """Remove a cell from its band, if it is in it."""
     before, after = links[cell, 0], links[cell, 1]
     if before >= 0:

@@ -103,7 +103,7 @@ def _look_ahead(
                 if not _is_clear(here, floor, spheres, radii, glider):
                     break
                 spare, i, j = _best_cell(here, need, worst, glider)
-                rest = _rest_of_turn(here, i, j, side, onward, moves, glider) if spare > -math.inf else before
+                rest = _remaining_turn(here, i, j, side, onward, moves, glider) if spare > -math.inf else before
                 # The path ahead changes during a turn, so that one step may overshoot its course by more than that
                 # step.
                 passed = 0.0 < before <= 2.0 * _TURN_STEP_RAD and -2.0 * _TURN_STEP_RAD <= rest < 0.0
@@ -159,7 +159,7 @@ def _best_cell(
 
 
 @inner
-def _rest_of_turn(
+def _remaining_turn(
     here: Record, i: int, j: int, side: float, onward: Codes, moves: Records, glider: Record
 ) -> float:  # pragma: no cover - compiled
     """Return the rest of a turn to the path on from a cell, rad; negative beyond it, 0 at the path's end."""

@@ -5,19 +5,19 @@ import math
 from flight.autopilots.arduplane.swift_return import REACTION
 from logs.verdict.returns.judge_glides import MARGIN, REACHES, Glide, GlideRange, Glides, GlideSite, NotJudged, Reach
 
-_NOT_JUDGED: dict[NotJudged, str] = {
+_NOT_JUDGED_TEXTS: dict[NotJudged, str] = {
     "terrain": "there is no elevation file",
     "trim": "the model has no trim with the throttle closed",
     "far": "the way is too long for a map of what lies around it",
 }
-_FROM: dict[Reach, str] = {
+_COUNT_TEXTS: dict[Reach, str] = {
     "home": "home can be reached from {count}",
     "site": "a rally point or landing place, but not home, from {count}",
     "flat": "flat ground alone from {count}",
     "nothing": "nothing from {count}",
     "unknown": "from {count} it is not known",
 }
-_REACHED: dict[Reach, str] = {
+_REACH_TEXTS: dict[Reach, str] = {
     "home": "home is in reach",
     "site": "a rally point or landing place is in reach",
     "flat": "flat ground alone is in reach",
@@ -32,7 +32,7 @@ def reached_text(reach: Reach) -> str:
     >>> reached_text("home")
     'home is in reach'
     """
-    return _REACHED[reach]
+    return _REACH_TEXTS[reach]
 
 
 def glides_headline(glides: Glides) -> str:
@@ -42,12 +42,12 @@ def glides_headline(glides: Glides) -> str:
     'not judged: there is no elevation file'
     """
     if glides.not_judged:
-        return f"not judged: {_NOT_JUDGED[glides.not_judged]}"
+        return f"not judged: {_NOT_JUDGED_TEXTS[glides.not_judged]}"
     if not glides.each:
         return "no place to glide from"
     counted = [(reach, glides.count(reach)) for reach in REACHES]
     # Home is reported even if it is reached from nowhere.
-    reached = ", ".join(_FROM[reach].format(count=count) for reach, count in counted if count or reach == "home")
+    reached = ", ".join(_COUNT_TEXTS[reach].format(count=count) for reach, count in counted if count or reach == "home")
     if any(one.own.end == "not flown" for one in glides.each):
         own = "ArduPlane's own return, which would follow the terrain, is not flown"
     else:

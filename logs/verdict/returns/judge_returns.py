@@ -83,7 +83,7 @@ TOUCHING = 10.0
 # A return from higher up is left out if it hits the ground or gets low within this run, m, because it sinks by the rest
 # of that fraction.
 _SINK_RUN_M = 500.0
-# Bank beyond which a JSBSim flight cannot begin at a start, rad: the start is approached in straight flight.
+# Bank beyond which a JSBSim flight cannot begin at a start, rad, because it approaches the start straight.
 _MAX_START_BANK_RAD = math.radians(10.0)
 
 
@@ -198,8 +198,8 @@ class Returns:
     @property
     def undecided(self) -> bool:
         """True if no return is known to be unsafe, but some are unknown."""
-        wrong = bool(self.unsafe) or self.count("low") > 0
-        return not wrong and (bool(self.open) or self.count("unknown") > 0 or self.count("unsure") > 0)
+        has_failures = bool(self.unsafe) or self.count("low") > 0
+        return not has_failures and (bool(self.open) or self.count("unknown") > 0 or self.count("unsure") > 0)
 
     @property
     def lands(self) -> bool:
@@ -427,11 +427,13 @@ def judge_returns(
             continue
         ends = [world.target(row, way) for row in starts.rows]
         flown, paths = fly_home(world, starts, ends)
-        asked = floors(world, starts)
+        floor_heights = floors(world, starts)
         ones = []
         for k, row in enumerate(flown):
             advance(number * len(starts) + k, total)
-            ones.append(_judge_return(world, starts, k, ends[k], row, paths[k] if paths else _NO_WAY, float(asked[k])))
+            ones.append(
+                _judge_return(world, starts, k, ends[k], row, paths[k] if paths else _NO_PATH, float(floor_heights[k]))
+            )
         if fly_again is not None and way == "circle":
             ones, apart = _recheck_in_jsbsim(world, starts, ones, flown, fly_again, most)
             again += apart
@@ -470,7 +472,7 @@ def sinks_down(one: ReturnFlown, height: float) -> bool:
     return one.kind in ("ground", "low", "unsure") and sinks and run <= _SINK_RUN_M
 
 
-_NO_WAY: Floats = np.zeros((0, 3))
+_NO_PATH: Floats = np.zeros((0, 3))
 
 
 def fly_home(

@@ -69,9 +69,9 @@ def flown_starts(setup: FlightSetup, track: Track, every: float) -> ReturnStarts
         return _no_starts(flown=True)
     time = track.time[known]
     wanted = np.arange(time[0], time[-1] + 1e-9, every)
-    # Take the nearest row; in a pause of the log there is none.
+    # Take the nearest row, except in a pause of the log.
     every_row = known[np.unique(np.searchsorted(time, wanted - 1e-9).clip(0, len(known) - 1))]
-    near, slow = _by_the_ground(setup, track, every_row)
+    near, slow = _low_and_slow_rows(setup, track, every_row)
     rows, low = every_row[~slow], near[~slow]
     velocity = _velocities(track, rows)
     roll = track.attitude[rows, ROLL].astype(np.float64)
@@ -84,7 +84,7 @@ def _no_starts(*, flown: bool) -> ReturnStarts:
     return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), flown, np.zeros(0, dtype=np.bool_))
 
 
-def _by_the_ground(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
+def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
     """Return which rows (n,) are low in a flown take-off or landing, and which are also too slow to fly."""
     ways, terrain = setup.ground_ways, setup.scenario.terrain
     on_way = by_the_ground(track, ways)[rows]

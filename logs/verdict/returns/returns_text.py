@@ -11,7 +11,7 @@ from world.frames import to_geo
 from world.scenario import Scenario
 
 # Outcome of one return, and of several.
-_ONE: dict[Kind, str] = {
+_SINGULAR_TEXTS: dict[Kind, str] = {
     "ground": "hits the ground",
     "threat": "enters a missile's sphere",
     "zone": "violates a zone",
@@ -21,7 +21,7 @@ _ONE: dict[Kind, str] = {
     "unsure": "is flown too differently by the point mass and in JSBSim to be judged",
     "low": "comes lower than {limit:.0f} m above ground",
 }
-_MANY: dict[Kind, str] = {
+_PLURAL_TEXTS: dict[Kind, str] = {
     "ground": "hit the ground",
     "threat": "enter a missile's sphere",
     "zone": "violate a zone",
@@ -32,7 +32,7 @@ _MANY: dict[Kind, str] = {
     "low": "come lower than {limit:.0f} m above ground",
 }
 # Name of the path segment from which returns have this outcome.
-_WAY: dict[Kind, str] = {
+_SEGMENT_NAMES: dict[Kind, str] = {
     "ground": "a return hits the ground",
     "threat": "a return enters a missile's sphere",
     "zone": "a return violates a zone",
@@ -43,7 +43,7 @@ _WAY: dict[Kind, str] = {
     "low": "a return comes lower than required",
     "safe": "a return is safe",
 }
-_DOES = {
+_ACTION_TEXTS = {
     "return": "returns",
     "land": "by its landing sequence",
     "autoland": "by mode AUTOLAND, or else it returns",
@@ -57,7 +57,7 @@ _DOES = {
     "landed": "has landed",
     "never": "set, but no threshold triggers it",
 }
-_OPEN: dict[Open, str] = {
+_OPEN_TEXTS: dict[Open, str] = {
     "terrain": "TERRAIN_FOLLOW has returns follow the terrain, which is not flown here",
     "law": "the autopilot returns by a law of its own, and ArduPlane's stands in",
     "autoland": "mode AUTOLAND lands by a pattern of its own",
@@ -72,12 +72,12 @@ def way_text(kind: Kind) -> str:
     >>> way_text("ground")
     'a return hits the ground'
     """
-    return _WAY[kind]
+    return _SEGMENT_NAMES[kind]
 
 
 def outcome_text(one: ReturnFlown, limit: float) -> str:
     """Return the outcome of one return.  limit: required least height above ground, m."""
-    return "is safe" if one.safe else _ONE[one.kind].format(limit=limit)
+    return "is safe" if one.safe else _SINGULAR_TEXTS[one.kind].format(limit=limit)
 
 
 def measured_text(one: ReturnFlown, limit: float, scenario: Scenario) -> str:
@@ -87,22 +87,25 @@ def measured_text(one: ReturnFlown, limit: float, scenario: Scenario) -> str:
     """
     east, north, _ = one.clearance_at
     where = f"{east:.0f} m east, {north:.0f} m north"
-    said = [f"to {one.target.name}", outcome_text(one, limit)]
+    parts = [f"to {one.target.name}", outcome_text(one, limit)]
     if one.kind == "ground":
-        said[-1] += f" at {where}"
+        parts[-1] += f" at {where}"
     elif not math.isnan(one.clearance):
-        said.append(f"{one.clearance:.0f} m above ground at the least at {where}")
+        parts.append(f"{one.clearance:.0f} m above ground at the least at {where}")
     if one.threat >= 0 and one.outside <= 0.0:
-        said.append(f"{-one.outside:.0f} m inside the sphere of {scenario.threats.names[one.threat]}")
+        parts.append(f"{-one.outside:.0f} m inside the sphere of {scenario.threats.names[one.threat]}")
     elif math.isfinite(one.outside):
-        said.append(f"{one.outside:.0f} m outside every missile's sphere")
-    return ", ".join(said)
+        parts.append(f"{one.outside:.0f} m outside every missile's sphere")
+    return ", ".join(parts)
 
 
 def counts_text(returns: Returns) -> str:
     """Return the number of returns per outcome, the worst first; "" if all are safe."""
     counted = {kind: returns.count(kind) for kind in KINDS if kind != "safe"}
-    texts = {kind: (_ONE if count == 1 else _MANY)[kind].format(limit=returns.limit) for kind, count in counted.items()}
+    texts = {
+        kind: (_SINGULAR_TEXTS if count == 1 else _PLURAL_TEXTS)[kind].format(limit=returns.limit)
+        for kind, count in counted.items()
+    }
     return ", ".join(f"{count} {texts[kind]}" for kind, count in counted.items() if count)
 
 
@@ -115,7 +118,7 @@ def headline(returns: Returns) -> str:
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, open=("terrain",)))
     'not judged: TERRAIN_FOLLOW has returns follow the terrain, which is not flown here'
     """
-    reasons = "; ".join(_OPEN[one] for one in returns.open)
+    reasons = "; ".join(_OPEN_TEXTS[one] for one in returns.open)
     if not returns.each:
         return f"not judged: {reasons}" if reasons else "no place to return from"
     landing = "; the landing is not judged" if returns.lands else ""
@@ -124,10 +127,10 @@ def headline(returns: Returns) -> str:
 
 
 def _judged(returns: Returns) -> str:
-    total, wrong = len(returns.each), counts_text(returns)
-    if wrong:
+    total, failures = len(returns.each), counts_text(returns)
+    if failures:
         safe = returns.count("safe")
-        return f"of {total} returns {wrong}; {safe} {'is' if safe == 1 else 'are'} safe"
+        return f"of {total} returns {failures}; {safe} {'is' if safe == 1 else 'are'} safe"
     # Returns that begin below the limit, as after a take-off, say nothing about the path home.
     aloft = [one for one in returns.each if not one.floor < returns.limit] or returns.each
     lowest = min(aloft, key=lambda one: one.clearance)
@@ -183,7 +186,7 @@ def causes_text(causes: tuple[Cause, ...]) -> list[str]:
         others: dict[str, list[str]] = {}
         for cause in causes:
             if not cause.returns and (cause.does in ("land", "autoland")) == counted:
-                others.setdefault(_DOES[cause.does], []).append(f"{cause.name}{stated(cause)}")
+                others.setdefault(_ACTION_TEXTS[cause.does], []).append(f"{cause.name}{stated(cause)}")
         text = [f"{', '.join(names)}: {does}" for does, names in others.items()]
         lines += [f"{heading}: {'; '.join(text)}"] if text else []
     return lines

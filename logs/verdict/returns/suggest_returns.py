@@ -231,19 +231,19 @@ def suggest_rally(world: ReturnWorld, starts: ReturnStarts) -> Remedy | None:
     home = _returns_meeting(world.with_rally(()), starts, needs, _keeps_all)
     if home.all() or not total or world.way == "straight to land":
         return None
-    asked = np.unique(np.linspace(0, total - 1, min(total, _MAX_STARTS)).round().astype(int))
+    searched = np.unique(np.linspace(0, total - 1, min(total, _MAX_STARTS)).round().astype(int))
     best: tuple[int, tuple[ReturnPlace, ...]] = (int(home.sum()), ())
     places = _candidates(world, starts, _GRID_SPACING_M, _MAX_PATH_DISTANCE_M)
     for _ in range(_GRIDS):
         if not places:
             break
         search = _Search(world, starts, needs, places, home)
-        count, points, missed = _search_in_rounds(search, world, starts, needs, asked, len(best[1]))
+        count, points, missed = _search_in_rounds(search, world, starts, needs, searched, len(best[1]))
         best = max(best, (count, points), key=lambda one: (one[0], -len(one[1])))
         if not missed.size:
             break
         # Keep the points found, and add a finer grid around the starts left unsafe.
-        asked = np.union1d(asked, missed[:: max(1, len(missed) // 20)])
+        searched = np.union1d(searched, missed[:: max(1, len(missed) // 20)])
         places = [*best[1], *_candidates(world, starts.at(missed), _GRID_SPACING_M / 3.0, 0.6 * _MAX_PATH_DISTANCE_M)]
     points = tuple(point._replace(number=k) for k, point in enumerate(best[1], 1))
     return Remedy(rally=points) if points else None
@@ -254,7 +254,7 @@ def _search_in_rounds(
     world: ReturnWorld,
     starts: ReturnStarts,
     needs: _Needs,
-    asked: NDArray[np.intp],
+    searched: NDArray[np.intp],
     first: int,
 ) -> tuple[int, tuple[ReturnPlace, ...], NDArray[np.intp]]:
     """Search, simulate all starts, and search again with the starts that were left unsafe.
@@ -264,16 +264,16 @@ def _search_in_rounds(
     """
     best: tuple[int, tuple[ReturnPlace, ...], NDArray[np.intp]] = (-1, (), np.zeros(0, dtype=np.intp))
     for _ in range(_ROUNDS):
-        points = tuple(search.places[c] for c in search.find(asked, list(range(first))))
+        points = tuple(search.places[c] for c in search.find(searched, list(range(first))))
         good = _returns_meeting(world.with_rally(points), starts, needs, _keeps_all)
         missed = np.flatnonzero(~good)
         if int(good.sum()) > best[0]:
             best = int(good.sum()), points, missed
-        unasked = np.setdiff1d(missed, asked)
+        unasked = np.setdiff1d(missed, searched)
         if not unasked.size:
             break
         # A few of each run are enough.
-        asked = np.union1d(asked, unasked[:: max(1, len(unasked) // 20)])
+        searched = np.union1d(searched, unasked[:: max(1, len(unasked) // 20)])
     return best
 
 
@@ -344,32 +344,32 @@ class _Search:
 
     def find(self, asked: NDArray[np.intp], chosen: list[int]) -> list[int]:
         """Return candidates that are good for as many of the starts as possible; chosen: the initial set."""
-        self._fly(asked[~self._known[asked]])
+        self._simulate_candidates(asked[~self._known[asked]])
         while len(chosen) < _MAX_POINTS and self._count(asked, chosen) < len(asked):
             more = self._with_best_addition(asked, chosen)
             if self._count(asked, more) <= self._count(asked, chosen):
                 break
-            chosen = self._swapped(asked, more)
-        return self._pruned(asked, chosen)
+            chosen = self._with_swaps(asked, more)
+        return self._without_superfluous(asked, chosen)
 
-    def _with_best_addition(self, asked: NDArray[np.intp], chosen: list[int]) -> list[int]:
+    def _with_best_addition(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
         """Return the set with the best point added; or the best two if one alone gains nothing."""
         every = range(len(self.places))
-        counts = [self._count(asked, [*chosen, c]) for c in every]
-        if max(counts) > self._count(asked, chosen):
+        counts = [self._count(searched, [*chosen, c]) for c in every]
+        if max(counts) > self._count(searched, chosen):
             return [*chosen, int(np.argmax(counts))]
         first = np.argsort(counts, kind="stable")[::-1][:_PAIR_SEEDS].tolist()
-        return max(([*chosen, a, c] for a in first for c in every), key=lambda more: self._count(asked, more))
+        return max(([*chosen, a, c] for a in first for c in every), key=lambda more: self._count(searched, more))
 
-    def _fly(self, asked: NDArray[np.intp]) -> None:
+    def _simulate_candidates(self, searched: NDArray[np.intp]) -> None:
         """Simulate returns from starts to their nearest candidates; all other candidates are rated as bad."""
         pairs = [
             (k, int(c))
-            for k in asked
+            for k in searched
             for c in np.argsort(self._away[k])[:_FLOWN_CANDIDATES]
             if self._away[k, c] < _MAX_FLOWN_DISTANCE_M
         ]
-        self._known[asked] = True
+        self._known[searched] = True
         if not pairs:
             return
         first, second = (np.array(column) for column in zip(*pairs, strict=True))
@@ -378,36 +378,36 @@ class _Search:
         starts, needs = self._starts.at(first), self._needs.at(first)
         self._good[first, second] = _targets_meeting(self._world, starts, ends, needs, _keeps_all)
 
-    def _count(self, asked: NDArray[np.intp], chosen: list[int]) -> int:
+    def _count(self, searched: NDArray[np.intp], chosen: list[int]) -> int:
         """Return the number of good returns with these rally points, by the autopilot's choice."""
         if not chosen:
-            return int(self._home[asked].sum())
-        away = self._away[np.ix_(asked, np.array(chosen))]
+            return int(self._home[searched].sum())
+        away = self._away[np.ix_(searched, np.array(chosen))]
         nearest = np.argmin(away, axis=1)
-        least = away[np.arange(len(asked)), nearest]
+        least = away[np.arange(len(searched)), nearest]
         goes_home = least > self._limit
         if self._world.parameters.rally_includes_home > 0.0:
-            goes_home |= self._to_home[asked] <= least
-        good = np.where(goes_home, self._home[asked], self._good[asked, np.array(chosen)[nearest]])
+            goes_home |= self._to_home[searched] <= least
+        good = np.where(goes_home, self._home[searched], self._good[searched, np.array(chosen)[nearest]])
         return int(good.sum())
 
-    def _swapped(self, asked: NDArray[np.intp], chosen: list[int]) -> list[int]:
+    def _with_swaps(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
         """Return the same number of points, each swapped for a better one while there is one."""
-        best, improved = self._count(asked, chosen), True
+        best, improved = self._count(searched, chosen), True
         while improved:
             improved = False
             for i in range(len(chosen)):
                 for c in range(len(self.places)):
                     other = [*chosen[:i], c, *chosen[i + 1 :]]
-                    count = self._count(asked, other)
+                    count = self._count(searched, other)
                     if count > best:
                         best, chosen, improved = count, other, True
         return chosen
 
-    def _pruned(self, asked: NDArray[np.intp], chosen: list[int]) -> list[int]:
+    def _without_superfluous(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
         """Return the set without superfluous points."""
         for c in list(chosen):
             fewer = [one for one in chosen if one != c]
-            if self._count(asked, fewer) >= self._count(asked, chosen):
+            if self._count(searched, fewer) >= self._count(searched, chosen):
                 chosen = fewer
         return chosen

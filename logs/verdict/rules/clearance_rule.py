@@ -38,14 +38,14 @@ def clearance_findings(
     low, _ = path_clearance(ground.heights, ground.to_pixel.record, points)
     out = []
     for leg in range(requirements.legs):
-        asked = _Requirement(limit, near.get(leg, ()))
+        requirement = _Requirement(limit, near.get(leg, ()))
         of_leg = np.flatnonzero(legs == leg)
-        planned, least = asked.worst(low[of_leg], points[of_leg])
+        planned, least = requirement.worst(low[of_leg], points[of_leg])
         if geometric:
             out.append(_planned_clearance(requirements, leg, planned, least, ground.vertical_error))
         else:
             short = planned < least - CLEARANCE_TOLERANCE
-            out.append(_flown_clearance(requirements, aligned, leg, planned, asked, planned_short=short))
+            out.append(_flown_clearance(requirements, aligned, leg, planned, requirement, planned_short=short))
     return [*_home_above_ground(requirements, ground, out), *out]
 
 
@@ -101,36 +101,36 @@ class _Requirement(NamedTuple):
 
     def of(self, points: Floats) -> Floats:
         """Return the requirement at places (n, 3), (n,) m."""
-        asked = np.full(len(points), self.limit)
+        requirement = np.full(len(points), self.limit)
         for east, north in self.fields:
             away = np.hypot(points[:, 0] - east, points[:, 1] - north)
-            asked[away <= NEAR_FIELD] = min(self.limit, GROUND_LEG_ROOM)
-        return asked
+            requirement[away <= NEAR_FIELD] = min(self.limit, GROUND_LEG_ROOM)
+        return requirement
 
     def worst(self, low: Floats, points: Floats) -> tuple[float, float]:
         """Return the height above ground with the least margin, and its requirement, m.
 
-        low: heights (n,) at places (n, 3).  NaN for the height if one is unknown, or if there are none.
+        low: heights (n,) at places (n, 3).  NaN for the height if one is unknown, or without heights.
         """
         if not low.size or np.isnan(low).any():
             return math.nan, self.limit
-        k, asked = self.least(low, points)
-        return float(low[k]), asked
+        k, requirement = self.least(low, points)
+        return float(low[k]), requirement
 
     def least(self, low: Floats, points: Floats) -> tuple[int, float]:
         """Return the index of the known height (n,) with the least margin, and the requirement there, m."""
         if not self.fields:
             return int(np.nanargmin(low)), self.limit
-        asked = self.of(points)
-        k = int(np.nanargmin(low - asked))
-        return k, float(asked[k])
+        requirement = self.of(points)
+        k = int(np.nanargmin(low - requirement))
+        return k, float(requirement[k])
 
 
 def _near_ground(requirements: RouteRequirements) -> dict[int, tuple[tuple[float, float], ...]]:
     """Return homes and landing points, m, by the legs after a flown take-off and before a flown landing.
 
-    The legs before a landing are those from DO_LAND_START on, or else the last two; of them the final, and the legs
-    from the last waypoint that meets the limit on height above ground.
+    The legs before a landing begin at DO_LAND_START, or else are the last two.  Of them the final is included, and the
+    legs from the last waypoint that meets the limit on height above ground.
     """
     setup, ground = requirements.setup, requirements.ground
     ways = setup.ground_ways if ground is None else ground.ways
@@ -139,10 +139,10 @@ def _near_ground(requirements: RouteRequirements) -> dict[int, tuple[tuple[float
         near[ways.take_off.waypoint] = ((float(ways.take_off.home[0]), float(ways.take_off.home[1])),)
     if ways.approach is not None:
         starts = [item.seq for item in setup.mission.items if item.command == Command.DO_LAND_START]
-        begun = max((seq for seq in starts if seq < ways.approach.item), default=None)
+        sequence_start = max((seq for seq in starts if seq < ways.approach.item), default=None)
         first = max(0, ways.approach.leg - 1)
-        if begun is not None:
-            after = np.flatnonzero(setup.route.items > begun)
+        if sequence_start is not None:
+            after = np.flatnonzero(setup.route.items > sequence_start)
             first = max(0, int(after[0]) - 1) if after.size else first
         point = (float(ways.approach.point[0]), float(ways.approach.point[1]))
         for leg in range(max(first, _last_clear_waypoint(requirements, ways.approach.leg)), ways.approach.leg + 1):
@@ -204,11 +204,11 @@ def _flown_clearance(
     aligned: AlignedTrack | None,
     leg: int,
     planned: float,
-    asked: _Requirement,
+    requirement: _Requirement,
     *,
     planned_short: bool,
 ) -> Finding:
-    least, ok, reason, limit = math.nan, None, "the leg was not flown", asked.limit
+    least, ok, reason, limit = math.nan, None, "the leg was not flown", requirement.limit
     if aligned is not None and aligned.flew(leg):
         # The first leg includes what came before it, the last leg what came after.
         first = 0 if leg == 0 else int(aligned.rows[leg])
@@ -216,7 +216,7 @@ def _flown_clearance(
         span = aligned.low[first:last]
         known = np.isfinite(span)
         if known.any():
-            row, limit = asked.least(span, np.asarray(aligned.track.position[first:last], dtype=np.float64))
+            row, limit = requirement.least(span, np.asarray(aligned.track.position[first:last], dtype=np.float64))
             k = first + row
             least = float(aligned.low[k])
             reason = f"{least:.1f} m above ground {_when_and_where(aligned, k, float(aligned.low_at[k]))}"

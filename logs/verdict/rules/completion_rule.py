@@ -157,10 +157,10 @@ def _unflown_legs(setup: FlightSetup, flown: Sequence[FlownLegs], done: set[int]
     absent = [leg for leg in range(setup.route.legs) if leg not in done]
     unseen = setup.source is not None and setup.source.begins_in_flight
     before = [leg for leg in absent if unseen and leg < flown[0].first]
-    begun = [leg for leg in absent if leg not in before and any(one.partial and one.last - 1 == leg for one in flown)]
+    started = [leg for leg in absent if leg not in before and any(one.partial and one.last - 1 == leg for one in flown)]
     doubts = [f"the log begins in flight, and {_legs_text(setup, before)} not in it"] if before else []
-    doubts += [f"{_legs_text(setup, begun)} flown along the mission in part"] if begun else []
-    return [leg for leg in absent if leg not in before and leg not in begun], doubts
+    doubts += [f"{_legs_text(setup, started)} flown along the mission in part"] if started else []
+    return [leg for leg in absent if leg not in before and leg not in started], doubts
 
 
 def _gaps_text(flown: Sequence[FlownLegs]) -> list[str]:

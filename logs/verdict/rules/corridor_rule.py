@@ -15,7 +15,7 @@ from logs.verdict.tolerances import ON_COURSE, ROUNDING
 def corridor_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the distance of each leg's flight from the legs; ``geometric``: that of its planned turns.
+    """Judge the distance of each leg's flight, or of its planned turns (``geometric``), from the legs.
 
     In a survey, and on the legs to it and from it, only an explicitly stated corridor applies: the survey rule judges
     the distance from its lines, and the turns onto the first line and off the last are the autopilot's own.
@@ -68,8 +68,8 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
 def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, limit: float) -> slice:
     """Return a leg's rows; after a take-off, from where the aircraft first flies along it.
 
-    Along it means within the limit (m) of the leg.  A take-off ends on its launch course, whatever the course of the
-    leg from there.
+    That is on the leg's course and within the limit (m) of its line.  A take-off ends on its launch course, whatever
+    the course of the leg from there.
     """
     rows, ground = aligned.leg_rows(leg), requirements.ground
     if ground is None or ground.ways.take_off is None or ground.ways.take_off.waypoint != leg:

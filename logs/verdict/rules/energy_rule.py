@@ -26,7 +26,7 @@ def energy_findings(
     setup = requirements.setup
     usable = (1.0 - RESERVE) * setup.battery
     predicted, peak = predicted_energy(requirements)
-    faults = [_never_ends(requirements, usable)] if setup.route.endless >= 0 else []
+    faults = [_endless_jump_message(requirements, usable)] if setup.route.endless >= 0 else []
     guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     used, current = predicted, peak
     if not geometric:
@@ -73,7 +73,7 @@ def energy_findings(
     ]
 
 
-def _never_ends(requirements: RouteRequirements, usable: float) -> Message:
+def _endless_jump_message(requirements: RouteRequirements, usable: float) -> Message:
     """Report that an endless jump is flown until the energy is used up, and how many rounds that lasts."""
     route = requirements.setup.route
     last = len(route.items) - 1
@@ -101,10 +101,10 @@ def _used_text(requirements: RouteRequirements, used: float, current: float) -> 
 
 
 def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
-    """Return energy (Wh) and peak current (A) of steady flight along a route.
+    """Energy (Wh) and peak current (A) of steady flight along a route, NaN where the envelope knows no power.
 
-    NaN if the envelope has no power.  Each leg at its commanded airspeed, its slope over the ground in the mean wind,
-    and its mean altitude; turns and gusts take a few per cent more.
+    Each leg at its commanded airspeed, its slope over the ground in the mean wind, and its middle height; what turns
+    and gusts take beside that is a few per cent.
     """
     volts = requirements.setup.envelope.volts
     energies, most = leg_energies(requirements)
@@ -112,7 +112,7 @@ def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
 
 
 def needed_energy(setup: FlightSetup) -> float:
-    """Return the energy (Wh) of steady flight along a setup's route, NaN if the envelope has no power.
+    """Energy (Wh) of steady flight along a setup's route, NaN where the envelope knows no power.
 
     >>> from logs.recording.example_log import example_log
     >>> needed_energy(example_log().setup)
@@ -122,10 +122,7 @@ def needed_energy(setup: FlightSetup) -> float:
 
 
 def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
-    """Return energy (Wh) of steady flight on each leg, and the highest power (W).
-
-    NaN if the envelope has no power.
-    """
+    """Energy (Wh) of steady flight on each leg, and the highest power (W); NaN where the envelope knows none."""
     envelope, route = requirements.setup.envelope, requirements.route
     if not np.isfinite(requirements.ground_speed).all():
         return [math.nan] * requirements.legs, math.nan
@@ -145,10 +142,7 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
 
 
 def air_angle(requirements: RouteRequirements, leg: int, speed: float, up: float) -> float:
-    """Return the path angle through the air, rad, for a leg's slope over ground.
-
-    In the mean wind at an altitude (m).
-    """
+    """Path angle to the air of a leg's slope over the ground in the mean wind at a height (m), rad."""
     tail, cross = requirements.setup.scenario.wind.along(float(requirements.courses[leg]), up)
     rise, angle = math.tan(float(requirements.slopes[leg])), 0.0
     for _ in range(4):

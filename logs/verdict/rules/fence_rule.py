@@ -1,7 +1,7 @@
 """The fence rule: how far planned path and flight go into exclusion zones, or out of inclusion zones.
 
-The zones are the scenario's and the mission's own fence.  The path's line is judged, including its arcs, loiters and
-jumps; a corridor that reaches into a zone is only reported.
+The zones are the zones of the scenario and the mission's own fence.  The path's line is judged, including its arcs,
+loiters and jumps; a corridor that reaches into a zone is only reported.
 """
 
 import math
@@ -47,7 +47,7 @@ def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
 def fence_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each zone that plan or flight violates, or report that none is; empty without zones."""
+    """Judge each zone that plan or flight violates, or report that all are kept; empty without zones."""
     airspace = requirements.airspace
     out = []
     if airspace.fault:
@@ -121,12 +121,12 @@ def _zone_finding(requirements: RouteRequirements, z: int, planned: Record, flow
     ok: bool | None = visit.depth <= ROUNDING
     if ok and visit.unknown:
         ok = None
-    wrong, stay = ("inside", "enters it") if zone.kind == "exclusion" else ("outside", "leaves it")
+    side_text, stay = ("inside", "enters it") if zone.kind == "exclusion" else ("outside", "leaves it")
     faults, notes = [], []
     if visit.depth > ROUNDING:
         faults.append(
             message(
-                f"{visit.depth:.1f} m {wrong}",
+                f"{visit.depth:.1f} m {side_text}",
                 f" at {_where(requirements, visit, 'at')}, for {visit.beyond:.1f} s in all:"
                 f" {stay} at {_where(requirements, visit, 'entry')}"
                 f" and is back at {_where(requirements, visit, 'exit')}"
@@ -138,7 +138,7 @@ def _zone_finding(requirements: RouteRequirements, z: int, planned: Record, flow
     if visit.unknown:
         notes.append("the ground that it counts from is not known all along")
     if flown is not None and planned.depth > ROUNDING:
-        notes.append(f"the planned path is {planned.depth:.1f} m {wrong} at {_where(requirements, planned, 'at')}")
+        notes.append(f"the planned path is {planned.depth:.1f} m {side_text} at {_where(requirements, planned, 'at')}")
     return make_finding(
         "fence",
         airspace.place(z),

@@ -200,8 +200,8 @@ def _unknown_path_text(requirements: RouteRequirements, item: MissionItem, landi
 
 def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing, *, required: bool) -> Finding:
     place, height = requirements.waypoint(landing.at), landing.height
-    said = f"it climbs to {height:.0f} m over home"
-    said += f", which is {landing.home + height - landing.ground:.0f} m over the landing point"
+    climb_text = f"it climbs to {height:.0f} m over home"
+    climb_text += f", which is {landing.home + height - landing.ground:.0f} m over the landing point"
     # A go-around flies to no rally point.
     setup = requirements.setup
     world = return_world(replace(setup, mission=replace(setup.mission, rally=())))
@@ -211,18 +211,19 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
     climb = Fact("climb above ground", min((one.climb for one in flown), default=math.inf), "m")
     if worst is None or (unknown and worst.is_free):
         unknown = unknown or "its glide is in the ground, or the ground below is not known"
-        open_ = message("a go-around is not judged", f": {said}; {unknown}")
+        open_ = message("a go-around is not judged", f": {climb_text}; {unknown}")
         check = GROUND_WAY if required else ""
         return make_finding(
             "go_around", place, ok=None, reason=open_.text, faults=[open_], unit="m", check=check, facts=[climb]
         )
     if worst.is_free:
-        fault = message(f"{said}; {worst.room:.0f} m above ground or more on the way back")
+        fault = message(f"{climb_text}; {worst.room:.0f} m above ground or more on the way back")
     else:
         enough = _next_sufficient_height(requirements, ground, world, landing, worst.before)
         would = f"{enough:.0f} m would do (the first number of item {landing.item.seq})"
         fault = message(
-            _brief_outcome(worst), f": {said}, and {_outcome_text(worst)}; {would if enough > 0.0 else _NO_HEIGHT_TEXT}"
+            _brief_outcome(worst),
+            f": {climb_text}, and {_outcome_text(worst)}; {would if enough > 0.0 else _NO_HEIGHT_TEXT}",
         )
     ok = worst.is_free or (False if required else None)
     return make_finding(
@@ -259,7 +260,8 @@ def _simulate(
 ) -> list[_Aborted]:
     """Simulate go-arounds from places on the glide that are above the ground.
 
-    height: above home, m.  places: m before the landing point."""
+    height: above home, m.  places: m before the landing point.
+    """
     top = landing.home + height
     begins = [(float(before), landing.place(float(before))) for before in places]
     over = [up - float(ground.height(east, north)) for _, (east, north, up) in begins]
@@ -285,7 +287,7 @@ def _judge_go_around(
     requirements: RouteRequirements,
     ground: Terrain,
     landing: _Landing,
-    begun: _Aborted,
+    state: _Aborted,
     flown: Record,
     positions: Floats,
     goal: LandingStart,
@@ -297,34 +299,34 @@ def _judge_go_around(
     goal: its destination.  top: altitude above which its climb is over, m AMSL.
     """
     rows, ended = climb_rows(positions, top), int(flown["ended"])
-    begun = begun._replace(lost=ended == NEVER, open=_unknown_part_text(ended, climbs=rows < len(positions)))
+    state = state._replace(lost=ended == NEVER, open=_unknown_part_text(ended, climbs=rows < len(positions)))
     if goal.lands and rows < len(positions):
         # Its path on a glide that begins anywhere is unknown; the path before is known.
         positions, ended = positions[: rows + 1], 0
-        begun = begun._replace(lost=False, open=f"its landing sequence begins with the landing (item {goal.item})")
+        state = state._replace(lost=False, open=f"its landing sequence begins with the landing (item {goal.item})")
     if len(positions) < 2:
         # Aborted where it is to fly back to, or where the climb is over at once.
-        return begun._replace(room=begun.over)
+        return state._replace(room=state.over)
     step = np.diff(positions[:, :2], axis=0)
     way = Way(positions, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
     low = path_clearance(ground.heights, ground.to_pixel.record, positions)[0]
     least = float(np.nanmin(low, initial=math.inf))
-    begun = begun._replace(entered=entered_by_way(requirements, way))
+    state = state._replace(entered=entered_by_way(requirements, way))
     if ended == HIT or least <= 0.0:
-        return begun._replace(room=min(least, 0.0), after=float(flown["clearance_time"]))
+        return state._replace(room=min(least, 0.0), after=float(flown["clearance_time"]))
     ahead = (positions[:-1, :2] - landing.point[:2]) @ (math.sin(landing.course), math.cos(landing.course)) > 0.0
     climb = float(np.nanmin(low[:rows][ahead[:rows]], initial=math.inf))
-    if climb < GO_AROUND_ERROR and not begun.open:
+    if climb < GO_AROUND_ERROR and not state.open:
         passes = (
-            f"aborted {begun.before:.0f} m before the landing point it passes the ground in its climb by {climb:.0f} m"
+            f"aborted {state.before:.0f} m before the landing point it passes the ground in its climb by {climb:.0f} m"
         )
-        begun = begun._replace(open=f"{passes}, and may be flown {GO_AROUND_ERROR:.0f} m lower")
-    asked = _required_heights(ground, goal, 0.5 * (positions[:-1] + positions[1:]))[rows:]
+        state = state._replace(open=f"{passes}, and may be flown {GO_AROUND_ERROR:.0f} m lower")
+    minimum = _required_heights(ground, goal, 0.5 * (positions[:-1] + positions[1:]))[rows:]
     back = np.where(np.isnan(low[rows:]), math.inf, low[rows:])
     if not back.size:
-        return begun._replace(climb=climb)
-    k = int(np.argmin(back - asked))
-    return begun._replace(climb=climb, room=float(back[k]), needed=float(asked[k]))
+        return state._replace(climb=climb)
+    k = int(np.argmin(back - minimum))
+    return state._replace(climb=climb, room=float(back[k]), needed=float(minimum[k]))
 
 
 def _unknown_part_text(ended: int, *, climbs: bool) -> str:
@@ -342,13 +344,13 @@ def _required_heights(ground: Terrain, goal: LandingStart, points: Floats) -> Fl
 
     Less near lower goals.
     """
-    asked = np.full(len(points), GO_AROUND_ROOM)
+    minimum = np.full(len(points), GO_AROUND_ROOM)
     for east, north, up in (one.place for one in (goal, *goal.onward)):
         high = up - float(ground.height(east, north))
         near = np.hypot(points[:, 0] - east, points[:, 1] - north) <= NEAR_LINE_UP
         if high < GO_AROUND_ROOM:
-            asked[near] = np.minimum(asked[near], high)
-    return asked
+            minimum[near] = np.minimum(minimum[near], high)
+    return minimum
 
 
 def _next_sufficient_height(

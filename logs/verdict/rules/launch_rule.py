@@ -52,8 +52,8 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
     left = _runway_left(requirements, take_off, position)
     if left < RUNWAY_ROOM:
         brief = f"leaves the ground {take_off.launch.run - left:.0f} m from home"
-        asked = f"; the runway is {take_off.launch.run:.0f} m long, of which {RUNWAY_ROOM:.0f} m are to be left"
-        faults.append(message(brief, asked))
+        runway_text = f"; the runway is {take_off.launch.run:.0f} m long, of which {RUNWAY_ROOM:.0f} m are to be left"
+        faults.append(message(brief, runway_text))
     if room < LAUNCH_ROOM:
         faults.append(message(f"{room:.1f} m above ground", f" {where:.0f} m from home, on the course that is held"))
     entered = entered_by_way(requirements, way)

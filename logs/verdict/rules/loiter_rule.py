@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 class Circle:
     """One loiter of a route.
 
-    first, last: waypoints of its corners, none of them an end of the route: a loiter is joined and left there.
+    first, last: waypoints of its corners, not ends of the route: a loiter is joined and left there.
     middle: (2,) m, its center.
     radius: m.
     turns: number of laps.
@@ -96,17 +96,17 @@ def fold_loiters(
             kept[at[0][0]] = _loiter_finding(requirements, aligned, circle, [item for _, item in at])
         legs = [requirements.leg(leg) for leg in range(circle.first, circle.last)]
         for rule in ("slope", "speed", "clearance", "corridor"):
-            mine = left((rule,), legs)
-            if at_once and any(item.ok is not None for _, item in mine):
+            rule_findings = left((rule,), legs)
+            if at_once and any(item.ok is not None for _, item in rule_findings):
                 # The loiter was left before the other legs: only the flown ones are judged.
-                for k, item in mine:
+                for k, item in rule_findings:
                     kept[k] = item if item.ok is not None else None
-                mine = [one for one in mine if one[1].ok is not None]
-            if len(mine) > 1:
-                at_worst, worst = min(mine, key=lambda one: badness(one[1]))
-                for k, _ in mine:
+                rule_findings = [one for one in rule_findings if one[1].ok is not None]
+            if len(rule_findings) > 1:
+                at_worst, worst = min(rule_findings, key=lambda one: badness(one[1]))
+                for k, _ in rule_findings:
                     kept[k] = None
-                reason = f"{worst.reason}; the worst of the circle's {len(mine)} legs"
+                reason = f"{worst.reason}; the worst of the circle's {len(rule_findings)} legs"
                 kept[at_worst] = replace(worst, reason=reason)
     return tuple(item for item in kept if item is not None)
 
@@ -118,10 +118,10 @@ def end_findings(
 
     aligned: not read.
     """
-    beside = beside_end(requirements) if geometric else None
-    if beside is None:
+    hazards = beside_end(requirements) if geometric else None
+    if hazards is None:
         return []
-    reach, found = beside
+    reach, found = hazards
     reason = f"after it {requirements.setup.autopilot.title} circles, up to {reach:.0f} m from it"
     if found:
         reason += f": {', '.join(found)}: only a flight tells how near it comes"
@@ -166,7 +166,7 @@ def _loiter_finding(
         else:
             facts.append(f"{name}, held with {math.degrees(bank):.0f}° of bank")
     if aligned is not None and bad:
-        faults.append(_not_held(circle, bad))
+        faults.append(_unheld_corners_message(circle, bad))
     elif bad and not faults:
         first = bad[0]
         text, placed = f"{place_text(first.place)}: {first.reason}", first.place == requirements.waypoint(circle.first)
@@ -205,7 +205,7 @@ def _loiter_finding(
 def _flown_radii(aligned: AlignedTrack, circle: Circle) -> Floats:
     """Return distances from a loiter's center from first to last corner, (n,) m.
 
-    Empty if not flown to its end.
+    Empty if the loiter was not flown to its end.
     """
     first, last = int(aligned.rows[circle.first]), int(aligned.rows[circle.last])
     if not aligned.passed[circle.last] or last <= first:
@@ -220,14 +220,15 @@ def _uses_parameter_radius(requirements: RouteRequirements, circle: Circle) -> b
     The item then states none that the autopilot reads.
     """
     rules, seq = requirements.setup.autopilot.loiter_rules, int(requirements.setup.route.items[circle.first])
-    asked = next((loiter_of(item) for item in requirements.setup.mission.items if item.seq == seq), None)
-    return rules.lines_up and rules.radius != 0.0 and asked is not None and rules.radius_of(asked) == 0.0
+    loiter = next((loiter_of(item) for item in requirements.setup.mission.items if item.seq == seq), None)
+    return rules.lines_up and rules.radius != 0.0 and loiter is not None and rules.radius_of(loiter) == 0.0
 
 
 def _bank_held(requirements: RouteRequirements, circle: Circle, tightest: float, at: list[Finding]) -> float:
     """Return the bank with which a loiter tighter than the bank limit's radius (m) was held, rad.
 
-    The largest mean over a second.  Without a flight or a measurement, the bank needed to hold it, up to the autopilot's limit.
+    The largest mean over a second.  Without a flight or a measurement, the bank needed to hold it, up to the
+    autopilot's limit.
     """
     measured = [fact.value for item in at for fact in item.facts if fact.what == "bank"]
     if measured:
@@ -268,7 +269,7 @@ def _too_small(requirements: RouteRequirements, circle: Circle, tightest: float)
     return [message(f"radius {circle.radius:.0f} m where {needs} in this wind")]
 
 
-def _not_held(circle: Circle, bad: list[Finding]) -> Message:
+def _unheld_corners_message(circle: Circle, bad: list[Finding]) -> Message:
     """Return the number of corners that were not held, and the worst of them."""
     worst = min(bad, key=badness)
     corners = len({item.place for item in bad})

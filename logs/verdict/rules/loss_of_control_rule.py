@@ -69,7 +69,7 @@ def departure_findings(
 
 
 def _largest(values: Floats) -> float:
-    """Return the largest finite number, or NaN if there is none."""
+    """Return the largest finite number, or NaN without one."""
     finite = values[np.isfinite(values)]
     return float(finite.max()) if finite.size else math.nan
 

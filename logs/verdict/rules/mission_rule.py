@@ -6,7 +6,7 @@ These are PX4's own limits and say nothing about the aircraft: items that PX4 al
 if PX4 is to fly.  The landing that PX4 requires by default fails only if the user's parameter file requires it, because
 most missions have none and it takes one parameter to change that.  A command that neither PX4 nor ArduPlane supports
 fails for any autopilot, and so does a route beyond the mission's own fence.  Invalid latitudes, longitudes, frames and
-counts were refused when the file was read.
+numbers of items were refused when the file was read.
 """
 
 import itertools
@@ -132,13 +132,15 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
     For an imported flight this is no fault, and undecided: `logs.verdict.rules.completion_rule.imported_completion`.
     """
     first, *others = setup.route.unjoined
-    who = setup.autopilot.title
+    autopilot = setup.autopilot.title
     if first.is_circle:
         why = f"no tangent joins its circle to that of item {first.circle}"
     else:
         why = f"lies inside the circle of item {first.circle}"
     more = f" (+{len(others)} more)" if others else ""
-    fault = message(why, f": {who} flies {'it as it is' if first.is_circle else 'there'}, which is not judged{more}")
+    fault = message(
+        why, f": {autopilot} flies {'it as it is' if first.is_circle else 'there'}, which is not judged{more}"
+    )
     return make_finding(
         "mission",
         Place("mission", item=first.item if first.item >= 0 else None),
@@ -190,9 +192,9 @@ def _validity(mission: Mission) -> Iterator[_Remark]:
         name, support = command_name(item.command), support_of(item.command)
         if support.px4 == Treatment.REFUSED:
             taken = support.arduplane != Treatment.REFUSED
-            who = "ArduPlane takes it" if taken else "nor does ArduPlane take it"
-            who = "ArduPlane passes it over" if support.reason == PASSED_OVER else who
-            yield REFUSED if taken else False, item.seq, f"unsupported command {name}; {who}"
+            autopilot = "ArduPlane takes it" if taken else "nor does ArduPlane take it"
+            autopilot = "ArduPlane passes it over" if support.reason == PASSED_OVER else autopilot
+            yield REFUSED if taken else False, item.seq, f"unsupported command {name}; {autopilot}"
         elif item.frame in OVER_TERRAIN and item.command in PLACES | TAKEOFFS | LANDINGS:
             yield (
                 REFUSED,

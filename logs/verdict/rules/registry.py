@@ -1,4 +1,4 @@
-"""The one list of the rules of the verdict, as far as they judge.
+"""List the rules of the verdict that judge, in one place.
 
 To add a rule, write its words in `logs.verdict.rule_words`, its file, and its line here.
 """
@@ -59,5 +59,5 @@ _RULES = (
     completion_rule.RULE,
 )
 
-# Every rule by its name, in the order of `RULE_WORDS`, in which a verdict judges and lists the rules.
+# All rules by name, in the order of `RULE_WORDS`, which is the order in which a verdict judges and lists them.
 RULES: dict[str, Rule] = {name: next(rule for rule in _RULES if rule.name == name) for name in RULE_WORDS}

@@ -32,8 +32,8 @@ from world.scenario_tables import ReturnDemand
 
 # Largest number of returns that are simulated if all have to be safe: one a second up to this, 2 ms each.
 _MAX_RETURNS = 3000
-# Angle by which a logged loiter may fall short of a full lap, rad: rows may miss a second at either end (26 m/s, 260
-# m).
+# Angle by which a logged loiter may fall short of a full lap, rad: its rows may miss up to a second at either end, at
+# 26 m/s on 260 m.
 _LAP_TOLERANCE_RAD = 0.1
 # Rules that hold a flight to its legs.
 _LEG_RULES = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
@@ -47,8 +47,8 @@ def return_findings(
     The end of planfly's own flights is known from outside their track: `flown_return_findings` judges them.
     """
     if geometric:
-        asked = _requirement_findings(requirements, partial(planned_starts, requirements.setup))
-        return _finding(requirements, None, "not flown yet") + asked
+        demanded = _requirement_findings(requirements, partial(planned_starts, requirements.setup))
+        return _finding(requirements, None, "not flown yet") + demanded
     if requirements.setup.source is None:
         return []
     passed = aligned is not None and bool(aligned.passed[-1])
@@ -78,17 +78,17 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
     starts: makes the starts of returns, at an interval in s.
     """
     setup = requirements.setup
-    asked = setup.scenario.returns
-    demands = [] if asked is None else [_DEMANDS[name] for name in asked.require if name in _DEMANDS]
-    if asked is None or not demands:
+    demanded = setup.scenario.returns
+    demands = [] if demanded is None else [_DEMANDS[name] for name in demanded.require if name in _DEMANDS]
+    if demanded is None or not demands:
         return []
     every = float(max(1, math.ceil(setup.path.length / setup.airspeed / _MAX_RETURNS)))
     try:
-        world, begun = return_world(setup), starts(every)
-        found = [judge(world, begun, every) for judge in demands]
+        world, return_starts = return_world(setup), starts(every)
+        found = [judge(world, return_starts, every) for judge in demands]
     except MissionError as error:
         # Without a home nothing returns; what a glide could reach is not known.
-        found = [_Answer(False if "rtl" in asked.require else None, str(error), _METHOD)]
+        found = [_Answer(False if "rtl" in demanded.require else None, str(error), _METHOD)]
     results = {one.ok for one in found}
     ok = False if False in results else None if None in results else True
     # Failures come first, then what is not known.
@@ -154,10 +154,10 @@ def circled(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
     east, north, up = (track.position - (end.east, end.north, end.up)).T
     # True radii grow with altitude as the square of true airspeed.
     wide = WIDER * abs(end.radius) * true_by_equivalent(end.up) ** 2
-    there = (np.hypot(east, north) < max(NEAR, wide)) & (np.abs(up) < AT_HEIGHT)
-    if not there.any():
+    at_loiter = (np.hypot(east, north) < max(NEAR, wide)) & (np.abs(up) < AT_HEIGHT)
+    if not at_loiter.any():
         return False
-    first = int(np.argmax(there))
+    first = int(np.argmax(at_loiter))
     bearing = np.unwrap(np.arctan2(east[first:], north[first:]))
     around = abs(float(bearing[-1] - bearing[0])) >= 2.0 * math.pi - _LAP_TOLERANCE_RAD
     return around and float(track.time[-1] - track.time[first]) >= UNLIMITED
@@ -174,8 +174,8 @@ def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> 
     if route.return_from < 0:
         return []
     name = f"{Command.NAV_RETURN_TO_LAUNCH.name}: "
-    told = next((note.partition(name)[2] for note in route.notes if name in note), "")
-    reason = f"by {requirements.setup.autopilot.title}'s law: {told}; {outcome}"
+    note_text = next((note.partition(name)[2] for note in route.notes if name in note), "")
+    reason = f"by {requirements.setup.autopilot.title}'s law: {note_text}; {outcome}"
     other = next((note.partition(": ")[2] for note in route.notes if RETURN_NOT_FLOWN_ON in note), "")
     faults = []
     if other and requirements.setup.source is None:

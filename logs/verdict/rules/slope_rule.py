@@ -117,8 +117,8 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     # When judged without the aircraft's limits, there is no limit to be in doubt.
     if abs(planned) <= max(LEVEL, sure) or not sure < limit < math.inf:
         return ""
-    asked, known, give = (math.degrees(angle) for angle in (abs(planned), limit, off))
-    return f"{verb} {asked:.1f}°, and what {envelope.source} says of the limit is {known:.1f}° give or take {give:.1f}°"
+    slope, known, give = (math.degrees(angle) for angle in (abs(planned), limit, off))
+    return f"{verb} {slope:.1f}°, and what {envelope.source} says of the limit is {known:.1f}° give or take {give:.1f}°"
 
 
 def _steep_arc(requirements: RouteRequirements, leg: int) -> list[Message]:

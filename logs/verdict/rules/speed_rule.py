@@ -54,29 +54,29 @@ def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
 def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
     commanded = float(requirements.route.airspeed[leg])
     slowest, fastest, faults = _level_flight_range(requirements, leg, commanded)
-    asked = float(requirements.setup.route.airspeed[leg])
-    true = "" if asked == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
-    said = [f"{asked:.1f} m/s{true} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"]
-    said += _speed_range_notes(requirements, asked)
-    said += _short_leg_notes(requirements, leg, commanded)
+    command = float(requirements.setup.route.airspeed[leg])
+    true = "" if command == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
+    notes = [f"{command:.1f} m/s{true} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"]
+    notes += _speed_range_notes(requirements, command)
+    notes += _short_leg_notes(requirements, leg, commanded)
     margin = min(commanded - slowest, fastest - commanded)
     limit = slowest if commanded - slowest <= fastest - commanded else fastest
     mean, tolerance, facts, source = math.nan, 0.0, [], "aircraft"
     unflown = not geometric and (aligned is None or not aligned.flew(leg))
     if unflown:
-        said.append("the leg was not flown")
+        notes.append("the leg was not flown")
     elif aligned is not None:
         measured = _measure_leg(requirements, aligned, leg)
         if measured is None:
             mean = _nearest_mean(aligned, leg, commanded)
-            said.append(f"{mean:.1f} m/s reached; the leg is too short to hold it")
+            notes.append(f"{mean:.1f} m/s reached; the leg is too short to hold it")
         else:
             mean, tolerance, least = measured
             off = abs(mean - commanded)
-            said.append(f"flown {mean:.2f} m/s on average, {least:.1f} m/s at the slowest second")
+            notes.append(f"flown {mean:.2f} m/s on average, {least:.1f} m/s at the slowest second")
             if off > OFF_MEAN + tolerance and not _caused_by_air(requirements, aligned, leg, mean - commanded):
                 text = f"flown {mean:.1f} m/s on average, {off:.1f} m/s off the commanded {commanded:.1f} m/s"
-                said += [text] if requirements.envelope else []
+                notes += [text] if requirements.envelope else []
                 faults += [] if requirements.envelope else [message(text)]
             wanted = _flown_command(requirements, leg)
             if not faults and (unheld := _find_held_speed(requirements, aligned, leg, wanted)):
@@ -90,12 +90,12 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
     check = ""
     if not faults and (doubt := _uncertainty_text(requirements, leg, commanded, fastest)):
         ok, check = None, UNKNOWN_AIRCRAFT
-        said.insert(0, doubt)
+        notes.insert(0, doubt)
     return make_finding(
         "speed",
         requirements.leg(leg),
         ok=None if ok and unflown else ok,
-        reason=reason_of(faults, said),
+        reason=reason_of(faults, notes),
         faults=faults,
         planned=commanded,
         flown=mean,
@@ -113,9 +113,9 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
 def _flown_command(requirements: RouteRequirements, leg: int) -> float:
     """Return the airspeed that the autopilot flies on a leg, m/s; it may differ from the command."""
     setup = requirements.setup
-    asked = setup.route.airspeed
-    taken = setup.autopilot.speeds_flown(asked, setup.airspeed)
-    return float(requirements.route.airspeed[leg] * taken[leg] / asked[leg])
+    command = setup.route.airspeed
+    taken = setup.autopilot.speeds_flown(command, setup.airspeed)
+    return float(requirements.route.airspeed[leg] * taken[leg] / command[leg])
 
 
 class _HeldSpeed(NamedTuple):
@@ -168,11 +168,11 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
     return f"{commanded:.1f} m/s commanded, and {says} give or take {envelope.fastest_sd:.1f} m/s"
 
 
-def _speed_range_notes(requirements: RouteRequirements, asked: float) -> list[str]:
+def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[str]:
     """Return a note if the autopilot does not accept a commanded speed (m/s)."""
     autopilot = requirements.setup.autopilot
     limits = autopilot.speed_limits
-    if limits is None or limits.min <= asked <= limits.max:
+    if limits is None or limits.min <= command <= limits.max:
         return []
     taken = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
     does = "flies the nearest for this one" if limits.nearest else "ignores this one"
@@ -226,7 +226,7 @@ def _level_flight_range(
     """Return the range of level-flight speeds all along a leg, and faults of the commanded speed."""
     heights = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     speeds = [requirements.setup.envelope.level_speeds(up) for up in heights]
-    # Without level flight at one altitude there is none all along the leg: NaN remains.
+    # If level flight is impossible at one altitude, NaN remains for the whole leg.
     slowest, fastest = float(np.max([low for low, _ in speeds])), float(np.min([high for _, high in speeds]))
     faults = []
     if math.isnan(requirements.ground_speed[leg]):

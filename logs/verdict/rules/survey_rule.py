@@ -53,10 +53,10 @@ def _overlaps(requirements: RouteRequirements, aligned: AlignedTrack | None, sur
         (SIDE, measure.side, measure.camera.side, survey.line(measure.pair[1])),
     )
     out = []
-    for check, share, asked, line in sides:
-        if share is None or asked is None:
+    for check, share, specified, line in sides:
+        if share is None or specified is None:
             continue
-        limit = asked - PHOTO_OVERLAP
+        limit = specified - PHOTO_OVERLAP
         ok = share >= limit
         text = overlap_text(measure, check)
         faults = [] if ok else [message(text)]
@@ -67,7 +67,7 @@ def _overlaps(requirements: RouteRequirements, aligned: AlignedTrack | None, sur
                 ok=ok,
                 reason=reason_of(faults, [] if faults else [text]),
                 faults=faults,
-                planned=100.0 * share if aligned is None else 100.0 * asked,
+                planned=100.0 * share if aligned is None else 100.0 * specified,
                 flown=None if aligned is None else 100.0 * share,
                 limit=100.0 * limit,
                 source="mission",
@@ -83,17 +83,17 @@ def _overlaps(requirements: RouteRequirements, aligned: AlignedTrack | None, sur
 def overlap_text(measure: OverlapMeasure, check: str) -> str:
     """Describe the least overlap of photos along lines or across them, its place, and the requirement."""
     if check == FRONT:
-        share, asked = measure.front, measure.camera.front
+        share, specified = measure.front, measure.camera.front
         soonest = f" apart, one each {measure.camera.interval:g} s" if measure.slow else " apart"
         where = f"line {measure.line + 1}: photos {measure.apart:.0f} m{soonest}, {measure.height:.0f} m above ground"
     else:
-        share, asked = measure.side, measure.camera.side
+        share, specified = measure.side, measure.camera.side
         one, other = sorted(measure.pair)
         where = f"lines {one + 1} and {other + 1}: {measure.between:.0f} m apart, {measure.heights:.0f} m above ground"
     if share is None:
         return ""
-    said = f"{check} {100.0 * share:.0f} % at the least ({where})"
-    return said if asked is None else f"{said}, {100.0 * asked:.0f} % asked for"
+    text = f"{check} {100.0 * share:.0f} % at the least ({where})"
+    return text if specified is None else f"{text}, {100.0 * specified:.0f} % asked for"
 
 
 def _turn_arounds(requirements: RouteRequirements, survey: Survey) -> list[Finding]:

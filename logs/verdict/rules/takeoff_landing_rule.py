@@ -112,13 +112,13 @@ def landing_findings(
 
 
 def _waypoint_of(requirements: RouteRequirements, seq: int) -> int:
-    """Return the last waypoint of a mission's item, or -1 if there is none."""
+    """Return the last waypoint of a mission's item, or -1 without one."""
     found = [k for k, item in enumerate(requirements.setup.route.items) if int(item) == seq]
     return found[-1] if found else -1
 
 
 def _slope(requirements: RouteRequirements, rule: str, first: int, last: int, low: float, high: float) -> Finding:
-    """Judge the slope from one waypoint's place to another's, between two altitudes (m AMSL)."""
+    """Judge the slope between the places of two waypoints, at two altitudes (m AMSL)."""
     place = requirements.waypoint(last)
     run = float(requirements.runs[first:last].sum())
     if math.isnan(low) or math.isnan(high):

@@ -27,7 +27,7 @@ _METHOD = "time inside, exact on each segment"
 def threat_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each missile and radar sphere that plan or flight touches, or report that there is none."""
+    """Judge each missile and radar sphere that plan or flight touches, or report that no missile is met."""
     scenario = requirements.setup.scenario
     if scenario.external:
         reason = "the mission came without a scenario, so threats are not known"

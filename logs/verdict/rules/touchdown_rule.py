@@ -1,10 +1,10 @@
 """The touchdown rule: a flown landing, from the last waypoint to where the aircraft stops.
 
 It judges the final's height above ground, the hazards that the final enters, and where the aircraft touches down and
-comes to rest on the scenario's strip.  The sink rate towards the ground, which may rise before the aircraft, is
-reported: the simulation of ArduPlane's law is accurate down to the flare, but less so in the last metres
-(`docs/measured.md`).  So a sink rate beyond all measured ones leaves the landing undecided, and no sink rate passes or
-fails it.  A landing that is not flown is judged by the landing and approach rules, from the mission's items.
+stops on the scenario's strip.  The sink rate towards the ground, which may rise before the aircraft, is reported: the
+simulation of ArduPlane's law is accurate down to the flare, but less so in the last metres (`docs/measured.md`).  So a
+sink rate beyond all measured ones leaves the landing undecided, and no sink rate passes or fails it.  A
+landing that is not flown is judged by the landing and approach rules, from the mission's items.
 """
 
 import math
@@ -130,15 +130,15 @@ def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[M
     open_ = [] if faults else _undecided_messages(approach, landing, gusts=gusts)
     if not faults and not open_ and math.isnan(landing.room):
         open_ = [message("the ground below the final is not known")]
-    said = faults or open_
+    messages = faults or open_
     inside = 0.5 * approach.strip.length - TOUCH_ERROR
     farthest = max(landing.stop[0], abs(landing.touch[0]))
     return make_finding(
         "touchdown",
         place,
         ok=False if faults else None if open_ else True,
-        reason=reason_of(said, _description(approach, landing)),
-        faults=said,
+        reason=reason_of(messages, _description(approach, landing)),
+        faults=messages,
         flown=farthest,
         limit=inside,
         source="scenario",
@@ -174,7 +174,7 @@ def _touchdown_row(track: Track, terrain: Terrain) -> int | None:
     position = np.asarray(track.position, dtype=np.float64)
     over = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
     speed = np.hypot(*np.asarray(track.velocity[:, :2], dtype=np.float64).T)
-    # The aircraft has landed only if it has come to rest.
+    # The aircraft has landed only if it has stopped.
     if not speed[-1] < 1.0:
         return None
     low = over <= over[-1] + TOUCHED

@@ -59,11 +59,11 @@ def _judge(
         [f"turns {math.degrees(planned):.1f}°" + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")],
     )
     if planned > limit + PLAN_TOLERANCE:
-        beside = negligible_kink(requirements, i)
-        if beside is None:
+        lateral = negligible_kink(requirements, i)
+        if lateral is None:
             faults.append(_too_sharp(requirements, i, planned, limit, source))
         else:
-            facts.append(f"a negligible kink: the way without it passes it at {beside:.1f} m and can be flown")
+            facts.append(f"a negligible kink: the way without it passes it at {lateral:.1f} m and can be flown")
     facts += _flown_over(requirements, i, planned)
     method, angle, tolerance = "route", None, PLAN_TOLERANCE
     if measure is not None:
@@ -125,10 +125,10 @@ def _flown_over(requirements: RouteRequirements, i: int, turn: float) -> list[st
     offset = fly_by_offset(turn, radius)
     if offset <= acceptance:
         return []
-    beside = radius * (1.0 - math.cos(turn))
+    lateral = radius * (1.0 - math.cos(turn))
     return [
         f"flown over, because its arc would pass at {offset:.0f} m and its acceptance is {acceptance:.0f} m;"
-        f" that leads up to {beside:.0f} m beside the next leg"
+        f" that leads up to {lateral:.0f} m beside the next leg"
     ]
 
 
@@ -221,14 +221,14 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
 def _too_tight(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[Message]:
     """Return a fault if a turn was tighter than the bank limit's arc, by the distance from its waypoint.
 
-    Legs too short for their turn are joined by a tighter arc, and a flight that follows it has used more
-    bank than it has, or slowed down.
+    Legs too short for their turn are joined by a tighter arc, and a flight that follows it has used more bank
+    than it has, or slowed down.
     """
     turn, setup = abs(float(requirements.turns[i])), requirements.setup
     tightest = float(requirements.tightest[i])
     # Guidance's own limit: a sharper corner has no arc to follow if its legs are short.
     least = fly_by_offset(turn, tightest) if turn < SHARPEST_FLY_BY else math.inf
-    # A real autopilot does not follow the arc, and may pass the waypoint at any distance.
+    # An autopilot that does not follow the arc may pass the waypoint at any distance.
     followed = setup.autopilot.keeps_to_arcs and setup.source is None and not setup.route.fly_over[i]
     if measure.passed is None or not math.isfinite(least) or not followed:
         return []

@@ -24,12 +24,12 @@ Floats = NDArray[np.float64]
 def waypoint_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge how close the track came to each waypoint; ``geometric``: how close the planned path passes."""
-    asked = [i for i in range(len(requirements.points)) if not requirements.turns_around(i)]
+    """Judge how closely the track, or the planned path (``geometric``), passes each waypoint."""
+    judged = [i for i in range(len(requirements.points)) if not requirements.turns_around(i)]
     if geometric:
-        return [_planned(requirements, i) for i in asked]
+        return [_planned(requirements, i) for i in judged]
     apexes = requirements.apexes()
-    return [_flown(requirements, aligned, i, apexes) for i in asked]
+    return [_flown(requirements, aligned, i, apexes) for i in judged]
 
 
 def _planned(requirements: RouteRequirements, i: int) -> Finding:
@@ -85,14 +85,14 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int
         away, off = _closest(requirements, aligned, i, float(apexes[i, 2]))
         facts = (Fact("height error", off, "m"),)
         ok = away <= most
-        beside = math.inf if ok or setup.autopilot.follows_path else _crossing_offset(requirements, aligned, i)
-        if beside <= setup.corridor:
+        crossing = math.inf if ok or setup.autopilot.follows_path else _crossing_offset(requirements, aligned, i)
+        if crossing <= setup.corridor:
             ok = True
         reason = f"passed at {away:.1f} m, {abs(off):.1f} m {'above' if off >= 0.0 else 'below'}"
         if offset >= 1.0:
             reason += f" (the fly-by path passes at {offset:.0f} m)"
-        if math.isfinite(beside):
-            reason += f"; the line across the leg there crossed {beside:.0f} m beside it"
+        if math.isfinite(crossing):
+            reason += f"; the line across the leg there crossed {crossing:.0f} m beside it"
         if i > 0 and not aligned.passed[i]:
             ended = requirements.leg(aligned.leg_at(len(aligned.track) - 1))
             text = f": the flight ended on {place_text_within(ended)} {math.hypot(away, off):.0f} m away"
@@ -135,9 +135,9 @@ def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: 
 
 def _acceptance_text(near: Reach) -> str:
     """Return the acceptance distance, in words."""
-    whose = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(near.source, "the path's")
+    owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(near.source, "the path's")
     error = f", and {near.tolerance:.1f} m for navigation and gusts," if near.tolerance else ""
-    return f"{near.radius:.0f} m{error} count as reached ({whose})"
+    return f"{near.radius:.0f} m{error} count as reached ({owner})"
 
 
 def _closest(requirements: RouteRequirements, aligned: AlignedTrack, i: int, level: float) -> tuple[float, float]:
