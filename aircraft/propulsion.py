@@ -91,7 +91,7 @@ class Propeller:
 # Propeller of the Aerosonde, D 0.508 m (Beard and McLain, appendix E.2).
 BOOK_PROPELLER = Propeller(0.508, (0.09357, -0.06044, -0.1079), (0.00523, 0.00497, -0.01664))
 # Radians per revolution.
-_TURN = 2.0 * math.pi
+_RAD_PER_TURN = 2.0 * math.pi
 
 
 def root(square: float, linear: float, constant: float) -> float:
@@ -200,7 +200,7 @@ class FuelEngine:
     def speed(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the propeller speed, rad/s."""
         square, linear, constant = self.propeller.torque_parabola(airspeed, rho)
-        driving = throttle * self.torque * rho / _SEA_LEVEL
+        driving = throttle * self.torque * rho / _SEA_LEVEL_DENSITY
         return max(0.0, root(square, linear, constant + self.friction - driving))
 
     def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
@@ -210,7 +210,7 @@ class FuelEngine:
 
     def power(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the heat of the fuel, W."""
-        work = throttle * self.torque * rho / _SEA_LEVEL * self.speed(throttle, airspeed, rho)
+        work = throttle * self.torque * rho / _SEA_LEVEL_DENSITY * self.speed(throttle, airspeed, rho)
         return work / self.efficiency
 
     def functions(self, factors: tuple[str, ...]) -> str:
@@ -222,7 +222,7 @@ class FuelEngine:
         heat = scaled(1.0 / self.efficiency, "motor/drive-n_m", "motor/propeller-rad_sec")
         return f"""    <!-- The engine's torque at this throttle and density; the air turns an idle one. -->
     <function name="motor/drive-n_m">
-      {product(f"<v> {number(self.torque / _SEA_LEVEL)} </v>", *parts)}
+      {product(f"<v> {number(self.torque / _SEA_LEVEL_DENSITY)} </v>", *parts)}
     </function>
 {_parabola(self.propeller)}
     <function name="motor/driven-rad_sec">
@@ -352,7 +352,7 @@ class ShaftPower:
     <function name="motor/turns-1_s">
       <quotient> <p> motor/flow-mps </p> {scaled(d, "motor/advance")} </quotient>
     </function>
-    <function name="motor/propeller-rad_sec"> {scaled(_TURN, "motor/turns-1_s")} </function>
+    <function name="motor/propeller-rad_sec"> {scaled(_RAD_PER_TURN, "motor/turns-1_s")} </function>
     <function name="motor/thrust-n"> {pull} </function>
     <function name="motor/torque-n_m">
       <quotient> <p> motor/shaft-power-w </p> <p> motor/propeller-rad_sec </p> </quotient>
@@ -379,7 +379,7 @@ class ShaftPower:
 
 
 # Air density at sea level, kg/m^3.
-_SEA_LEVEL = 1.225
+_SEA_LEVEL_DENSITY = 1.225
 
 
 def _factor_element(factors: tuple[str, ...]) -> Callable[[str], str]:
@@ -431,7 +431,11 @@ def _thrust_and_torque(propeller: Propeller, windmill: float, factor: Callable[[
     d, (c0, c1, c2) = propeller.diameter, propeller.thrust
     braking = "<min> <v> 0 </v> <p> motor/pull-n </p> </min>"
     w, air = "motor/propeller-rad_sec", "motor/airspeed-mps"
-    pull = total(scaled(c0 * d**4 / _TURN**2, w, w), scaled(c1 * d**3 / _TURN, air, w), scaled(c2 * d**2, air, air))
+    pull = total(
+        scaled(c0 * d**4 / _RAD_PER_TURN**2, w, w),
+        scaled(c1 * d**3 / _RAD_PER_TURN, air, w),
+        scaled(c2 * d**2, air, air),
+    )
     return f"""    <!-- T = rho n^2 D^4 CT(V / n D); below zero the idle propeller's drag. -->
     <function name="motor/pull-n"> {product("<p> motor/rho-kg_m3 </p>", factor("thrust"), pull)} </function>
     <function name="motor/thrust-n">
