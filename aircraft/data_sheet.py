@@ -479,7 +479,7 @@ def _solve_motor(stated: DataSheet, sheet: DataSheet, drag: Drag, wanted: list[s
     base = BOOK_PROPELLER.scaled(diameter=diameter / BOOK_PROPELLER.diameter if diameter else 1.0, pitch=steep)
     emf = 60.0 / (2.0 * math.pi * stated.motor) if stated.motor else 0.0
     first_size = 1.0 if diameter else math.sqrt(sheet.mass / 11.0)
-    # Initial guess: unloaded speed slightly above that of the top speed, rad/s.
+    # Initial guess: unloaded propeller speed slightly above the speed for the top airspeed, rad/s.
     first_turns = 1.2 * sheet.top / base.zero_thrust_ratio / (base.diameter * first_size) * 2.0 * math.pi
     single = len(wanted) == 1 and wanted != ["climb"]
 
@@ -552,7 +552,7 @@ def _thrust_error(motor: Drive, sheet: DataSheet, drag: Drag, name: str) -> floa
 
 
 def _solve_errors(errors: Callable[[Sequence[float]], list[float]], count: int, sheet: DataSheet) -> list[float]:
-    """Return positive numbers near 1 at which all errors vanish. Raise FlightError if there are none."""
+    """Return positive numbers near 1 at which all errors vanish. Raise FlightError without a solution."""
     if not count:
         return []
     for size in (1.0, 0.6, 1.7):

@@ -36,12 +36,12 @@ class PerformanceTable(NamedTuple):
     tan_max_bank: tangent of the bank limit.
     wind_speed: mean wind (m/s) at `wind_reference_amsl` (m).
     wind_to: direction towards which the wind blows, rad clockwise from north.
-    wind_gradient: increase per metre of height, 1/s.
+    wind_gradient: increase per meter of altitude, 1/s.
     gust_sigma: standard deviation of the gusts, m/s.
     amsl: (h,) m, increasing; altitudes of the two tables.
     climb, descent: (h,) rad, steepest angles relative to the air, positive in the direction of their name.
-    equivalent: 1 if `airspeed` is an equivalent one, so that slopes are those of the true airspeed at each altitude; 0
-    if it is the true one.
+    equivalent: 1 if `airspeed` is an equivalent airspeed, so that slopes apply to the true airspeed at each altitude; 0
+        if it is a true airspeed.
     """
 
     airspeed: float
@@ -68,7 +68,7 @@ class Limits:
     max_bank: rad, the tighter of scenario and aircraft.
     wind: over the whole area.
     tracking: tracking error of the autopilot, None if it follows its path exactly.
-    reserve_height: height above ground that is kept for downdrafts beside the clearance, m.
+    reserve_height: height above ground that is kept for downdrafts in addition to the clearance, m.
     reserve_threats: the same around missiles' spheres, in all directions, and above and below zones, m.
     reserve_climb: rate of climb that legs leave unused for downdrafts, m/s.
     reserve_above: distance below a maximum height above ground that is kept for updrafts, m.

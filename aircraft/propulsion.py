@@ -75,7 +75,7 @@ class Propeller:
     def torque_parabola(self, airspeed: float, rho: float) -> tuple[float, float, float]:
         """Return the torque (N m) as a parabola in the propeller speed (rad/s).
 
-        The coefficients are those of its square, its first power, and 1.
+        The coefficients belong to the square of the speed, the speed, and 1.
         """
         c0, c1, c2 = self.torque
         d, turn = self.diameter, 2.0 * math.pi

@@ -139,7 +139,7 @@ def corner_deviation(
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Return the largest distance from the legs at a corner, and the affected lengths around it, m.
 
-    The affected lengths are those of the leg before and of the leg after the corner.
+    The first affected length is on the leg before the corner, the second on the leg after it.
 
     turn: rad, positive.
     ground_speed: m/s.
@@ -172,7 +172,7 @@ CORRIDOR_RADII = 2.0
 def corridor_half_width(stated: float | None, acceptance_radius: float | None) -> float:
     """Return the half-width of the corridor around the legs of a path, m.
 
-    It is the scenario's, or the one that the autopilot needs.
+    It is stated by the scenario, or follows from the autopilot's acceptance radius.
     stated: `[limits] corridor_m`, None if not stated.
     acceptance_radius: radius at which the autopilot accepts a waypoint unless the mission states another, m; None for
         guidance that flies corners as planned.

@@ -25,7 +25,7 @@ FILES = ("posterior.toml", "uncertainty.toml")
 DRAWS_FILE = "draws.csv"
 # Number of draws.
 DRAWS = 512
-# Relative standard deviation of the power of an aircraft from a data sheet: mostly that of its least drag.
+# Relative standard deviation of the power of an aircraft from a data sheet, mostly from its least drag.
 POWER_SD = 0.25
 # Largest file of draws, bytes.
 MAX_BYTES = 4 * 2**20

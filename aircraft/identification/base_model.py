@@ -59,7 +59,7 @@ class BaseModel:
     inertia: (4,) Ixx, Iyy, Izz and Ixz (the integral of x z dm), kg m^2.
     servo_lag, motor_lag: first-order time constants, s.
     reacts: True if the propeller's torque rolls it; a flying wing's elevons are rigged against that.
-    induced_factor: ratio of the coefficients' drag_induced to that of the aircraft it was scaled from.
+    induced_factor: ratio of drag_induced to the value of the aircraft that it was scaled from.
     """
 
     mass: float

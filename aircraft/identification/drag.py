@@ -36,7 +36,7 @@ NUISANCES = {
 }
 # The last two are in standard deviations of `AlphaDoubt`.
 
-# True for the quantities of the aircraft, False for those of its sensors.
+# True for quantities of the aircraft, False for quantities of its sensors.
 _IS_OF_AIRCRAFT = np.array([name.split()[0] in ("resistance", "idle", "voltage", "drag") for name in NUISANCES])
 # Number of steps of the search for folded parameters.
 _MAX_FOLDING_STEPS = 3
@@ -126,7 +126,7 @@ def fit_drag(
     The values give the same forces and currents with the base's own resistance, idle current, voltage and elevator drag
     as the fit does with its own.
 
-    values: (n,) of all parameters, of which those of lift are used.
+    values: (n,) of all parameters, of which the parameters of lift are used.
     doubt: uncertainty of the lift curve.
     """
     forces = forward_forces(signals, base, values, flow, AlphaDoubt() if doubt is None else doubt)

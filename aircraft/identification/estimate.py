@@ -182,7 +182,7 @@ def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
     covariance = fitted + sum(np.outer(shift, shift) for shift in shifts.values())
     widening = np.array([FAST_WIDENING if parameter.fast else 1.0 for parameter in PARAMETERS])
     sds = np.sqrt(np.diag(covariance)) * widening
-    # Correlations stay where an interval is clipped to the prior's.
+    # Correlations stay where an interval is clipped to the prior's interval.
     factor = widening * np.minimum(1.0, prior_sds() / sds)
     return np.asarray(covariance * np.outer(factor, factor))
 

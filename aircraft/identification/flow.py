@@ -44,7 +44,7 @@ def motor_of(base: BaseModel, values: Floats) -> Motor:
 
 
 def voltage_of(signals: Signals, base: BaseModel) -> Floats | float:
-    """Return the battery's voltage, V: the logged one, or the base's."""
+    """Return the battery's voltage, V: the logged voltage, or the base model's voltage."""
     return signals.voltage if np.isfinite(signals.voltage).all() else base.motor.voltage
 
 
@@ -63,7 +63,7 @@ def other_lift(signals: Signals, base: BaseModel) -> Floats:
 def vane(signals: Signals, base: BaseModel, values: Floats) -> Flow:
     """Return the flow according to the accelerometers.
 
-    values: (n,) of `aircraft.identification.parameters.PARAMETERS`, of which those of lift and motor are used.
+    values: (n,) of `aircraft.identification.parameters.PARAMETERS`, of which the parameters of lift and motor are used.
     """
     c, (slope, zero) = base.coefficients, lift_curve(base, values)
     pressure, other = pressure_of(signals, base), other_lift(signals, base)
@@ -87,7 +87,7 @@ def vane(signals: Signals, base: BaseModel, values: Floats) -> Flow:
 def attitude_alpha(signals: Signals, level: float = 0.0) -> Floats:
     """Return the angle of attack (n,), rad, from attitude, ground velocity and estimated horizontal wind.
 
-    level: angle of the autopilot's level above the model's, rad.
+    level: angle of the autopilot's level above the model's level, rad.
     """
     roll, pitch, yaw = signals.attitude.T
     pitch = pitch + level

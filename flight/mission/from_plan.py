@@ -149,7 +149,7 @@ def acceptance_radii(
     turns, pull = turning_angles(points), GRAVITY * math.tan(max_bank)
     radii = np.full(len(points), ACCEPTANCE_TOLERANCE)
     radii[1:-1] += _fly_by_offsets(np.minimum(turns, _MAX_OFFSET_TURN_RAD), (airspeed + wind) ** 2 / pull)
-    # Arcs are drawn with a margin for a gust; a sharper turn's arc passes wherever it passes, a U-turn's at infinity.
+    # Arcs are drawn with a margin for a gust. The limit on the turn keeps the offset finite: a U-turn has no arc.
     gust = 0.1 * W20[scenario.wind.turbulence]
     arcs = _fly_by_offsets(np.minimum(turns, _MAX_ARC_TURN_RAD), (airspeed + wind + gust) ** 2 / pull)
     radii[1:-1] = np.maximum(radii[1:-1], arcs)

@@ -1,6 +1,6 @@
 """Change the layout of a survey: longer turn-arounds, interleaved lines, or lines on another course.
 
-Items that do not belong to the survey stay as they are, and each line keeps its items, including the camera's.
+Items that do not belong to the survey stay as they are, and each line keeps its items, including camera commands.
 """
 
 import math

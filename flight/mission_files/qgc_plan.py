@@ -466,7 +466,7 @@ def plan_file_text(mission: Mission) -> str:
 
     cruiseSpeed is the mission's speed, or its first DO_CHANGE_SPEED, or QGC's default. It is written in whole m/s, as
     hoverSpeed is: they are integers in Mission Planner's `MissionFile.Mission`, whose reader refuses "25.0"; QGC reads
-        both as numbers, and sends neither to an aircraft. firmwareType is that of the mission's autopilot, 0 for
+        both as numbers, and sends neither to an aircraft. firmwareType names the mission's autopilot, 0 for
         planfly's own guidance, which no ground station knows.
     """
     mission = renumbered(mission)
