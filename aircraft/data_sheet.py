@@ -288,8 +288,9 @@ class SizedAircraft:
 def size_aircraft(sheet: DataSheet, title: str = "", kind: AircraftClass | None = None) -> SizedAircraft:
     """Build the model of a data sheet.
 
-    kind: class of the aircraft; None takes the layout's class. Raise FlightError if no propeller gives the stated climb
-        and top speed.
+    kind: class of the aircraft; None takes the layout's class.
+
+    Raise FlightError if no propeller gives the stated climb and top speed.
 
     >>> made = size_aircraft(check_sheet(DataSheet(2.1, 1.6, 15.0, 10.0)))
     >>> round(made.numbers.area, 3), made.guessed

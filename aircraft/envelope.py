@@ -115,8 +115,10 @@ class Envelope:
         """Return the steepest climb and dive over the ground on a leg in this steady wind, rad.
 
         Both are positive.
-        tailwind, crosswind: m/s along and across the leg's course. A tailwind flattens the slope over the ground, a
-            headwind steepens it. NaN if the aircraft cannot make progress along the leg, or where `air_angles` is NaN.
+        tailwind, crosswind: m/s along and across the leg's course.
+
+        A tailwind flattens the slope over the ground, a headwind steepens it. NaN if the aircraft cannot make progress
+        along the leg, or where `air_angles` is NaN.
         """
         climb, descent = self.air_angles(airspeed, amsl)
         return (

@@ -139,8 +139,9 @@ class Limits:
         """Return the performance at a true airspeed (m/s), for compiled functions.
 
         airspeed: None for the airspeed of the limits. An autopilot with a tracking error uses it as an equivalent
-            airspeed: its true airspeed grows with altitude, where the aircraft climbs less. Climb and descent are NaN
-            where `Envelope.air_angles` is NaN.
+            airspeed: its true airspeed grows with altitude, where the aircraft climbs less.
+
+        Climb and descent are NaN where `Envelope.air_angles` is NaN.
         """
         if airspeed not in self._tables:
             self._tables[airspeed] = self._table(airspeed)

@@ -2,7 +2,7 @@
 
 The wind does not depend on the aircraft's heading. A sensor that reads too little leaves a part of the airspeed in the
 wind, and that part turns with the aircraft: every turn shows it. Wind and gusts change too, but slowly, so the change
-    of the difference from one second to the next is used.
+of the difference from one second to the next is used.
 """
 
 from dataclasses import replace

@@ -46,9 +46,9 @@ def plan_mission(
 
     The acceptance radius is the fly-by offset R(1/cos(theta/2) - 1), the distance at which a turn at this speed and
     bank passes its waypoint with the scenario's wind from behind, plus `ACCEPTANCE_TOLERANCE`, rounded up to a whole
-    meter: no arc of the flight misses it. PX4 has its own radius on fixed wings. If the tracking error of an autopilot
-    is known, the
-    radius is the one with the smallest error: ArduPlane turns to the next leg at that distance before a waypoint.
+    meter, so that no arc of the flight misses it. PX4 has its own radius on fixed wings. If the tracking error of an
+    autopilot is known, the radius is the one with the smallest error: ArduPlane turns to the next leg at that distance
+    before a waypoint.
 
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")

@@ -283,7 +283,7 @@ def lay_return(
     dive = min(ability.dive, rules.sink / ability.airspeed)
     plan = _ReturnBuilder(circle, target.slope_base, rules.least_slope, ability, dive, here, onward)
     if _distance(here, target.position) <= abs(radius) + _MIN_TANGENT_M:
-        # Start near the target: it is on the circle as soon as it has crossed to it.
+        # The return starts inside the loiter: fly straight on to its circle.
         plan.circle_from(*_rim_ahead(here, course, circle))
         return plan.points
     course = plan.turn_gently(course, rules)
