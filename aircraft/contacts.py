@@ -34,7 +34,9 @@ _MIN_SKID_DEPTH_RATIO = 0.75
 # Positions relative to the center of gravity, forward, right and down, in spans. Points to the right have a twin to the
 # left, so that belly and wheels have three points each.
 _BELLY_POINTS = {"belly front": (0.12, 0.025, 0.069), "belly rear": (-0.12, 0.0, 0.069)}
+# Wheels.
 _WHEEL_POINTS = {"nose wheel": (0.20, 0.0, 0.085), "main wheel": (-0.04, 0.10, 0.085)}
+# Other points of the structure.
 _STRUCTURE_POINTS = {"nose": (0.25, 0.0, 0.02), "tail": (-0.35, 0.0, 0.0), "wing tip": (0.0, 0.5, -0.02)}
 # Static compression of skids or wheels under the aircraft's weight, in spans.
 _SAG_SPANS = 0.0062

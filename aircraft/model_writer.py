@@ -279,10 +279,17 @@ def _external_reactions(numbers: ModelNumbers) -> str:
 # ----------------------------------------------------------------------
 # Forces and moments. In the stability frame JSBSim takes X aft and Z up as positive: drag and lift.
 
+# Element of dynamic pressure times wing area.
 _Q = "<p> aero/qbar-area </p>"
-_ALPHA, _BETA = "aero/alpha-rad", "aero/beta-rad"
+# Property of the angle of attack.
+_ALPHA = "aero/alpha-rad"
+# Property of the sideslip.
+_BETA = "aero/beta-rad"
+# Properties of the rotation rates.
 _RATE_P, _RATE_Q, _RATE_R = (f"velocities/{axis}-aero-rad_sec" for axis in "pqr")
+# Properties of the control surfaces.
 _ELEVATOR, _AILERON, _RUDDER = (f"surface/{name}-rad" for name in ("elevator", "aileron", "rudder"))
+# Property of the factor on the control surfaces' moments.
 _CONTROL = "aero/control-factor"
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+# Equations in which parameters are estimated.
 Group = Literal["lift", "drag", "pitch", "roll", "yaw"]
 
 

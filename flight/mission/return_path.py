@@ -18,6 +18,7 @@ from flight.mission.itinerary import UNLIMITED, ItineraryStop
 from flight.mission.loiter_circles import CORNER, Node, RoutePoint, circle_corners, is_joined, on_rim, tangent_course
 from world.geometry import wrap
 
+# East, north, up, m.
 Place = tuple[float, float, float]
 
 

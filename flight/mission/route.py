@@ -215,9 +215,9 @@ def fly_over_waypoints(
     turn_distance: see `RouteRules`.
 
     An arc that turns by ``turn`` passes its waypoint at R(1/cos(turn/2) - 1). At 25 m/s and 30 degrees of bank R is 110
-    m: the arc passes a corner of 90 degrees at 46 m, one of 120 degrees at 110 m, and one of 174 degrees at 2 km. It
-    misses the waypoint if that distance exceeds the acceptance radius that the mission states, or, if it states none,
-    the autopilot's own turn distance; the autopilot then flies on to that distance before it turns.
+    m, and the arc passes a corner of 90 degrees at 46 m, one of 120 degrees at 110 m, and one of 174 degrees at 2 km.
+    It misses the waypoint if that distance exceeds the acceptance radius that the mission states, or, if it states
+    none, the autopilot's own turn distance; the autopilot then flies on to that distance before it turns.
 
     >>> from types import SimpleNamespace
     >>> from aircraft.path_limits import PerformanceTable
