@@ -450,9 +450,9 @@ def _make_survey(
 def _line_gaps(places: Floats) -> list[float]:
     """Return the gaps (m) between lines at sorted positions (n,) m, ignoring lines flown twice."""
     gaps = [float(gap) for gap in np.diff(places) if gap >= _MIN_LINE_SPACING_M]
-    beside = [[gaps[k] for k in (i - 1, i + 1) if 0 <= k < len(gaps)] for i in range(len(gaps))]
+    neighbors = [[gaps[k] for k in (i - 1, i + 1) if 0 <= k < len(gaps)] for i in range(len(gaps))]
     return [
-        gap for gap, near in zip(gaps, beside, strict=True) if not near or gap > _DUPLICATE_LINE_FRACTION * min(near)
+        gap for gap, near in zip(gaps, neighbors, strict=True) if not near or gap > _DUPLICATE_LINE_FRACTION * min(near)
     ]
 
 
