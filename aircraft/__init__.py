@@ -1,1 +1,1 @@
-"""Aircraft: JSBSim models as data, the performance envelope, path limits, and the autopilot's tracking error."""
+"""Aircraft: JSBSim models as data, performance envelope, path limits, and autopilot tracking error."""

@@ -1,4 +1,4 @@
-"""The known aircraft: metadata of each model in SI units, and folders for a user's own aircraft.
+"""Catalog of aircraft: metadata of each model in SI units, and folders for a user's own aircraft.
 
 An aircraft is a folder with ``<name>.xml`` (JSBSim) and ``<name>.toml`` (metadata: masses, speeds, limits, energy).
 `find_aircraft` reads an embedded aircraft or a folder, `model_hash` identifies a model's files, and `make_own_folder`
@@ -19,13 +19,15 @@ from world.errors import FlightError
 from world.files import did_you_mean, read_at_most, read_toml, write_folder
 from world.scenario_tables import names_folder
 
-# Maximum size of a model's file; JSBSim's own largest has 200 kB.
+# Largest size of a model's file, bytes; JSBSim's own largest has 200 kB.
 MAX_MODEL_BYTES = 32 * 2**20
+# Folder of the embedded aircraft.
 _ROOT = Path(__file__).parent
+# Radians in one degree.
 _DEGREE = math.pi / 180.0
 
 # TOML key: (field of Aircraft, factor to SI).
-_KEYS = {
+_FIELD_BY_KEY = {
     "mass_kg": ("mass", 1.0),
     "wing_area_m2": ("wing_area", 1.0),
     "wing_span_m": ("wing_span", 1.0),
@@ -42,24 +44,28 @@ _KEYS = {
     "surface_lag_s": ("surface_lag", 1.0),
     "motor_lag_s": ("motor_lag", 1.0),
 }
-# Energy carried: one of these pairs.
-_BATTERY = ("battery_v", "battery_wh")
-_FUEL = ("fuel_kg", "fuel_mj_per_kg")
+# Keys of the energy carried: one of these pairs.
+_BATTERY_KEYS = ("battery_v", "battery_wh")
+# The other pair.
+_FUEL_KEYS = ("fuel_kg", "fuel_mj_per_kg")
 
 
 @dataclass(frozen=True, slots=True)
 class Aircraft:
     """One aircraft model: its JSBSim files and its metadata.
 
-    folder: holds ``<name>.xml`` (JSBSim) and ``<name>.toml``.
-    mass: kg. wing_area: m^2. wing_span: m.
+    folder: folder of ``<name>.xml`` (JSBSim) and ``<name>.toml``.
+    mass: kg.
+    wing_area: m^2.
+    wing_span: m.
     airspeed: cruise, m/s; this and the next three are true airspeeds.
     airspeed_min, airspeed_max: range that guidance may use, m/s.
     stall_speed: slowest level trim at sea level, m/s.
-    max_bank: for planned turns, rad.
-    max_pitch: commanded, either way, rad.
-    max_elevator, max_aileron, max_rudder: either way, rad.
-    surface_rate: rad/s. surface_lag, motor_lag: first-order time constants, s.
+    max_bank: bank limit of planned turns, rad.
+    max_pitch: limit of the pitch command in either direction, rad.
+    max_elevator, max_aileron, max_rudder: travel in either direction, rad.
+    surface_rate: rad/s.
+    surface_lag, motor_lag: first-order time constants, s.
     battery_voltage: V; 0 for an aircraft that burns fuel.
     battery_energy: energy of the battery, or heat of the fuel, J.
     model: properties of the JSBSim model.
@@ -89,7 +95,7 @@ class Aircraft:
 
     @property
     def model_file(self) -> Path:
-        """The JSBSim model's XML file."""
+        """XML file of the JSBSim model."""
         if shipped := self.model.shipped:
             return jsbsim_folder() / "aircraft" / shipped / f"{shipped}.xml"
         return self.folder / f"{self.name}.xml"
@@ -105,18 +111,18 @@ class Aircraft:
 
     @property
     def embedded(self) -> bool:
-        """Whether the aircraft ships with planfly."""
+        """True if the aircraft ships with planfly."""
         return self.folder.parent == _ROOT
 
 
 def jsbsim_folder() -> Path:
-    """Folder of JSBSim's own models, found without importing JSBSim."""
+    """Return the folder of JSBSim's own models, found without importing JSBSim."""
     spec = find_spec("jsbsim")
     return Path(spec.origin if spec and spec.origin else "jsbsim").parent
 
 
 def aircraft_names() -> tuple[str, ...]:
-    """Names that `load_aircraft` takes, sorted.
+    """Return the names that `load_aircraft` accepts, sorted.
 
     >>> aircraft_names()
     ('aerosonde', 'c172x', 'ultrastick25e', 'x8', 'zagi')
@@ -125,9 +131,9 @@ def aircraft_names() -> tuple[str, ...]:
 
 
 def load_aircraft(name: str) -> Aircraft:
-    """The embedded aircraft with this name.
+    """Return the embedded aircraft with this name.
 
-    Raises FlightError with one line for an unknown name, or for a metadata file with a missing, unknown or invalid
+    Raise FlightError with one line for an unknown name, or for a metadata file with a missing, unknown or invalid
     entry.
 
     >>> aircraft = load_aircraft("aerosonde")
@@ -146,9 +152,9 @@ def load_aircraft(name: str) -> Aircraft:
 
 
 def find_aircraft(name: str) -> Aircraft:
-    """The embedded aircraft with this name, or the one in this folder if the name contains a slash.
+    """Return the embedded aircraft with this name, or the one in this folder if the name contains a slash.
 
-    Raises FlightError as `load_aircraft`.
+    Raise FlightError as `load_aircraft` does.
 
     >>> find_aircraft("c172x").airspeed
     50.0
@@ -157,9 +163,9 @@ def find_aircraft(name: str) -> Aircraft:
 
 
 def find_again(name: str, asked: str) -> Aircraft:
-    """The aircraft that a setup or a log calls by its name, where its scenario asks for it by name or by folder.
+    """Return the aircraft that a setup or a log names, given the name or folder that its scenario states.
 
-    Raises FlightError as `load_aircraft`.
+    Raise FlightError as `load_aircraft` does.
 
     >>> find_again("c172x", "aerosonde").name
     'c172x'
@@ -168,9 +174,9 @@ def find_again(name: str, asked: str) -> Aircraft:
 
 
 def read_aircraft(folder: Path) -> Aircraft:
-    """The aircraft described by ``<folder>/<folder's name>.toml``.
+    """Return the aircraft described by ``<folder>/<folder's name>.toml``.
 
-    Raises FlightError as `load_aircraft`.
+    Raise FlightError as `load_aircraft` does.
     """
     file = folder / f"{folder.name}.toml"
     try:
@@ -199,12 +205,12 @@ def read_aircraft(folder: Path) -> Aircraft:
 
 
 def _numbers(table: dict[str, Any]) -> dict[str, float]:
-    """The numeric fields of `Aircraft`; FlightError without the file's name."""
-    store = _FUEL if set(_FUEL) & table.keys() else _BATTERY
-    allowed = {*_KEYS, *store}
+    """Return the numeric fields of `Aircraft`; raise FlightError without the file's name."""
+    store = _FUEL_KEYS if set(_FUEL_KEYS) & table.keys() else _BATTERY_KEYS
+    allowed = {*_FIELD_BY_KEY, *store}
     missing, unknown = sorted(allowed - table.keys()), sorted(table.keys() - allowed)
     near = did_you_mean(unknown[0], missing) if unknown else ""
-    # A misspelt key is missing as well; the spelling is the better message.
+    # A misspelled key is missing as well; the spelling is the better message.
     if missing and not near:
         raise FlightError(f"missing {', '.join(missing)}", field=missing[0])
     if unknown:
@@ -212,20 +218,20 @@ def _numbers(table: dict[str, Any]) -> dict[str, float]:
     for key, value in table.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
             raise FlightError(f"{key} = {value!r} is not a positive number", field=key, value=value)
-    values = {field: table[key] * factor for key, (field, factor) in _KEYS.items()}
+    values = {field: table[key] * factor for key, (field, factor) in _FIELD_BY_KEY.items()}
     first, second = (float(table[key]) for key in store)
-    # Watt hours to joules, or kilograms of fuel times megajoules a kilogram.
+    # Watt hours to joules, or kilograms of fuel times megajoules per kilogram.
     values["battery_voltage"], values["battery_energy"] = (
-        (first, second * 3600.0) if store is _BATTERY else (0.0, first * second * 1e6)
+        (first, second * 3600.0) if store is _BATTERY_KEYS else (0.0, first * second * 1e6)
     )
     return values
 
 
 def model_hash(aircraft: Aircraft) -> str:
-    """SHA-256, as hex, of the names and contents of the model's XML and TOML files.
+    """Return the SHA-256, as hex, of the names and contents of the model's XML and TOML files.
 
     It changes with any change of the model and so identifies the model of a cached envelope or an old log. Other files
-    in the folder, such as guidance gains, do not count. Raises FlightError for a file that cannot be read.
+    in the folder, such as guidance gains, are not included. Raise FlightError for a file that cannot be read.
 
     >>> len(model_hash(load_aircraft("aerosonde")))
     64
@@ -253,19 +259,22 @@ def _hash_files(files: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) ->
 
 # --- Folders for a user's own aircraft ---
 
+# Valid name of a folder.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
-# Names that files in every folder have.
-_TAKEN = ("ardupilot", "draws", "gains", "posterior", "uncertainty", "README")
+# Names of files that every folder has.
+_RESERVED_NAMES = ("ardupilot", "draws", "gains", "posterior", "uncertainty", "README")
+# Suffixes of the files that are copied.
 _SUFFIXES = frozenset({".xml", ".toml", ".parm", ".md", ".csv"})
-_SHIPPED = re.compile(r"^(\s*shipped_by_jsbsim\s*=\s*)true\b", re.MULTILINE)
+# Entry of a metadata file for a model that JSBSim ships.
+_SHIPPED_ENTRY = re.compile(r"^(\s*shipped_by_jsbsim\s*=\s*)true\b", re.MULTILINE)
 
 
 def make_own_folder(folder: Path, source: Aircraft) -> tuple[str, ...]:
     """Create a folder with the same aircraft under the folder's name, completely or not at all.
 
-    A model that ships with JSBSim stays there, and the metadata name it. Returns the names of the created files,
-    sorted. Raises FlightError if the folder exists, its parent does not, or its name is not valid for a model; OSError
-    if it cannot be written.
+    A model that ships with JSBSim stays there, and the metadata name it. Return the names of the created files, sorted.
+    Raise FlightError if the folder exists, its parent does not, or its name is not valid for a model; OSError if it
+    cannot be written.
 
     >>> from tempfile import TemporaryDirectory
     >>> from aircraft.catalog import load_aircraft, read_aircraft
@@ -282,13 +291,15 @@ def make_own_folder(folder: Path, source: Aircraft) -> tuple[str, ...]:
 
 
 def check_new_folder(folder: Path) -> Path:
-    """The whole path of a folder that an aircraft is to be made in.
+    """Return the absolute path of a folder in which an aircraft is to be created.
 
-    Raises FlightError if it exists, its parent does not, or its name is not valid for a model.
+    Raise FlightError if it exists, its parent does not, or its name is not valid for a model.
     """
     target = folder.absolute()
-    if _NAME.fullmatch(target.name) is None or target.name in _TAKEN:
-        allowed = f"a folder's name of letters, digits, '.', '_' and '-' is expected, none of {', '.join(_TAKEN)}"
+    if _NAME.fullmatch(target.name) is None or target.name in _RESERVED_NAMES:
+        allowed = (
+            f"a folder's name of letters, digits, '.', '_' and '-' is expected, none of {', '.join(_RESERVED_NAMES)}"
+        )
         raise FlightError(f"{folder}: {allowed}", file=folder, value=target.name, allowed=allowed)
     if target.exists() or target.is_symlink():
         raise FlightError(f"{folder}: exists; name a folder that does not", file=folder)
@@ -298,7 +309,7 @@ def check_new_folder(folder: Path) -> Path:
 
 
 def _renamed(source: Aircraft, name: str) -> dict[str, bytes]:
-    """Contents of the new folder by path: the aircraft's files, with its own two renamed."""
+    """Return the contents of the new folder by path: the aircraft's files, with its own two renamed."""
     folders = [source.folder, *(folder for folder in source.model_folders if source.folder in folder.parents)]
     found = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]
     files = {}
@@ -309,5 +320,5 @@ def _renamed(source: Aircraft, name: str) -> dict[str, bytes]:
         own = where if where.stem != source.name else where.with_name(f"{name}{where.suffix}")
         files[str(own)] = file.read_bytes()
     metadata = files[f"{name}.toml"].decode("utf-8").replace(f"{source.name}.xml", f"{name}.xml")
-    files[f"{name}.toml"] = _SHIPPED.sub(rf'\g<1>"{source.name}"', metadata).encode()
+    files[f"{name}.toml"] = _SHIPPED_ENTRY.sub(rf'\g<1>"{source.name}"', metadata).encode()
     return files

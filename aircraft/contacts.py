@@ -1,11 +1,11 @@
-"""Where an aircraft meets the ground: belly skids or wheels, and the points that are not to touch it.
+"""Ground contacts of an aircraft: belly skids or wheels, and points of the structure.
 
-Most models have no contacts, for a flight in the air needs none: they are given to the model that is loaded for a
-flight which takes off or lands, so that a flight in the air loads the same file as ever.  A model that has contacts of
-its own keeps them.
+Most models have no contacts, since a flight in the air needs none. Contacts are added to the model that is loaded for a
+flight with take-off or landing, so that a flight in the air still loads the same file. A model with contacts keeps its
+own.
 
-Places and stiffness go by span and mass, about those of an Aerosonde (11 kg, 2.9 m) that took off and landed in JSBSim
-under ArduPlane: a belly of 3000 N/m a skid, 0.18 m below the centre of gravity at rest, friction 0.5 and 0.4.
+Positions and stiffness scale with span and mass, from an Aerosonde (11 kg, 2.9 m) that took off and landed in JSBSim
+under ArduPlane: a belly of 3000 N/m per skid, 0.18 m below the center of gravity at rest, friction 0.5 and 0.4.
 """
 
 import math
@@ -22,30 +22,40 @@ from aircraft.envelope import GRAVITY
 
 Floats = NDArray[np.float64]
 
+# Landing gear of an aircraft whose model has no contacts.
 Gear = Literal["belly", "wheels"]
-_METRES = {"M": 1.0, "FT": 0.3048, "IN": 0.0254}
-_KILOGRAMS = {"KG": 1.0, "LBS": 0.45359237}
-# A model without wheels stands on its lowest points: on those that are at least so deep, as a share of the deepest.
-_SKIDS = 0.75
+# Meters in each unit of a model.
+_METERS_PER_UNIT = {"M": 1.0, "FT": 0.3048, "IN": 0.0254}
+# Kilograms in each unit of a model.
+_KILOGRAMS_PER_UNIT = {"KG": 1.0, "LBS": 0.45359237}
+# Smallest depth of the points that a model without wheels stands on, as a ratio to the deepest point.
+_MIN_SKID_DEPTH_RATIO = 0.75
 
-# In spans, forward, to the right and down from the centre of gravity.  Of the belly and the wheels each side has one
-# more: all stand on three points.
-_BELLY = {"belly front": (0.12, 0.025, 0.069), "belly rear": (-0.12, 0.0, 0.069)}
-_WHEELS = {"nose wheel": (0.20, 0.0, 0.085), "main wheel": (-0.04, 0.10, 0.085)}
-_STRUCTURE = {"nose": (0.25, 0.0, 0.02), "tail": (-0.35, 0.0, 0.0), "wing tip": (0.0, 0.5, -0.02)}
-# So far the aircraft's weight presses its skids or wheels in, in spans; damping, as a share of the critical one.
-_SAG, _DAMPING = 0.0062, 0.6
-# Static, dynamic and rolling friction: a belly on grass, and small wheels without a brake.
-_SKID, _WHEEL = (0.5, 0.4, 0.0), (0.8, 0.5, 0.05)
+# Positions relative to the center of gravity, forward, right and down, in spans. Points to the right have a twin to the
+# left, so that belly and wheels have three points each.
+_BELLY_POINTS = {"belly front": (0.12, 0.025, 0.069), "belly rear": (-0.12, 0.0, 0.069)}
+# Wheels.
+_WHEEL_POINTS = {"nose wheel": (0.20, 0.0, 0.085), "main wheel": (-0.04, 0.10, 0.085)}
+# Other points of the structure.
+_STRUCTURE_POINTS = {"nose": (0.25, 0.0, 0.02), "tail": (-0.35, 0.0, 0.0), "wing tip": (0.0, 0.5, -0.02)}
+# Static compression of skids or wheels under the aircraft's weight, in spans.
+_SAG_SPANS = 0.0062
+# Damping of skids or wheels, as a ratio to critical damping.
+_DAMPING_RATIO = 0.6
+# Static, dynamic and rolling friction of a belly on grass.
+_SKID_FRICTION = (0.5, 0.4, 0.0)
+# Static, dynamic and rolling friction of small wheels without a brake.
+_WHEEL_FRICTION = (0.8, 0.5, 0.05)
 
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """A point that may meet the ground.
+    """A point that may touch the ground.
 
-    name: as the model has it.  forward, right, down: from the centre of gravity, m.
-    stands: whether the aircraft stands and slides on it; any other is not to touch the ground at speed.
-    wheel: whether it rolls.
+    name: name in the model.
+    forward, right, down: position relative to the center of gravity, m.
+    stands: True if the aircraft stands and slides on it; other points must not touch the ground at speed.
+    wheel: True if it rolls.
     """
 
     name: str
@@ -57,26 +67,28 @@ class Contact:
 
 
 def usual_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
-    """The contacts of an aircraft whose model has none, by its span.
+    """Return the contacts of an aircraft whose model has none, scaled by its span.
 
     >>> from aircraft.catalog import load_aircraft
     >>> made = usual_contacts(load_aircraft("aerosonde"), "belly")
     >>> len(made), made[0].name, round(made[0].down, 2), made[-1].stands
     (7, 'belly front left', 0.2, False)
     """
-    span, stands = aircraft.wing_span, _WHEELS if gear == "wheels" else _BELLY
+    span, stands = aircraft.wing_span, _WHEEL_POINTS if gear == "wheels" else _BELLY_POINTS
     found = []
-    for name, (forward, right, down) in {**stands, **_STRUCTURE}.items():
+    for name, (forward, right, down) in {**stands, **_STRUCTURE_POINTS}.items():
         for side, sign in (("left", -1.0), ("right", 1.0)) if right else (("", 0.0),):
             place = (forward * span, sign * right * span, down * span)
-            found.append(Contact(f"{name} {side}".strip(), *place, name in stands, name in _WHEELS))
+            found.append(Contact(f"{name} {side}".strip(), *place, name in stands, name in _WHEEL_POINTS))
     return tuple(found)
 
 
 def contacts_of(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
-    """The contacts that an aircraft flies with: those of its model, what it stands on first, or the usual ones.
+    """Return the contacts that an aircraft flies with: its model's contacts, or the usual ones.
 
-    Raises ValueError for a model that is no XML.
+    Contacts that it stands on come first.
+
+    Raise ValueError for a model that is not XML.
 
     >>> from aircraft.catalog import load_aircraft
     >>> [contact.name for contact in contacts_of(load_aircraft("c172x"), "belly") if contact.wheel]
@@ -87,7 +99,7 @@ def contacts_of(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
-    """A model's XML with the usual contacts; as it is where it has contacts of its own."""
+    """Return a model's XML with the usual contacts, or unchanged if it has contacts of its own."""
     if _own_contacts(model):
         return model
     made = usual_contacts(aircraft, gear)
@@ -98,12 +110,12 @@ def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
 
 
 def _contact_xml(contact: Contact, aircraft: Aircraft, made: tuple[Contact, ...], centre: Floats) -> str:
-    """One contact as JSBSim reads it: metres aft, to the right and up, where the model counts them from."""
+    """Return one contact as JSBSim reads it: meters aft, right and up from the model's reference point."""
     carrying = sum(one.stands for one in made)
-    stiffness = aircraft.mass * GRAVITY / (_SAG * aircraft.wing_span) / carrying
-    damping = 2.0 * _DAMPING * math.sqrt(stiffness * aircraft.mass / carrying)
+    stiffness = aircraft.mass * GRAVITY / (_SAG_SPANS * aircraft.wing_span) / carrying
+    damping = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness * aircraft.mass / carrying)
     aft, right, up = centre + np.array([-contact.forward, contact.right, -contact.down])
-    static, dynamic, rolling = _WHEEL if contact.wheel else _SKID
+    static, dynamic, rolling = _WHEEL_FRICTION if contact.wheel else _SKID_FRICTION
     kind, name = "BOGEY" if contact.wheel else "STRUCTURE", contact.name.upper().replace(" ", "_")
     return f"""  <contact type="{kind}" name="{name}">
     <location unit="M"> <x> {aft:.6f} </x> <y> {right:.6f} </y> <z> {up:.6f} </z> </location>
@@ -119,16 +131,19 @@ def _contact_xml(contact: Contact, aircraft: Aircraft, made: tuple[Contact, ...]
 
 
 def _own_contacts(model: bytes) -> tuple[Contact, ...]:
-    """The contacts that a model states: it stands on its wheels, or on its lowest points where it has none."""
+    """Return the contacts that a model states.
+
+    It stands on its wheels, or on its lowest points if it has none.
+    """
     found = _stated(model)
     if not any(one.wheel for one in found):
         deepest = max((one.down for one in found), default=0.0)
-        found = [replace(one, stands=one.down >= _SKIDS * deepest > 0.0) for one in found]
+        found = [replace(one, stands=one.down >= _MIN_SKID_DEPTH_RATIO * deepest > 0.0) for one in found]
     return tuple(sorted(found, key=lambda one: not one.stands))
 
 
 def _stated(model: bytes) -> list[Contact]:
-    """The contacts of a model, of which its wheels alone stand."""
+    """Return the contacts of a model, of which only the wheels stand."""
     section = ElementTree.fromstring(model).find("ground_reactions")
     found, centre = [], _centre(model)
     for one in [] if section is None else section.findall("contact"):
@@ -142,9 +157,10 @@ def _stated(model: bytes) -> list[Contact]:
 
 
 def _centre(model: bytes) -> Floats:
-    """The loaded aircraft's centre of gravity where the model counts places from, (3,) m aft, to the right, up.
+    """Return the loaded aircraft's center of gravity, (3,) m aft, right, up.
 
-    Of the empty aircraft, its point masses and what its tanks begin with, as JSBSim adds them up.
+    It is relative to the model's reference point, and includes the empty aircraft, its point masses and the initial
+    contents of its tanks, as JSBSim sums them up.
     """
     root = ElementTree.fromstring(model)
     empty = [one for one in root.findall("mass_balance/location") if one.get("name") == "CG"]
@@ -159,15 +175,15 @@ def _centre(model: bytes) -> Floats:
 
 
 def _mass(weight: ElementTree.Element | None) -> float:
-    """A weight of a model, kg."""
+    """Return a weight of a model, kg."""
     if weight is None:
         return 0.0
-    return _KILOGRAMS.get(weight.get("unit", "LBS"), 1.0) * float(weight.text or "0")
+    return _KILOGRAMS_PER_UNIT.get(weight.get("unit", "LBS"), 1.0) * float(weight.text or "0")
 
 
 def _place(location: ElementTree.Element | None) -> Floats | None:
-    """A place of a model, (3,) m."""
+    """Return a location of a model, (3,) m, or None."""
     if location is None:
         return None
-    unit = _METRES.get(location.get("unit", "IN"), 1.0)
+    unit = _METERS_PER_UNIT.get(location.get("unit", "IN"), 1.0)
     return unit * np.array([float(location.findtext(axis, "0")) for axis in "xyz"])

@@ -1,7 +1,7 @@
-"""An aircraft from the few numbers of a data sheet: a model of its class, scaled until it does what the sheet says.
+"""Build an aircraft from the few numbers of a data sheet, by scaling a model of its class.
 
-What a sheet states is met exactly: mass, span, speeds, climb.  What it leaves open is taken from published aircraft of
-the class (`TAIL`, `WING`) and has a standard deviation (`aircraft.uncertainty`).
+The model meets stated values exactly: mass, span, speeds, climb. Missing values are taken from published aircraft of
+the class (`TAIL`, `WING`) and have a standard deviation (`aircraft.uncertainty`).
 """
 
 import contextlib
@@ -20,20 +20,31 @@ from world.errors import FlightError
 
 Floats = NDArray[np.float64]
 
-# Air at sea level: density, kg/m^3, and kinematic viscosity, m^2/s.  Sheets are read as at 500 m, where most fly.
-SEA_LEVEL, VISCOSITY = 1.225, 1.46e-5
+# Air density at sea level, kg/m^3.
+SEA_LEVEL = 1.225
+# Kinematic viscosity of air at sea level, m^2/s.
+VISCOSITY = 1.46e-5
+# Air density at 500 m, for which sheets are read, since most aircraft fly there, kg/m^3.
 SHEET_DENSITY = 1.1673
 
 
 @dataclass(frozen=True, slots=True)
 class DataSheet:
-    """What is known of an aircraft; 0 for what is not.  SI units and radians.
+    """Known values of an aircraft, 0 for unknown ones, in SI units and radians.
 
-    mass: kg.  span: m.  area: m^2, of the wing.
-    cruise, stall, top: airspeeds in level flight, m/s.  bank: steepest in turns.  climb: steepest at cruise.
-    sink: at cruise without power, m/s.  trim_throttle: in level flight at cruise, 0..1.
-    volts: of the battery; energy: J, of the battery, or heat of the fuel.
-    motor: rpm a volt.  propeller: diameter and pitch, m.  fuel: kg; an aircraft with fuel has no battery.
+    mass: kg.
+    span: m.
+    area: wing area, m^2.
+    cruise, stall, top: airspeeds in level flight, m/s.
+    bank: steepest bank in turns.
+    climb: steepest climb angle at cruise.
+    sink: sink rate at cruise without power, m/s.
+    trim_throttle: throttle in level flight at cruise, 0..1.
+    volts: battery voltage.
+    energy: energy of the battery, or heat of the fuel, J.
+    motor: motor speed per volt, rpm/V.
+    propeller: diameter and pitch, m.
+    fuel: kg; an aircraft with fuel has no battery.
     """
 
     mass: float
@@ -55,11 +66,11 @@ class DataSheet:
 
     @property
     def fuelled(self) -> bool:
-        """Whether it burns fuel."""
+        """True if it burns fuel."""
         return self.fuel > 0.0
 
 
-# By the field of `DataSheet`: the option's name, its unit, what is allowed, and the factor from that unit to SI.
+# For each field of `DataSheet`: name of the option, unit, lowest and highest value, and factor from that unit to SI.
 RANGES = {
     "mass": ("mass", "kg", 0.5, 25.0, 1.0),
     "span": ("span", "m", 0.5, 6.0, 1.0),
@@ -72,23 +83,31 @@ RANGES = {
     "motor": ("motor", "rpm a volt", 20.0, 5000.0, 1.0),
     "fuel": ("fuel", "kg", 0.05, 12.0, 1.0),
 }
-# Of two speeds, and of what follows from several numbers.
-STALL_SHARE = (0.35, 0.87)  # stall by cruise
-TOP_SHARE = (1.05, 2.5)  # top by cruise
-LIFT_RANGE = (0.5, 2.4)  # lift coefficient at the stall
-ASPECT_RANGE = (2.5, 25.0)  # span^2 / area
-MAX_BATTERY = 300.0 * 3600.0  # J by the aircraft's mass, kg: no cell that is sold holds more by its own
+# Range of the ratio of stall speed to cruise speed.
+STALL_SHARE = (0.35, 0.87)
+# Range of the ratio of top speed to cruise speed.
+TOP_SHARE = (1.05, 2.5)
+# Range of the lift coefficient at the stall.
+LIFT_RANGE = (0.5, 2.4)
+# Range of the aspect ratio, span^2 / area.
+ASPECT_RANGE = (2.5, 25.0)
+# Largest battery energy per aircraft mass, J/kg: no available cell stores more per its own mass.
+MAX_BATTERY = 300.0 * 3600.0
 
 
 @dataclass(frozen=True, slots=True)
 class AircraftClass:
-    """What published aircraft of a class have in common, without units; rates and angles as in `AeroCoefficients`.
+    """Dimensionless properties of the published aircraft of a class.
 
-    lift_slope: by that of the elliptic wing of the same aspect ratio.  lift_max: where the sheet has no area.
-    drag: least drag at a Reynolds number of `DRAG_REYNOLDS` on the mean chord.  oswald: span efficiency.
-    pitch_alpha, pitch_q: for each unit of aspect ratio where ``by_aspect``, else as they are.
-    gyration: radii of gyration about x, y, z by the span.
-    elevator_stall: elevator at the stall, rad; the sheet's stall is where it comes to its stop.
+    Rates and angles are defined as in `AeroCoefficients`.
+
+    lift_slope: ratio to the lift slope of an elliptic wing of the same aspect ratio.
+    lift_max: largest lift coefficient, if the sheet states no area.
+    drag: least drag at a Reynolds number of `DRAG_REYNOLDS` on the mean chord.
+    oswald: span efficiency.
+    pitch_alpha, pitch_q: per unit of aspect ratio if ``by_aspect``, otherwise absolute.
+    gyration: radii of gyration about x, y, z as ratios to the span.
+    elevator_stall: elevator at the stall, rad; at the sheet's stall speed it reaches its stop.
     """
 
     lift_slope: float
@@ -118,10 +137,13 @@ class AircraftClass:
     throw: tuple[float, float, float]
 
 
-DRAG_REYNOLDS, DRAG_POWER = 3.2e5, -0.2
+# Reynolds number of the class's least drag.
+DRAG_REYNOLDS = 3.2e5
+# Power of the Reynolds number in the least drag.
+DRAG_POWER = -0.2
 # The Aerosonde (Beard and McLain, appendix E.2) and the Ultra Stick 25e (University of Minnesota): least drag 0.043 and
 # 0.0434 at Reynolds numbers of 3.2e5 and 2.9e5, Cmq -38 and -13.6 at aspect ratios of 15.2 and 5.2, Cm_alpha -2.74 and
-# -0.72; radii of gyration 0.095, 0.111, 0.138 and 0.150, 0.165, 0.220 of the span; elsewhere between the two.
+# -0.72; radii of gyration 0.095, 0.111, 0.138 and 0.150, 0.165, 0.220 of the span; other values lie between the two.
 TAIL = AircraftClass(
     lift_slope=1.05, lift_max=1.25, drag=0.0425, oswald=0.82, by_aspect=True, pitch_alpha=-0.16, pitch_q=-2.55,
     lift_q=7.0, lift_elevator=0.11, side_beta=-0.7, roll_beta=-0.085, roll_p=-0.48, roll_r=0.17, roll_aileron=0.17,
@@ -130,8 +152,8 @@ TAIL = AircraftClass(
     throw=(math.radians(25.0), math.radians(25.0), math.radians(25.0)),
 )  # fmt: skip
 # The Skywalker X8 (Gryte et al. 2018) and the Zagi (Beard and McLain, first edition, appendix E.1): lift slopes 0.89
-# and 0.72 of the elliptic wing's, least drag 0.0182 and 0.0254 at Reynolds numbers of 4.4e5 and 3.4e5; laterally the
-# X8, for the Zagi's table has no directional stability.
+# and 0.72 of the elliptic wing's slope, least drag 0.0182 and 0.0254 at Reynolds numbers of 4.4e5 and 3.4e5; lateral
+# values of the X8 only, since the Zagi's table has no directional stability.
 WING = AircraftClass(
     lift_slope=0.80, lift_max=1.05, drag=0.0225, oswald=0.86, by_aspect=False, pitch_alpha=-0.51, pitch_q=-1.35,
     lift_q=3.4, lift_elevator=0.275, side_beta=-0.22, roll_beta=-0.085, roll_p=-0.40, roll_r=0.055, roll_aileron=0.13,
@@ -139,34 +161,49 @@ WING = AircraftClass(
     yaw_rudder=0.0, gyration=(0.16, 0.12, 0.2), product_share=0.0, elevator_stall=-math.radians(22.0),
     throw=(math.radians(25.0), math.radians(25.0), math.radians(25.0)),
 )  # fmt: skip
+# Class of each layout.
 CLASSES: dict[Layout, AircraftClass] = {"tail": TAIL, "vtail": TAIL, "wing": WING}
 
-# Where a sheet says nothing.
+# Climb angle if the sheet states none, rad.
 USUAL_CLIMB = math.radians(12.0)
-USUAL_TOP = 1.4  # by cruise
+# Ratio of top speed to cruise speed if the sheet states no top speed.
+USUAL_TOP = 1.4
+# Steepest climb angle of a model, rad.
 STEEPEST_CLIMB = math.radians(35.0)
+# Bank limit if the sheet states none, rad.
 USUAL_BANK = math.radians(35.0)
-BATTERY_PER_MASS = 45.0 * 3600.0  # J/kg: 30 % of the mass at 150 Wh/kg
-# Volts by the mass, kg.
-_VOLTS = ((1.5, 11.1), (5.0, 14.8), (10.0, 22.2), (math.inf, 44.4))
-FUEL_HEAT = 43.5e6  # J/kg
-# At cruise the body stands this far up, and the elevator's servo is rigged this far down, rad.
-CRUISE_ALPHA, CRUISE_ELEVATOR = 0.05, -0.035
+# Battery energy per aircraft mass if the sheet states none, J/kg: 30 % of the mass at 150 Wh/kg.
+BATTERY_PER_MASS = 45.0 * 3600.0
+# Battery voltage if the sheet states none, by the upper limit of the mass, kg.
+_USUAL_VOLTS = ((1.5, 11.1), (5.0, 14.8), (10.0, 22.2), (math.inf, 44.4))
+# Heat of the fuel, J/kg.
+FUEL_HEAT = 43.5e6
+# Angle of attack at cruise, rad.
+CRUISE_ALPHA = 0.05
+# Elevator at cruise, rad.
+CRUISE_ELEVATOR = -0.035
+# Sharpness of the stall, the M of Beard and McLain.
 STALL_SHARPNESS = 80.0
-# An idle propeller brakes as much of what a stiff one would.
+# Fraction of a rigid propeller's braking that an idle propeller has.
 WINDMILL = 0.5
-# The Aerosonde's motor by its power and volts at full throttle in cruise: R P / V^2 and i0 V / P.
-_RESISTANCE_SHARE, _IDLE_SHARE = 0.026, 0.055
-# Of a propeller: least diameter, m, and largest by the span.
-_MIN_DIAMETER, _DIAMETER_SHARE = 0.06, 0.6
-# An engine's propeller by the span, at most.
-_USUAL_SHARE = 0.18
-# An engine's friction by its largest torque.
-_FRICTION_SHARE = 0.08
+# Resistance of the Aerosonde's motor at full throttle in cruise, R P / V^2.
+_RESISTANCE_RATIO = 0.026
+# Idle current of the Aerosonde's motor at full throttle in cruise, i0 V / P.
+_IDLE_CURRENT_RATIO = 0.055
+# Smallest diameter of a propeller, m.
+_MIN_DIAMETER_M = 0.06
+# Largest diameter of a propeller, as a ratio to the span.
+_MAX_DIAMETER_RATIO = 0.6
+# Largest diameter of an engine's propeller if none is stated, as a ratio to the span.
+_ENGINE_DIAMETER_RATIO = 0.18
+# Friction torque of an engine, as a ratio to its largest torque.
+_FRICTION_RATIO = 0.08
 
 
 def check_sheet(sheet: DataSheet) -> DataSheet:
-    """Refuse what is no small aircraft.  Raises FlightError, in one line with the allowed range.
+    """Return a sheet if it describes a small aircraft.
+
+    Raise FlightError otherwise, in one line with the allowed range.
 
     >>> check_sheet(DataSheet(2.1, 1.6, 15.0, 10.0)).mass
     2.1
@@ -221,7 +258,10 @@ def _weight(sheet: DataSheet) -> float:
 
 
 def _area(sheet: DataSheet) -> float:
-    """The wing's area, m^2: the sheet's, or what carries the mass at the stall with the class's largest lift."""
+    """Return the wing area, m^2.
+
+    It is the stated area, or the area for the stall speed at the class's largest lift.
+    """
     if sheet.area:
         return sheet.area
     return _weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * CLASSES[sheet.layout].lift_max)
@@ -233,10 +273,11 @@ def _area_source(sheet: DataSheet) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SizedAircraft:
-    """A model that does what the sheet says, and what was guessed for it.
+    """A model that matches a data sheet, and the values that were guessed for it.
 
-    numbers: of the model.  sheet: with every number filled in.
-    guessed: fields of the sheet that it did not state.
+    numbers: numbers of the model.
+    sheet: the sheet with every value filled in.
+    guessed: fields that the sheet did not state.
     """
 
     numbers: ModelNumbers
@@ -245,10 +286,11 @@ class SizedAircraft:
 
 
 def size_aircraft(sheet: DataSheet, title: str = "", kind: AircraftClass | None = None) -> SizedAircraft:
-    """Make the model of a data sheet.
+    """Build the model of a data sheet.
 
-    kind: of which class it is; None takes the layout's.
-    Raises FlightError where no propeller gives the stated climb and top speed.
+    kind: class of the aircraft; None takes the layout's class.
+
+    Raise FlightError if no propeller gives the stated climb and top speed.
 
     >>> made = size_aircraft(check_sheet(DataSheet(2.1, 1.6, 15.0, 10.0)))
     >>> round(made.numbers.area, 3), made.guessed
@@ -265,7 +307,7 @@ def size_aircraft(sheet: DataSheet, title: str = "", kind: AircraftClass | None 
     chord = filled.area / filled.span
     jx, jy, jz = (filled.mass * (share * filled.span) ** 2 for share in kind.gyration)
     numbers = ModelNumbers(
-        title=title or f"{_KIND[sheet.layout]} of {sheet.mass:g} kg, {sheet.span:g} m",
+        title=title or f"{_LAYOUT_TEXTS[sheet.layout]} of {sheet.mass:g} kg, {sheet.span:g} m",
         source="From a data sheet, scaled from published aircraft of its class: README.md beside this file.",
         mass=filled.mass,
         area=filled.area,
@@ -282,11 +324,12 @@ def size_aircraft(sheet: DataSheet, title: str = "", kind: AircraftClass | None 
     return SizedAircraft(numbers, filled, guessed)
 
 
-_KIND = {"tail": "aircraft with a tail", "wing": "flying wing", "vtail": "aircraft with a V-tail"}
+# Words for each layout.
+_LAYOUT_TEXTS = {"tail": "aircraft with a tail", "wing": "flying wing", "vtail": "aircraft with a V-tail"}
 
 
 def _filled(sheet: DataSheet) -> tuple[DataSheet, tuple[str, ...]]:
-    """The sheet with what it leaves open, and the names of that."""
+    """Return the sheet with missing values filled in, and the names of those values."""
     usual: dict[str, Any] = {
         "area": _area(sheet),
         "top": USUAL_TOP * sheet.cruise,
@@ -296,7 +339,7 @@ def _filled(sheet: DataSheet) -> tuple[DataSheet, tuple[str, ...]]:
     if sheet.fuelled:
         sheet = replace(sheet, energy=sheet.fuel * FUEL_HEAT)
     else:
-        usual["volts"] = next(volts for mass, volts in _VOLTS if sheet.mass < mass)
+        usual["volts"] = next(volts for mass, volts in _USUAL_VOLTS if sheet.mass < mass)
         usual["energy"] = BATTERY_PER_MASS * sheet.mass
     guessed = tuple(name for name in usual if not getattr(sheet, name))
     known = {name: getattr(sheet, name) or usual[name] for name in usual}
@@ -305,7 +348,7 @@ def _filled(sheet: DataSheet) -> tuple[DataSheet, tuple[str, ...]]:
 
 
 def elliptic_slope(aspect: float) -> float:
-    """Lift curve slope a radian of a straight wing of this aspect ratio (Helmbold; Raymer, section 12.4).
+    """Return the lift slope per radian of a straight wing of this aspect ratio (Helmbold; Raymer 12.4).
 
     >>> round(elliptic_slope(1e9), 4)  # 2 pi for an endless one
     6.2832
@@ -324,7 +367,7 @@ def _aerodynamics(sheet: DataSheet, kind: AircraftClass) -> AeroCoefficients:
     lift_max = weight / (0.5 * SEA_LEVEL * sheet.stall**2 * area)
     lift_0 = cruise_lift - slope * CRUISE_ALPHA - kind.lift_elevator * CRUISE_ELEVATOR
     stall = (lift_max - lift_0 - kind.lift_elevator * kind.elevator_stall) / slope
-    # The elevator comes to its stop where the sheet has the stall.
+    # The elevator reaches its stop at the sheet's stall speed.
     travel = kind.elevator_stall - CRUISE_ELEVATOR
     elevator = -stiffness * (stall - CRUISE_ALPHA) / travel
     reynolds = sheet.cruise * chord / VISCOSITY
@@ -356,15 +399,16 @@ def _aerodynamics(sheet: DataSheet, kind: AircraftClass) -> AeroCoefficients:
     )
 
 
+# Drag, N, by airspeed, m/s.
 Drag = Callable[[float], float]
 
 
 def _drag_of(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
-    """Drag, N, of level flight at an airspeed, m/s."""
+    """Return a function for the drag, N, of level flight at an airspeed, m/s."""
 
     def drag(airspeed: float) -> float:
         area_pressure = 0.5 * SHEET_DENSITY * airspeed**2 * sheet.area
-        # Of the angle of attack alone, as in the model; the elevator's share of the lift is left out.
+        # The drag depends only on the angle of attack, as in the model; the elevator's lift is neglected.
         lift = _weight(sheet) / area_pressure
         return area_pressure * (aero.drag_min + aero.drag_lift * lift**2)
 
@@ -372,7 +416,7 @@ def _drag_of(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
 
 
 def _with_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[AeroCoefficients, Drag]:
-    """Least drag such that the aircraft sinks as stated (m/s) without power at cruise, a folded propeller assumed."""
+    """Set the least drag for a stated sink rate (m/s) without power at cruise, with a folded propeller."""
     angle = math.asin(min(0.5, sink / sheet.cruise))
     area_pressure = 0.5 * SHEET_DENSITY * sheet.cruise**2 * sheet.area
     lift = _weight(sheet) * math.cos(angle) / area_pressure
@@ -389,51 +433,54 @@ def _with_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[A
 
 
 # ----------------------------------------------------------------------
-# Motor and propeller: what gives the stated climb at cruise, and the stated top speed.
+# Motor and propeller that give the stated climb at cruise and the stated top speed.
 
 
 def _motor(stated: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[ElectricMotor, DataSheet]:
-    """The motor and the propeller of a sheet, and the sheet with the climb and the top speed that they give.
+    """Return motor and propeller of a sheet, and the sheet with the climb and top speed that they give.
 
-    A stated propeller has its diameter and pitch, a stated motor its speed per volt; what is left free meets the climb,
-    and the throttle of level flight or the top speed.  Where motor and propeller are both stated, what the sheet does
-    not say of climb and top speed follows from them.
+    A stated propeller fixes diameter and pitch, a stated motor its speed per volt; free values are chosen to meet the
+    climb, and the throttle of level flight or the top speed. If motor and propeller are both stated, climb and top
+    speed follow from them where the sheet states none.
     """
     if stated.motor and stated.propeller[0]:
         wanted = [name for name in ("climb", "top") if getattr(stated, name)]
-        motor, flown = _solved(stated, sheet, drag, wanted)
+        motor, flown = _solve_motor(stated, sheet, drag, wanted)
         if flown.climb <= STEEPEST_CLIMB:
             return motor, flown
-        # What hangs on its propeller climbs as steeply as anybody asks for.
-        return _solved(stated, replace(sheet, climb=STEEPEST_CLIMB), drag, ["climb"])
+        # Limit the climb of an aircraft with more thrust than that.
+        return _solve_motor(stated, replace(sheet, climb=STEEPEST_CLIMB), drag, ["climb"])
     if (stated.climb and stated.top) or not (stated.top or stated.trim_throttle):
-        return _solved(stated, sheet, drag, ["climb", "top"])
+        return _solve_motor(stated, sheet, drag, ["climb", "top"])
     if stated.climb:
         with contextlib.suppress(FlightError):
-            return _solved(stated, sheet, drag, ["climb", "trim_throttle"])
-        # What the autopilot is told of its climb is often less than the motor gives.
-        return _solved(stated, sheet, drag, ["climb", "top"])
-    # A propeller of the usual size, and the speed per volt that the top speed or the throttle tells: either says more
-    # of the climb than a guess.
+            return _solve_motor(stated, sheet, drag, ["climb", "trim_throttle"])
+        # The climb that an autopilot is configured with is often less than the motor gives.
+        return _solve_motor(stated, sheet, drag, ["climb", "top"])
+    # A propeller of the usual size, and the speed per volt from the top speed or the throttle: either determines the
+    # climb better than a guess.
     plain = replace(stated, top=0.0, trim_throttle=0.0)
-    usual, _ = _solved(plain, replace(sheet, top=USUAL_TOP * sheet.cruise), drag, ["climb", "top"])
+    usual, _ = _solve_motor(plain, replace(sheet, top=USUAL_TOP * sheet.cruise), drag, ["climb", "top"])
     size = stated.propeller if stated.propeller[0] else (usual.propeller.diameter, 0.0)
     wanted = ["top"] if stated.top else ["trim_throttle"]
-    motor, flown = _solved(replace(stated, propeller=size), sheet, drag, wanted)
+    motor, flown = _solve_motor(replace(stated, propeller=size), sheet, drag, wanted)
     if flown.climb <= STEEPEST_CLIMB:
         return motor, flown
-    return _solved(replace(stated, trim_throttle=0.0), sheet, drag, ["climb", "top"])
+    return _solve_motor(replace(stated, trim_throttle=0.0), sheet, drag, ["climb", "top"])
 
 
-def _solved(stated: DataSheet, sheet: DataSheet, drag: Drag, wanted: list[str]) -> tuple[ElectricMotor, DataSheet]:
-    """The motor that meets these fields of the sheet; as many numbers are free, the last the speed or the pitch."""
+def _solve_motor(stated: DataSheet, sheet: DataSheet, drag: Drag, wanted: list[str]) -> tuple[ElectricMotor, DataSheet]:
+    """Return the motor that meets these fields of the sheet, with as many free numbers.
+
+    The last free number is the motor's speed per volt, or the propeller's pitch.
+    """
     volts, (diameter, pitch) = sheet.volts, stated.propeller
-    # With the Aerosonde's shape a pitch by the diameter of as much as its zero-thrust ratio.
+    # With the Aerosonde's blade shape the ratio of pitch to diameter is the zero-thrust ratio.
     steep = pitch / diameter / BOOK_PROPELLER.zero_thrust_ratio if pitch else 1.0
     base = BOOK_PROPELLER.scaled(diameter=diameter / BOOK_PROPELLER.diameter if diameter else 1.0, pitch=steep)
     emf = 60.0 / (2.0 * math.pi * stated.motor) if stated.motor else 0.0
     first_size = 1.0 if diameter else math.sqrt(sheet.mass / 11.0)
-    # A guess to start from: unloaded a little beyond the top speed, rad/s.
+    # Initial guess: unloaded propeller speed slightly above the speed for the top airspeed, rad/s.
     first_turns = 1.2 * sheet.top / base.zero_thrust_ratio / (base.diameter * first_size) * 2.0 * math.pi
     single = len(wanted) == 1 and wanted != ["climb"]
 
@@ -444,99 +491,113 @@ def _solved(stated: DataSheet, sheet: DataSheet, drag: Drag, wanted: list[str]) 
             return _on_battery(propeller.scaled(pitch=speed), volts, emf, sheet.cruise)
         return _on_battery(propeller, volts, volts / (speed * first_turns), sheet.cruise)
 
-    def amiss(free: Sequence[float]) -> list[float]:
+    def errors(free: Sequence[float]) -> list[float]:
         motor = made(free)
-        return [_amiss(motor, sheet, drag, name) for name in wanted]
+        return [_thrust_error(motor, sheet, drag, name) for name in wanted]
 
-    motor = made(_meet(amiss, len(wanted), sheet))
-    if not _MIN_DIAMETER <= motor.propeller.diameter <= _DIAMETER_SHARE * sheet.span:
+    motor = made(_solve_errors(errors, len(wanted), sheet))
+    if not _MIN_DIAMETER_M <= motor.propeller.diameter <= _MAX_DIAMETER_RATIO * sheet.span:
         raise _no_propeller(sheet)
-    return motor, _flown(sheet, motor, drag)
+    return motor, _with_performance(sheet, motor, drag)
 
 
 def _on_battery(propeller: Propeller, volts: float, emf: float, cruise: float) -> ElectricMotor:
-    """A motor of this speed per volt that loses what the Aerosonde's does, by its own power in cruise."""
+    """Return a motor of this speed per volt with the Aerosonde's losses relative to its cruise power."""
     power = 0.3 * volts**2 * emf
     motor = ElectricMotor(propeller, volts, emf, 0.1, 0.5, WINDMILL)
     for _ in range(12):
         motor = replace(
-            motor, resistance=_RESISTANCE_SHARE * volts**2 / power, idle_current=_IDLE_SHARE * power / volts
+            motor, resistance=_RESISTANCE_RATIO * volts**2 / power, idle_current=_IDLE_CURRENT_RATIO * power / volts
         )
         power = math.sqrt(power * max(1.0, motor.power(1.0, cruise, SHEET_DENSITY)))
     return motor
 
 
 def _engine(stated: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelEngine, DataSheet]:
-    """An engine whose torque meets the climb or the top speed; where both are stated, a propeller's pitch, too."""
+    """Return an engine whose torque meets the climb or the top speed.
+
+    If both are stated, the propeller's pitch is chosen too.
+    """
     pull = drag(sheet.cruise) + _weight(sheet) * math.sin(sheet.climb)
     diameter, pitch = sheet.propeller
     steep = pitch / diameter / BOOK_PROPELLER.zero_thrust_ratio if diameter else 1.0
-    usual = min(math.sqrt(sheet.mass / 11.0), _USUAL_SHARE * sheet.span / BOOK_PROPELLER.diameter)
+    usual = min(math.sqrt(sheet.mass / 11.0), _ENGINE_DIAMETER_RATIO * sheet.span / BOOK_PROPELLER.diameter)
     base = BOOK_PROPELLER.scaled(diameter=diameter / BOOK_PROPELLER.diameter if diameter else usual, pitch=steep)
     first_torque = 0.12 * pull * base.diameter
-    # A top speed says more of the climb than a guess.
+    # A stated top speed determines the climb better than a guess.
     wanted = [name for name in ("climb", "top") if getattr(stated, name)] or ["climb"]
 
     def made(free: Sequence[float]) -> FuelEngine:
         torque, steeper = (*free, 1.0)[:2]
         torque *= first_torque
-        return FuelEngine(base.scaled(pitch=steeper), torque, _FRICTION_SHARE * torque, windmill=WINDMILL)
+        return FuelEngine(base.scaled(pitch=steeper), torque, _FRICTION_RATIO * torque, windmill=WINDMILL)
 
-    def amiss(free: Sequence[float]) -> list[float]:
+    def errors(free: Sequence[float]) -> list[float]:
         engine = made(free)
-        return [_amiss(engine, sheet, drag, name) for name in wanted]
+        return [_thrust_error(engine, sheet, drag, name) for name in wanted]
 
-    engine = made(_meet(amiss, len(wanted), sheet))
-    return engine, _flown(sheet, engine, drag)
+    engine = made(_solve_errors(errors, len(wanted), sheet))
+    return engine, _with_performance(sheet, engine, drag)
 
 
+# Drives that a sheet can have.
 Drive = ElectricMotor | FuelEngine
 
 
-def _amiss(motor: Drive, sheet: DataSheet, drag: Drag, name: str) -> float:
-    """How far the thrust is from what a field of the sheet takes, as a share of it."""
+def _thrust_error(motor: Drive, sheet: DataSheet, drag: Drag, name: str) -> float:
+    """Return the relative error of the thrust from the thrust that a field of the sheet needs."""
     speed = sheet.top if name == "top" else sheet.cruise
     throttle = sheet.trim_throttle if name == "trim_throttle" else 1.0
     needed = drag(speed) + (_weight(sheet) * math.sin(sheet.climb) if name == "climb" else 0.0)
     return motor.thrust(throttle, speed, SHEET_DENSITY) / needed - 1.0
 
 
-def _meet(amiss: Callable[[Sequence[float]], list[float]], count: int, sheet: DataSheet) -> list[float]:
-    """Positive numbers near 1 at which nothing is amiss.  Raises FlightError where there are none."""
+def _solve_errors(errors: Callable[[Sequence[float]], list[float]], count: int, sheet: DataSheet) -> list[float]:
+    """Return positive numbers near 1 at which all errors vanish. Raise FlightError without a solution."""
     if not count:
         return []
     for size in (1.0, 0.6, 1.7):
-        x = _newton(lambda x: np.array(amiss(np.exp(x).tolist())), np.log([size, 1.0 / size][:count]))
+        x = _newton(lambda x: np.array(errors(np.exp(x).tolist())), np.log([size, 1.0 / size][:count]))
         if x is not None:
             free: list[float] = np.exp(x).tolist()
             return free
     raise _no_propeller(sheet)
 
 
-# A step for the slopes, the longest of the search, which is to find the nearest solution, and where it ends, as
-# logarithms of factors; amiss of what counts as met.
-_STEP, _LONGEST, _BOUND, _MET = 1e-6, 0.2, 2.5, 1e-7
+# Step of the difference quotients, as a logarithm of a factor.
+_DIFFERENCE_STEP = 1e-6
+# Largest step of the search, which is to find the nearest solution, as a logarithm of a factor.
+_MAX_STEP = 0.2
+# Bound of the search, as a logarithm of a factor.
+_SEARCH_BOUND = 2.5
+# Relative thrust error of a solution.
+_THRUST_TOLERANCE_RATIO = 1e-7
 
 
-def _newton(amiss: Callable[[Floats], Floats], x: Floats) -> Floats | None:
-    """Numbers within the bound at which nothing is amiss, by Newton's method; None where it finds none.
+def _newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | None:
+    """Return numbers within the bound at which the errors vanish, by Newton's method, or None.
 
-    A step that does not help is halved.
+    A step that does not reduce the errors is halved.
     """
-    off = amiss(x)
+    off = errors(x)
     for _ in range(100):
-        slopes = np.array([(amiss(x + step) - amiss(x - step)) / (2.0 * _STEP) for step in _STEP * np.eye(x.size)]).T
+        slopes = np.array(
+            [
+                (errors(x + step) - errors(x - step)) / (2.0 * _DIFFERENCE_STEP)
+                for step in _DIFFERENCE_STEP * np.eye(x.size)
+            ]
+        ).T
         whole = np.linalg.lstsq(slopes, -off, rcond=None)[0]
-        size = min(1.0, _LONGEST / max(float(np.abs(whole).max()), 1e-12))
+        size = min(1.0, _MAX_STEP / max(float(np.abs(whole).max()), 1e-12))
         while size > 1e-6:
-            there = np.clip(x + size * whole, -_BOUND, _BOUND)
-            if np.linalg.norm(left := amiss(there)) < np.linalg.norm(off):
+            there = np.clip(x + size * whole, -_SEARCH_BOUND, _SEARCH_BOUND)
+            if np.linalg.norm(left := errors(there)) < np.linalg.norm(off):
                 break
             size *= 0.5
         else:
             break
         x, off = there, left
-    return x if np.abs(off).max() < _MET else None
+    return x if np.abs(off).max() < _THRUST_TOLERANCE_RATIO else None
 
 
 def _no_propeller(sheet: DataSheet) -> FlightError:
@@ -546,8 +607,8 @@ def _no_propeller(sheet: DataSheet) -> FlightError:
     return FlightError.of_argument("climb", climb, f"{no}: {allowed}", shown=f"{climb:.3g} degrees")
 
 
-def _flown(sheet: DataSheet, motor: Drive, drag: Drag) -> DataSheet:
-    """The sheet with the climb and the top speed that a motor gives.  Raises FlightError where it cannot climb."""
+def _with_performance(sheet: DataSheet, motor: Drive, drag: Drag) -> DataSheet:
+    """Return the sheet with the climb and top speed of a motor. Raise FlightError if it cannot climb."""
     spare = motor.thrust(1.0, sheet.cruise, SHEET_DENSITY) - drag(sheet.cruise)
     climb = math.asin(max(-1.0, min(0.95, spare / _weight(sheet))))
     least = RANGES["climb"][2]

@@ -10,12 +10,14 @@ from world.kernels import compiled
 
 Floats = NDArray[np.float64]
 
+# Standard gravity, m/s^2.
 GRAVITY = 9.80665
-# Standard deviations.  A slope nearer than this to a limit that is not known for certain is undecided: 95 % one-sided,
-# of a normal distribution.
+# Number of standard deviations from an uncertain limit within which a slope is undecided: 95 % one-sided, of a normal
+# distribution.
 UNDECIDED = 1.645
-# Names of the tables of an `Envelope`, and of its power tables.
+# Names of the tables of an `Envelope`.
 TABLES = ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_speed_max")
+# Names of its power tables.
 POWERS = ("power_idle", "power_level", "power_full")
 
 
@@ -23,21 +25,22 @@ POWERS = ("power_idle", "power_level", "power_full")
 class Envelope:
     """Limits of steady flight from trims, relative to the air mass.
 
-    aircraft, model_hash: of the model.
-    motor_braking: whether descent may drive the motor.
-    airspeed: (v,) m/s. amsl: (h,) m. Both increasing.
+    aircraft, model_hash: identification of the model.
+    motor_braking: True if a descent may drive the motor.
+    airspeed: (v,) m/s, increasing.
+    amsl: (h,) m, increasing.
     climb, descent: (v, h) flight-path angles, rad, positive in the direction of their name (a negative climb means that
-    the aircraft cannot hold altitude there); NaN where there is no trim.
+        the aircraft cannot hold altitude there); NaN where there is no trim.
     level_speed_min, level_speed_max: (h,) m/s.
     max_bank: the aircraft's own limit, rad.
     power_idle, power_level, power_full: (v, h) electric power, or heat of the fuel per second, at the steepest descent,
-    in level flight and at the steepest climb, W; (0, 0) if unknown.
+        in level flight and at the steepest climb, W; (0, 0) if unknown.
     volts: battery voltage, 0 without one.
-    source: what the model was made from where its slopes are not known for certain: "a data sheet"; "" where they are.
+    source: source of a model whose slopes are uncertain: "a data sheet"; "" if they are known for certain.
     climb_sd, descent_sd: standard deviations of the steepest climb and descent, rad.
-    fastest_sd: of the fastest level flight, m/s.
-    power_sd: standard deviation of power, as a share.
-    battery_guessed: whether nobody stated what the battery holds.
+    fastest_sd: standard deviation of the fastest level flight, m/s.
+    power_sd: relative standard deviation of power.
+    battery_guessed: True if the battery's energy was not stated.
     """
 
     aircraft: str
@@ -69,10 +72,11 @@ class Envelope:
             object.__setattr__(self, name, table)
 
     def air_angles(self, airspeed: float, amsl: float) -> tuple[float, float]:
-        """Steepest climb and descent relative to the air, rad, both positive, by bilinear interpolation.
+        """Return the steepest climb and descent relative to the air, rad, by bilinear interpolation.
 
-        NaN at an airspeed outside the table or below the slowest level flight; between that speed and the slowest trim
-        of the table the values of the latter are used. Altitudes outside the table use its nearest edge.
+        Both are positive. NaN at an airspeed outside the table or below the slowest level flight; between that speed
+        and the slowest trim of the table the values of that trim are used. Altitudes outside the table use its nearest
+        edge.
         """
         if not airspeed >= float(np.interp(amsl, self.amsl, self.level_speed_min)):
             return math.nan, math.nan
@@ -82,9 +86,9 @@ class Envelope:
         )
 
     def surely(self) -> "Envelope":
-        """What the aircraft can for certain, as far as is known: `UNDECIDED` deviations less than it may.
+        """Return the envelope that is certain: `UNDECIDED` standard deviations below the estimate.
 
-        Slopes are 0 at least, and the fastest level flight is no slower than the slowest.
+        Slopes are at least 0, and the fastest level flight is no slower than the slowest.
 
         >>> tables = {name: np.full((1, 1), 0.2) for name in ("climb", "descent")}
         >>> edges = dict.fromkeys(("airspeed", "amsl", "level_speed_min", "level_speed_max"), np.ones(1))
@@ -95,7 +99,7 @@ class Envelope:
         if not (self.climb_sd or self.descent_sd or self.fastest_sd):
             return self
         less = {name: UNDECIDED * getattr(self, f"{name}_sd") for name in ("climb", "descent")}
-        # What loses height stays as it is.
+        # A loss of altitude stays as it is.
         climb, descent = (
             np.where(table > 0.0, np.maximum(0.0, table - less[name]), table)
             for name, table in (("climb", self.climb), ("descent", self.descent))
@@ -108,10 +112,13 @@ class Envelope:
     def slope_limits(
         self, airspeed: float, amsl: float, tailwind: float = 0.0, crosswind: float = 0.0
     ) -> tuple[float, float]:
-        """Steepest climb and dive over the ground, rad, both positive, on a leg in this steady wind.
+        """Return the steepest climb and dive over the ground on a leg in this steady wind, rad.
 
-        tailwind, crosswind: m/s along and across the leg's course. A tailwind flattens the slope over the ground, a
-        headwind steepens it. NaN if the aircraft cannot make progress along the leg, or as `air_angles`.
+        Both are positive.
+        tailwind, crosswind: m/s along and across the leg's course.
+
+        A tailwind flattens the slope over the ground, a headwind steepens it. NaN if the aircraft cannot make progress
+        along the leg, or where `air_angles` is NaN.
         """
         climb, descent = self.air_angles(airspeed, amsl)
         return (
@@ -120,7 +127,9 @@ class Envelope:
         )
 
     def power(self, airspeed: float, amsl: float, air_angle: float) -> float:
-        """Power (W) of steady flight at this path angle relative to the air (rad, positive in a climb).
+        """Return the power (W) of steady flight at a path angle.
+
+        air_angle: angle relative to the air, rad, positive in a climb.
 
         Interpolated by the parabola through idle, level and full throttle, and constant beyond them. NaN if power is
         unknown or the airspeed is outside the table.
@@ -142,7 +151,7 @@ class Envelope:
         )
 
     def level_speeds(self, amsl: float) -> tuple[float, float]:
-        """Slowest and fastest level flight at this altitude, m/s."""
+        """Return the slowest and fastest level flight at this altitude, m/s."""
         return (
             float(np.interp(amsl, self.amsl, self.level_speed_min)),
             float(np.interp(amsl, self.amsl, self.level_speed_max)),
@@ -153,14 +162,17 @@ class Envelope:
 def ground_slope(
     air_angle: float, airspeed: float, tailwind: float, crosswind: float
 ) -> float:  # pragma: no cover - compiled
-    """Path angle over the ground of a steady climb at ``air_angle`` to the air, rad; NaN without progress."""
+    """Return the path angle over the ground of a steady climb at ``air_angle`` to the air, rad.
+
+    NaN without progress.
+    """
     along = ground_speed(airspeed * math.cos(air_angle), tailwind, crosswind)
     return math.atan2(airspeed * math.sin(air_angle), along)
 
 
 @compiled
 def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:  # pragma: no cover - compiled
-    """Ground speed along a course held against the wind, m/s; NaN if the course cannot be held."""
+    """Return the ground speed along a course held against the wind, m/s; NaN if it cannot be held."""
     square = airspeed**2 - crosswind**2
     along = math.sqrt(square) + tailwind if square > 0.0 else -1.0
     return along if along > 0.0 else math.nan
@@ -168,25 +180,25 @@ def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:  
 
 @compiled
 def turn_radius(speed: float, bank: float) -> float:  # pragma: no cover - compiled
-    """Radius of a coordinated level turn, m, from speed (m/s) and bank (rad)."""
+    """Return the radius of a coordinated level turn, m, from speed (m/s) and bank (rad)."""
     return speed**2 / (GRAVITY * math.tan(bank))
 
 
 def _bilinear(xs: Floats, ys: Floats, table: Floats, x: float, y: float) -> float:
-    rows = _at(ys, table, y)
+    rows = _interpolate_rows(ys, table, y)
     first = int(np.argmax(~np.isnan(rows)))
     rows[:first] = rows[first]
     return float(np.interp(x, xs, rows, left=np.nan, right=np.nan))
 
 
-def _at(ys: Floats, table: Floats, y: float) -> Floats:
-    """``np.interp`` of every row of a table at one point, identical to the last bit but ten times faster."""
+def _interpolate_rows(ys: Floats, table: Floats, y: float) -> Floats:
+    """Return ``np.interp`` of every row of a table at one point, to the last bit but ten times faster."""
     k = min(max(0, int(np.searchsorted(ys, y, side="right")) - 1), ys.size - 1)
     if y <= ys[k] or k == ys.size - 1:
         return np.array(table[:, k])
     left, right = table[:, k], table[:, k + 1]
     slope = (right - left) / (ys[k + 1] - ys[k])
     rows = slope * (y - ys[k]) + left
-    # As in np.interp: interpolate from the other side if NaN, and take equal neighbours as they are.
+    # As in np.interp: interpolate from the other side if NaN, and keep equal neighbors unchanged.
     rows = np.where(np.isnan(rows), slope * (y - ys[k + 1]) + right, rows)
     return np.where(np.isnan(rows) & (left == right), left, rows)

@@ -8,8 +8,11 @@ from typing import Any
 from world.errors import FlightError
 from world.files import did_you_mean
 
+# Commands of a model.
 _COMMANDS = ("elevator", "aileron", "rudder", "throttle")
-_PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
+# Valid name of one of JSBSim's models.
+_MODEL_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
+# Readings of a model.
 _READINGS = (*_COMMANDS, "current", "power")
 
 
@@ -17,7 +20,7 @@ _READINGS = (*_COMMANDS, "current", "power")
 class CommandProperty:
     """One command: a property, and its change per radian (or full throttle) above and below zero.
 
-    Two factors, because a normalised stick often has unequal travel.
+    There are two factors because a normalized stick often has unequal travel.
     """
 
     name: str
@@ -27,7 +30,10 @@ class CommandProperty:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One reading: a property and its factor to SI. An empty name reads as zero, for a quantity that does not exist."""
+    """One reading: a property and its factor to SI.
+
+    An empty name reads as zero, for a quantity that does not exist.
+    """
 
     name: str
     factor: float
@@ -37,9 +43,9 @@ class Reading:
 class Model:
     """Properties of a JSBSim model, and its kind.
 
-    shipped: name of the model among those of JSBSim; "" for a model file in the aircraft's folder.
-    settles: whether the engine has a speed of its own, so that it is running from the start and must settle before
-    measurements.
+    shipped: name of the model among JSBSim's models; "" for a model file in the aircraft's folder.
+    settles: True if the engine has a speed of its own, so that it runs from the start and must settle before
+        measurements.
     commands: elevator, aileron, rudder, throttle.
     readings: the same four, then battery current (A) and power (W).
     """
@@ -50,6 +56,7 @@ class Model:
     readings: tuple[Reading, ...]
 
 
+# Properties of a model that planfly wrote.
 DEFAULT_MODEL = Model(
     shipped="",
     settles=False,
@@ -67,11 +74,11 @@ DEFAULT_MODEL = Model(
 
 
 def read_model(table: object, aircraft: str) -> Model:
-    """The model described by a metadata file's ``[model]`` table.
+    """Return the model described by a metadata file's ``[model]`` table.
 
-    aircraft: its name, which is also that of JSBSim's model unless the table names another.
+    aircraft: name of the aircraft, which is also the name of JSBSim's model unless the table states another.
 
-    Raises FlightError with one line, which begins with the key, for an unknown, missing or invalid entry.
+    Raise FlightError with one line, which begins with the key, for an unknown, missing or invalid entry.
     """
     table = _table(table, "model", ("shipped_by_jsbsim", "engine_settles", "command", "reading"))
     commands = _table(table.get("command", {}), "model.command", _COMMANDS)
@@ -105,11 +112,14 @@ def _table(value: object, key: str, known: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _shipped(table: dict[str, Any], aircraft: str) -> str:
-    """Name of JSBSim's own model; it names a folder and must not lead outside JSBSim's."""
+    """Return the name of JSBSim's own model.
+
+    It names a folder and must not lead outside JSBSim's folder.
+    """
     value = table.get("shipped_by_jsbsim", False)
     if isinstance(value, bool):
         return aircraft if value else ""
-    if not isinstance(value, str) or _PLAIN.fullmatch(value) is None:
+    if not isinstance(value, str) or _MODEL_NAME.fullmatch(value) is None:
         field, allowed = "model.shipped_by_jsbsim", "true, false or the name of a model of JSBSim's"
         raise FlightError(f"{field} = {value!r} is not {allowed}", field=field, value=value, allowed=allowed)
     return value
@@ -123,9 +133,9 @@ def _flag(table: dict[str, Any], name: str) -> bool:
 
 
 def _entry(value: object, key: str, numbers: int) -> tuple[Any, ...]:
-    """A property and its factors, all different from zero."""
+    """Return a property and its factors, all different from zero."""
     good = isinstance(value, list) and len(value) == 1 + numbers and isinstance(value[0], str)
-    # JSBSim aborts the process over a name with a space in it.
+    # JSBSim aborts the process on a name with a space in it.
     if good and isinstance(value, list):
         good = bool(value[0]) and value[0].isascii() and not any(letter.isspace() for letter in value[0])
         good = good and all(

@@ -1,9 +1,9 @@
-"""Writes the JSBSim model of a small aircraft from its numbers: mass, coefficients, and what drives its propeller.
+"""Write the JSBSim model of a small aircraft from its numbers: mass, coefficients and propulsion.
 
-Equations and signs are those of R. W. Beard and T. W. McLain, *Small Unmanned Aircraft*, chapters 3 and 4, as in
+Equations and signs follow R. W. Beard and T. W. McLain, *Small Unmanned Aircraft*, chapters 3 and 4, as in
 ``aircraft/aerosonde/aerosonde.xml``: elevator trailing edge down, aileron rolling right and rudder yawing left are
-positive.  What is not known for certain of an aircraft stands in the model as a property ``ident/NAME``, a factor that
-is 1 unless somebody sets another: so a draw of an uncertain aircraft is a set of properties.
+positive. A value that is not known for certain has a property ``ident/NAME`` in the model, a factor that is 1 unless it
+is set: so a draw of an uncertain aircraft is a set of properties.
 """
 
 import math
@@ -13,10 +13,10 @@ from typing import Literal
 from aircraft.propulsion import Propulsion
 from aircraft.xml_text import number, product, scaled, total
 
-# What moves: a tail with elevator and rudder, a flying wing with elevons, a V-tail with ruddervators.
+# Control surfaces: a tail with elevator and rudder, a flying wing with elevons, a V-tail with ruddervators.
 Layout = Literal["tail", "wing", "vtail"]
 
-# Factors of the model that may be set, and what each multiplies.
+# Factors of the model that may be set, with the quantity that each multiplies.
 FACTORS = {
     "zero-lift-drag": "least drag coefficient",
     "induced-drag": "drag due to lift",
@@ -30,22 +30,27 @@ FACTORS = {
     "roll-damping": "rolling moment per roll rate",
     "aileron-power": "rolling moment per aileron",
 }
-# Elevons and ruddervators reach this much beyond the stop of either of the two commands that they mix.
+# Ratio of the stops of elevons and ruddervators to the larger stop of the two commands that they mix.
 MIXED_TRAVEL = 1.3
-_SLUG_FT2 = 1.3558179483314004  # kg m^2 in one slug ft^2
+# kg m^2 in one slug ft^2.
+_SLUG_FT2 = 1.3558179483314004
+# Kilograms in one pound.
 _POUND = 0.45359237
 
 
 @dataclass(frozen=True, slots=True)
 class AeroCoefficients:
-    """Aerodynamic coefficients by the book's names, a radian and a reduced rate (p b/2V, q c/2V, r b/2V) each.
+    """Aerodynamic coefficients with the textbook's names, per radian and per reduced rate.
 
-    lift_0, lift_alpha, lift_q, lift_elevator: of the lift.
-    drag_min, drag_lift, lift_at_least_drag: CD = drag_min + drag_lift (CL - lift_at_least_drag)^2, where CL is that of
-    the angle of attack alone.
-    drag_elevator, drag_elevator_2: on the elevator's size, and on its square.  drag_beta_2: on the sideslip's square.
-    pitch_0 .. yaw_rudder: of the moments.  side_beta .. side_rudder: of the side force.
-    stall_alpha, stall_sharpness: where the lift curve breaks (rad), and the book's M.
+    Reduced rates are p b/2V, q c/2V and r b/2V.
+
+    lift_0, lift_alpha, lift_q, lift_elevator: lift.
+    drag_min, drag_lift, lift_at_least_drag: CD = drag_min + drag_lift (CL - lift_at_least_drag)^2, where CL depends
+        only on the angle of attack.
+    drag_elevator, drag_elevator_2: drag by the elevator's magnitude, and by its square.
+    drag_beta_2: drag by the square of the sideslip. pitch_0 .. yaw_rudder: moments. side_beta .. side_rudder: side
+        force.
+    stall_alpha, stall_sharpness: angle of attack at which the lift curve breaks (rad), and the textbook's M.
     """
 
     lift_0: float
@@ -83,12 +88,15 @@ class AeroCoefficients:
 
 @dataclass(frozen=True, slots=True)
 class ModelNumbers:
-    """All that a model is made of, SI units and radians.
+    """All numbers of a model, in SI units and radians.
 
-    title: for a person.  source: where the numbers are from, a sentence.
-    inertia: Jx, Jy, Jz, Jxz about the centre of gravity, kg m^2; Jxz is the integral of x z dm.
-    throw: of elevator, aileron and rudder, either way.  rate: rad/s.  lag: of surfaces and of the motor, s.
-    lift_behind: how far the wing's forces act behind the centre of gravity, m.
+    title: for a person.
+    source: source of the numbers, a sentence.
+    inertia: Jx, Jy, Jz, Jxz about the center of gravity, kg m^2; Jxz is the integral of x z dm.
+    throw: travel of elevator, aileron and rudder in either direction.
+    rate: rate limit of the surfaces, rad/s.
+    lag: lag of surfaces and of the motor, s.
+    lift_behind: distance of the wing's forces behind the center of gravity, m.
     """
 
     title: str
@@ -109,7 +117,7 @@ class ModelNumbers:
 
 
 def model_xml(name: str, numbers: ModelNumbers) -> str:
-    """The text of ``NAME.xml``.
+    """Return the text of ``NAME.xml``.
 
     It has no ``<input>`` and ``<output>`` channels, and the properties of `aircraft.jsbsim_model.DEFAULT_MODEL`.
     """
@@ -161,7 +169,7 @@ def model_xml(name: str, numbers: ModelNumbers) -> str:
 
 
 def _comment(text: str) -> str:
-    """A text that may stand in XML and in its comments."""
+    """Return a text without characters that are not allowed in XML and its comments."""
     return text.replace("&", "and").replace("<", "").replace(">", "").replace("--", "-")
 
 
@@ -183,7 +191,7 @@ def _flight_control(numbers: ModelNumbers) -> str:
         name = "elevon" if numbers.layout == "wing" else "ruddervator"
         limit = MIXED_TRAVEL * max(plain[first], plain[second])
         sides = {"left": 1.0, "right": -1.0}
-        # The outer functions only take commands to surfaces and back; the servos between them have lag and stops.
+        # The outer functions only convert between commands and surfaces; the servos between them have lag and stops.
         for side, sign in sides.items():
             asked = total(f"<p> command/{first}-rad </p>", scaled(sign, f"command/{second}-rad"))
             channels.append(_function(f"{name}/{side}-command-rad", asked))
@@ -229,7 +237,8 @@ def _function(name: str, content: str) -> str:
 # Propeller and motor.
 
 
-_TORQUE = """    <!-- The reaction to the propeller's torque rolls the aircraft left. -->
+# Moment of the propeller's torque on the aircraft.
+_TORQUE_XML = """    <!-- The reaction to the propeller's torque rolls the aircraft left. -->
     <moment name="torque" frame="BODY">
       <function> <product> <p> motor/torque-n_m </p> <v> -0.7375621492772654 </v> </product> </function>
       <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
@@ -241,10 +250,10 @@ def _external_reactions(numbers: ModelNumbers) -> str:
     x, y, z = numbers.propulsion.direction
     # JSBSim's structural axes point aft, right and up; the body's forward, right and down.
     ahead, right, below = numbers.propulsion.place
-    # Without a rudder only sideslip would balance the torque and the ailerons against it, and trims have none.
+    # Without a rudder only sideslip could balance the torque and the ailerons against it, and trims have no sideslip.
     torque = "    <!-- No torque of the propeller: its elevons are rigged against it. -->"
     if numbers.layout != "wing":
-        torque = _TORQUE
+        torque = _TORQUE_XML
     return f"""  <external_reactions>
     <!-- What is not known for certain: factors, 1 for the model as published or as guessed. -->
 {declared}
@@ -268,12 +277,19 @@ def _external_reactions(numbers: ModelNumbers) -> str:
 
 
 # ----------------------------------------------------------------------
-# Forces and moments.  In the stability frame JSBSim takes X aft and Z up as positive: drag and lift.
+# Forces and moments. In the stability frame JSBSim takes X aft and Z up as positive: drag and lift.
 
+# Element of dynamic pressure times wing area.
 _Q = "<p> aero/qbar-area </p>"
-_ALPHA, _BETA = "aero/alpha-rad", "aero/beta-rad"
+# Property of the angle of attack.
+_ALPHA = "aero/alpha-rad"
+# Property of the sideslip.
+_BETA = "aero/beta-rad"
+# Properties of the rotation rates.
 _RATE_P, _RATE_Q, _RATE_R = (f"velocities/{axis}-aero-rad_sec" for axis in "pqr")
+# Properties of the control surfaces.
 _ELEVATOR, _AILERON, _RUDDER = (f"surface/{name}-rad" for name in ("elevator", "aileron", "rudder"))
+# Property of the factor on the control surfaces' moments.
 _CONTROL = "aero/control-factor"
 
 
@@ -310,17 +326,17 @@ def _axis(axis: str, name: str, content: str, frame: str = "") -> str:
     </axis>"""
 
 
-def _uncertain(name: str, factors: tuple[str, ...]) -> tuple[str, ...]:
-    """The property of a factor, if the model has it."""
+def _factor_property(name: str, factors: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the property of a factor, if the model has it."""
     return (f"ident/{name}",) if name in factors else ()
 
 
 def _forces(a: AeroCoefficients, known: tuple[str, ...]) -> tuple[str, str, str]:
-    """Drag, lift and side force, each as a coefficient."""
+    """Return drag, lift and side force, each as a coefficient."""
     apart = f"<difference> <p> aero/lift-linear </p> <v> {number(a.lift_at_least_drag)} </v> </difference>"
-    induced = (f"<p> {name} </p>" for name in _uncertain("induced-drag", known))
+    induced = (f"<p> {name} </p>" for name in _factor_property("induced-drag", known))
     drag = total(
-        scaled(a.drag_min, *_uncertain("zero-lift-drag", known)),
+        scaled(a.drag_min, *_factor_property("zero-lift-drag", known)),
         product(f"<v> {number(a.drag_lift)} </v>", *induced, apart, apart),
         product(f"<v> {number(a.drag_elevator)} </v>", f"<abs> <p> {_ELEVATOR} </p> </abs>"),
         scaled(a.drag_elevator_2, _ELEVATOR, _ELEVATOR),
@@ -342,19 +358,19 @@ def _forces(a: AeroCoefficients, known: tuple[str, ...]) -> tuple[str, str, str]
 
 
 def _moments(a: AeroCoefficients, known: tuple[str, ...]) -> tuple[str, str, str]:
-    """Rolling, pitching and yawing moment, each as a coefficient."""
+    """Return rolling, pitching and yawing moment, each as a coefficient."""
     roll = total(
         scaled(a.roll_beta, _BETA),
-        scaled(a.roll_p, "aero/bi2vel", _RATE_P, *_uncertain("roll-damping", known)),
+        scaled(a.roll_p, "aero/bi2vel", _RATE_P, *_factor_property("roll-damping", known)),
         scaled(a.roll_r, "aero/bi2vel", _RATE_R),
-        scaled(a.roll_aileron, _CONTROL, _AILERON, *_uncertain("aileron-power", known)),
+        scaled(a.roll_aileron, _CONTROL, _AILERON, *_factor_property("aileron-power", known)),
         scaled(a.roll_rudder, _CONTROL, _RUDDER),
     )
     pitch = total(
         f"<v> {number(a.pitch_0)} </v>",
-        scaled(a.pitch_alpha, _ALPHA, *_uncertain("pitch-stiffness", known)),
-        scaled(a.pitch_q, "aero/ci2vel", _RATE_Q, *_uncertain("pitch-damping", known)),
-        scaled(a.pitch_elevator, _CONTROL, _ELEVATOR, *_uncertain("elevator-power", known)),
+        scaled(a.pitch_alpha, _ALPHA, *_factor_property("pitch-stiffness", known)),
+        scaled(a.pitch_q, "aero/ci2vel", _RATE_Q, *_factor_property("pitch-damping", known)),
+        scaled(a.pitch_elevator, _CONTROL, _ELEVATOR, *_factor_property("elevator-power", known)),
     )
     yaw = total(
         scaled(a.yaw_beta, _BETA),
@@ -367,8 +383,8 @@ def _moments(a: AeroCoefficients, known: tuple[str, ...]) -> tuple[str, str, str
 
 
 def _lift_curve(a: AeroCoefficients, known: tuple[str, ...]) -> str:
-    """Lift by angle of attack: a straight line, and past the stall a flat plate."""
-    line = total(f"<v> {number(a.lift_0)} </v>", scaled(a.lift_alpha, _ALPHA, *_uncertain("lift-slope", known)))
+    """Return the lift by angle of attack: a straight line, and a flat plate beyond the stall."""
+    line = total(f"<v> {number(a.lift_0)} </v>", scaled(a.lift_alpha, _ALPHA, *_factor_property("lift-slope", known)))
     sine = f"<sin> <p> {_ALPHA} </p> </sin>"
     plate = product("<v> 2 </v>", sine, f"<abs> {sine} </abs>", f"<cos> <p> {_ALPHA} </p> </cos>")
     apart = f"<difference> {plate} <p> aero/lift-linear </p> </difference>"
@@ -390,7 +406,10 @@ def _lift_curve(a: AeroCoefficients, known: tuple[str, ...]) -> str:
 
 
 def _separation_table(stall: float, sharpness: float) -> str:
-    """Share of separated flow by angle of attack, rad (Beard and McLain, equation 4.10), exactly 0 in attached flow."""
+    """Return rows of the separated fraction of the flow by angle of attack, rad (Beard and McLain, 4.10).
+
+    The fraction is exactly 0 in attached flow.
+    """
     width = 10.0 / sharpness
     steps = [stall - width + 0.02 * k for k in range(math.ceil(2.0 * width / 0.02) + 1)]
     points = sorted({-math.pi, *(-step for step in steps), *steps, math.pi})

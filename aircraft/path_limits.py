@@ -36,12 +36,12 @@ class PerformanceTable(NamedTuple):
     tan_max_bank: tangent of the bank limit.
     wind_speed: mean wind (m/s) at `wind_reference_amsl` (m).
     wind_to: direction towards which the wind blows, rad clockwise from north.
-    wind_gradient: increase per metre of height, 1/s.
+    wind_gradient: increase per meter of altitude, 1/s.
     gust_sigma: standard deviation of the gusts, m/s.
     amsl: (h,) m, increasing; altitudes of the two tables.
     climb, descent: (h,) rad, steepest angles relative to the air, positive in the direction of their name.
-    equivalent: 1 if `airspeed` is an equivalent one, so that slopes are those of the true airspeed at each altitude; 0
-    if it is the true one.
+    equivalent: 1 if `airspeed` is an equivalent airspeed, so that slopes apply to the true airspeed at each altitude; 0
+        if it is a true airspeed.
     """
 
     airspeed: float
@@ -68,7 +68,7 @@ class Limits:
     max_bank: rad, the tighter of scenario and aircraft.
     wind: over the whole area.
     tracking: tracking error of the autopilot, None if it follows its path exactly.
-    reserve_height: height above ground that is kept for downdrafts beside the clearance, m.
+    reserve_height: height above ground that is kept for downdrafts in addition to the clearance, m.
     reserve_threats: the same around missiles' spheres, in all directions, and above and below zones, m.
     reserve_climb: rate of climb that legs leave unused for downdrafts, m/s.
     reserve_above: distance below a maximum height above ground that is kept for updrafts, m.
@@ -93,32 +93,36 @@ class Limits:
     _tables: dict[float | None, PerformanceTable] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def slopes(self, course: float, amsl: float, airspeed: float | None = None) -> tuple[float, float]:
-        """Steepest climb and dive over the ground on a course (rad) at an altitude (m), rad, both positive.
+        """Return the steepest climb and dive over the ground on a course (rad) at an altitude (m), rad.
 
-        airspeed: m/s; None for that of the limits. Both are 0 where the aircraft cannot make progress along the course.
+        Both are positive, and 0 if the aircraft cannot make progress along the course.
+        airspeed: m/s; None for the airspeed of the limits.
         """
         climb, dive = aircraft_slopes(self.performance(airspeed), course, amsl)
         return float(climb), float(dive)
 
     def surely(self) -> "Limits":
-        """The limits with the slopes that the aircraft can for certain, as far as that is known."""
+        """Return the limits with the slopes that the aircraft can certainly fly, as far as they are known."""
         return replace(self, envelope=self.envelope.surely())
 
     def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
-        """Radius (m) of the arc at `max_bank` between two courses, for the highest ground speed in the turn."""
+        """Return the radius (m) of the arc at `max_bank` between two courses, for its highest ground speed."""
         return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 
     def rates(self, amsl: float) -> tuple[float, float]:
-        """Fastest steady climb and sink in still air at an altitude (m), at the airspeed of the limits, m/s."""
+        """Return the fastest steady climb and sink in still air at an altitude (m), m/s.
+
+        They are for the airspeed of the limits.
+        """
         table = self.performance()
         speed = float(true_airspeed(table, amsl))
         climb, sink = (speed * math.sin(np.interp(amsl, table.amsl, angles)) for angles in (table.climb, table.descent))
         return climb, sink
 
     def climb_rates(self, waypoints: Floats) -> Floats:
-        """Rate of climb (legs, 2) of each leg of a path (w, 3) at its beginning and at its end, m/s.
+        """Return the rate of climb (legs, 2) of each leg of a path (w, 3) at its start and at its end, m/s.
 
-        Negative where it sinks; NaN where the wind does not let the aircraft hold the leg.
+        Negative in a descent; NaN if the wind does not let the aircraft hold the leg.
         """
         legs, table = zip(leg_courses(waypoints), leg_slopes(waypoints), strict=True), self.performance()
         return np.array(
@@ -132,11 +136,12 @@ class Limits:
         )
 
     def performance(self, airspeed: float | None = None) -> PerformanceTable:
-        """Performance at a true airspeed (m/s), for compiled functions.
+        """Return the performance at a true airspeed (m/s), for compiled functions.
 
-        airspeed: None for that of the limits, which an autopilot that strays from its legs takes for an equivalent one:
-        with height it flies faster, where the aircraft climbs less.
-        Climb and descent are NaN where `Envelope.air_angles` is.
+        airspeed: None for the airspeed of the limits. An autopilot with a tracking error uses it as an equivalent
+            airspeed: its true airspeed grows with altitude, where the aircraft climbs less.
+
+        Climb and descent are NaN where `Envelope.air_angles` is NaN.
         """
         if airspeed not in self._tables:
             self._tables[airspeed] = self._table(airspeed)
@@ -156,7 +161,7 @@ class Limits:
             wind_to=wind.to_course,
             wind_gradient=float(wind.gradient),
             wind_reference_amsl=float(wind.reference_amsl),
-            # sigma_w of MIL-F-8785C, which sigma_u meets at 300 m.
+            # sigma_w of MIL-F-8785C, which sigma_u equals at 300 m.
             gust_sigma=0.1 * W20[wind.turbulence],
             amsl=heights,
             climb=_read_only(angles[:, 0]),
@@ -168,10 +173,10 @@ class Limits:
 def derated(
     table: PerformanceTable, climb_share: float, sink_share: float, unused_climb: float = 0.0, unused_sink: float = 0.0
 ) -> PerformanceTable:
-    """The same aircraft with shares (0..1) of its climb and descent, of which it leaves these rates (m/s) unused.
+    """Return the performance with fractions (0..1) of climb and descent, keeping these rates (m/s) unused.
 
-    Negative angles, a loss of height, are unchanged. Where the aircraft has no more than the unused rate, level flight
-    is left.
+    Negative angles, a loss of altitude, are unchanged. If the aircraft has no more than the unused rate, level flight
+    remains.
 
     >>> nothing = np.zeros(2)
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, nothing, np.array([0.2, -0.1]), nothing)
@@ -192,7 +197,7 @@ def derated(
 
 
 def within_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -> PerformanceTable:
-    """The same aircraft limited to these climb and sink rates, m/s; inf for no limit.
+    """Return the performance limited to these climb and sink rates, m/s; inf for no limit.
 
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, *(np.full(2, 0.3) for _ in range(3)))
     >>> slower = within_rates(table, 5.0, math.inf)
@@ -217,20 +222,20 @@ def _read_only(values: Floats) -> Floats:
 
 @inlined
 def wind_speed_at(table: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
-    """Mean wind speed at an altitude, m/s."""
+    """Return the mean wind speed at an altitude, m/s."""
     return mean_wind_speed(table.wind_speed, table.wind_gradient, table.wind_reference_amsl, amsl)
 
 
 @compiled_inline
 def true_airspeed(table: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
-    """True airspeed at an altitude, m/s."""
+    """Return the true airspeed at an altitude, m/s."""
     speed: float = table.airspeed * (1.0 + table.equivalent * (density_factor(amsl) - 1.0))
     return speed
 
 
 @compiled_inline
 def ground_speed_on(table: PerformanceTable, course: float, amsl: float) -> float:  # pragma: no cover - compiled
-    """Ground speed on a course held against the mean wind, m/s; NaN where it cannot be held."""
+    """Return the ground speed on a course held against the mean wind, m/s; NaN if it cannot be held."""
     wind = wind_speed_at(table, amsl)
     angle = table.wind_to - course
     return ground_speed(true_airspeed(table, amsl), wind * math.cos(angle), wind * math.sin(angle))
@@ -238,7 +243,7 @@ def ground_speed_on(table: PerformanceTable, course: float, amsl: float) -> floa
 
 @compiled_inline
 def downwind(table: PerformanceTable) -> tuple[float, float]:  # pragma: no cover - compiled
-    """East and north components of the downwind unit vector."""
+    """Return the east and north components of the downwind unit vector."""
     return math.sin(table.wind_to), math.cos(table.wind_to)
 
 
@@ -246,7 +251,10 @@ def downwind(table: PerformanceTable) -> tuple[float, float]:  # pragma: no cove
 def slopes_along(
     table: PerformanceTable, tail_share: float, cross_share: float, amsl: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Steepest climb and dive over the ground, rad, for these shares of the wind along and across the course."""
+    """Return the steepest climb and dive over the ground, rad.
+
+    tail_share, cross_share: fractions of the wind along and across the course.
+    """
     count = table.amsl.size
     wind = wind_speed_at(table, amsl)
     k = 0
@@ -261,7 +269,7 @@ def slopes_along(
     down = ground_slope(dive, speed, wind * tail_share, wind * cross_share)
     if math.isnan(up) or math.isnan(down):
         return 0.0, 0.0
-    # Where the thin air makes it faster than its fastest level flight, no leg may lead.
+    # No leg may descend from an altitude at which thin air makes it faster than its fastest level flight.
     if table.equivalent > 0.0 and climb < 0.0:
         down = 0.0
     return up, down
@@ -271,7 +279,7 @@ def slopes_along(
 def aircraft_slopes(
     table: PerformanceTable, course: float, amsl: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Steepest climb and dive over the ground on this course, rad, both positive; (0, 0) without progress."""
+    """Return the steepest climb and dive over the ground on this course, rad; (0, 0) without progress."""
     angle = table.wind_to - course
     return slopes_along(table, math.cos(angle), math.sin(angle), amsl)
 
@@ -280,7 +288,10 @@ def aircraft_slopes(
 def _turn_radius(
     table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, side: float, wx: float, wy: float
 ) -> float:  # pragma: no cover - compiled
-    """Arc radius between the unit courses u and v; w: `downwind`; side: sign of the turn, 0 for either direction."""
+    """Return the arc radius between the unit courses u and v, m.
+
+    w: `downwind`. side: sign of the turn, 0 for either direction.
+    """
     wind, speed = wind_speed_at(table, amsl), true_airspeed(table, amsl)
     if wind == 0.0:
         # Without wind the speed is the same on every course.
@@ -303,15 +314,15 @@ def _turn_radius(
 def turn_radius_between(
     table: PerformanceTable, course_in: float, course_out: float, amsl: float
 ) -> float:  # pragma: no cover - compiled
-    """Arc radius at the bank limit for the highest ground speed between two courses; inf if one cannot be held.
+    """Return the arc radius at the bank limit between two courses; inf if one cannot be held.
 
-    In turbulence one standard deviation of the gusts is added: the airspeed, and with it the bank that an arc over the
-    ground requires, varies by that much.
+    It is for the highest ground speed in the turn. In turbulence one standard deviation of the gusts is added: the
+    airspeed, and with it the bank that an arc over the ground requires, varies by that much.
     """
     turn = wrap(course_out - course_in)
     ux, uy, vx, vy = math.sin(course_in), math.cos(course_in), math.sin(course_out), math.cos(course_out)
     wx, wy = downwind(table)
-    # A U-turn may be flown either way.
+    # A U-turn may be flown in either direction.
     side = 0.0 if abs(turn) > math.pi - 1e-6 else (-1.0 if turn > 0.0 else 1.0)
     return _turn_radius(table, ux, uy, vx, vy, amsl, side, wx, wy)
 
@@ -320,7 +331,7 @@ def turn_radius_between(
 def corner_tangent(
     table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, wx: float, wy: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Tangent length of the fly-by arc between the unit courses u and v, and its radius, m.
+    """Return the tangent length of the fly-by arc between the unit courses u and v, and its radius, m.
 
     R tan(theta/2) = R |sin| / (1 + cos); 0 without a turn, inf for a U-turn. w: `downwind`.
     """
@@ -335,10 +346,12 @@ def corner_tangent(
 
 @compiled_inline
 def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> float:  # pragma: no cover - compiled
-    """Tangent of the slope along a fly-by arc: height difference of its tangent points over the arc's length.
+    """Return the tangent of the slope along a fly-by arc.
 
-    tan_in, tan_out: of the legs. tangent = radius x tan(theta/2): the arc, radius x theta, is shorter than its two
-    tangents and therefore steeper, by a factor of 1.27 at 90 degrees.
+    It is the altitude difference of the arc's tangent points over the arc's length.
+    tan_in, tan_out: tangents of the legs' slopes.
+    tangent: radius x tan(theta/2); the arc, radius x theta, is shorter than its two tangents and therefore steeper, by
+        a factor of 1.27 at 90 degrees.
     """
     if tangent <= 0.0 or radius <= 0.0 or math.isinf(tangent):
         return 0.0
@@ -348,7 +361,9 @@ def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> f
 
 @compiled_inline
 def fly_over_run(turn: float) -> float:  # pragma: no cover - compiled
-    """Distance along the leg after a fly-over turn (rad) until the track is back on it, in radii.
+    """Return the distance along the leg after a fly-over turn until the track is back on it, in radii.
+
+    turn: rad.
 
     With overshoot angle phi, cos phi = (1 + cos turn)/2, the distance is sin turn + 2 sin phi; beyond its maximum the
     maximum is returned, so that it never decreases with the angle.
@@ -361,7 +376,7 @@ def fly_over_run(turn: float) -> float:  # pragma: no cover - compiled
 
 @compiled
 def turn_tangents(table: PerformanceTable, waypoints: Floats) -> Floats:  # pragma: no cover - compiled
-    """Tangent length of the fly-by arc at each waypoint, (w,) m; 0 at the ends.
+    """Return the tangent length of the fly-by arc at each waypoint, (w,) m; 0 at the ends.
 
     waypoints: (w, 3). R tan(theta/2); inf for a U-turn, which has no tangent point.
     """
@@ -388,7 +403,9 @@ def roll_reversal_length(
     wx: float,
     wy: float,
 ) -> float:  # pragma: no cover - compiled
-    """Length of leg (m) for rolling from a turn into one to the other side, between arcs of these radii (m).
+    """Return the leg length (m) for rolling from a turn into an opposite turn.
+
+    radius_in, radius_out: radii of the two arcs, m.
 
     u: the leg's unit course. w: `downwind`. 0 if the aircraft cannot make progress along the leg.
     """

@@ -1,9 +1,9 @@
-"""What drives a small aircraft's propeller, as numbers and as JSBSim functions.
+"""Propulsion of small aircraft, as numbers and as JSBSim functions.
 
-Each kind makes the properties ``motor/thrust-n``, ``motor/torque-n_m``, ``motor/battery-current-a`` and
-``motor/battery-power-w`` of ``motor/throttle-norm`` (0..1), ``motor/rho-kg_m3`` and ``motor/airspeed-mps``.
-All of them are closed forms: nothing spins up, so that a trim is exact.  Factors of the model are properties
-``ident/NAME``.
+Each kind provides the properties ``motor/thrust-n``, ``motor/torque-n_m``, ``motor/battery-current-a`` and
+``motor/battery-power-w`` as functions of ``motor/throttle-norm`` (0..1), ``motor/rho-kg_m3`` and
+``motor/airspeed-mps``. All of them are closed forms without states, so that a trim is exact. Factors of the model are
+properties ``ident/NAME``.
 """
 
 import math
@@ -13,30 +13,37 @@ from typing import Protocol
 
 from aircraft.xml_text import number, product, scaled, total
 
+# Direction or position in body axes: forward, right, down.
 Place = tuple[float, float, float]
 
 
 class Propulsion(Protocol):
-    """What `aircraft.model_writer` needs of a kind of propulsion.
+    """Interface of a kind of propulsion for `aircraft.model_writer`.
 
-    direction: of the thrust in body axes.  place: where it acts, m forward, right and below the centre of gravity.
+    direction: direction of the thrust in body axes.
+    place: point where it acts, m forward, right and below the center of gravity.
     """
 
     @property
     def direction(self) -> Place:
-        """Of the thrust."""
+        """Direction of the thrust."""
 
     @property
     def place(self) -> Place:
-        """Where it acts."""
+        """Point where the thrust acts."""
 
     def functions(self, factors: tuple[str, ...]) -> str:
-        """JSBSim functions; factors: names of the model's ``ident/`` properties."""
+        """Return the JSBSim functions.
+
+        factors: names of the model's ``ident/`` properties.
+        """
 
 
 @dataclass(frozen=True, slots=True)
 class Propeller:
-    """A propeller: T = rho n^2 D^4 CT(J), Q = rho n^2 D^5 CQ(J), J = V / (n D); n in revolutions a second.
+    """A propeller: T = rho n^2 D^4 CT(J), Q = rho n^2 D^5 CQ(J), J = V / (n D).
+
+    n: revolutions per second.
 
     diameter: m.
     thrust, torque: (c0, c1, c2) of CT = c0 + c1 J + c2 J^2, and of CQ.
@@ -47,9 +54,10 @@ class Propeller:
     torque: tuple[float, float, float]
 
     def scaled(self, *, diameter: float = 1.0, blades: float = 1.0, pitch: float = 1.0) -> "Propeller":
-        """One of another size: coefficients grow with the blades' area, and J counts in the pitch.
+        """Return a propeller of another size.
 
-        A steeper propeller gives its thrust up to a higher J and asks for as much more torque.
+        Coefficients scale with the blade area, and J scales with the pitch. A propeller of steeper pitch gives its
+        thrust up to a higher J and needs proportionally more torque.
         """
         ct, cq = self.thrust, self.torque
         return Propeller(
@@ -59,41 +67,49 @@ class Propeller:
         )
 
     def thrust_at(self, w: float, airspeed: float, rho: float) -> float:
-        """Thrust, N, at a speed of the propeller (rad/s) and an airspeed (m/s)."""
+        """Return the thrust, N, at a propeller speed (rad/s) and an airspeed (m/s)."""
         n, d = w / (2.0 * math.pi), self.diameter
         c0, c1, c2 = self.thrust
         return rho * (c0 * n**2 * d**4 + c1 * n * airspeed * d**3 + c2 * airspeed**2 * d**2)
 
     def torque_parabola(self, airspeed: float, rho: float) -> tuple[float, float, float]:
-        """Torque (N m) as a parabola in the propeller's speed (rad/s): coefficients of its square, itself, and 1."""
+        """Return the torque (N m) as a parabola in the propeller speed (rad/s).
+
+        The coefficients belong to the square of the speed, the speed, and 1.
+        """
         c0, c1, c2 = self.torque
         d, turn = self.diameter, 2.0 * math.pi
         return rho * d**5 * c0 / turn**2, rho * d**4 * airspeed * c1 / turn, rho * d**3 * airspeed**2 * c2
 
     @property
     def zero_thrust_ratio(self) -> float:
-        """The advance ratio J at which it pulls no more."""
+        """Advance ratio J at which the thrust is zero."""
         c0, c1, c2 = self.thrust
         return (-c1 - math.sqrt(c1**2 - 4.0 * c2 * c0)) / (2.0 * c2)
 
 
-# The Aerosonde's: D 0.508 m (Beard and McLain, appendix E.2).
+# Propeller of the Aerosonde, D 0.508 m (Beard and McLain, appendix E.2).
 BOOK_PROPELLER = Propeller(0.508, (0.09357, -0.06044, -0.1079), (0.00523, 0.00497, -0.01664))
-# Diameter by the Aerosonde's, and what of its full power the motor loses.
-_TURN = 2.0 * math.pi
+# Radians per revolution.
+_RAD_PER_TURN = 2.0 * math.pi
 
 
 def root(square: float, linear: float, constant: float) -> float:
-    """The larger root of a parabola, as if its discriminant were 0 where that is negative."""
+    """Return the larger root of a parabola; a negative discriminant is replaced by 0."""
     return (math.sqrt(max(0.0, linear**2 - 4.0 * square * constant)) - linear) / (2.0 * square)
 
 
 @dataclass(frozen=True, slots=True)
 class ElectricMotor:
-    """A brushless motor on a battery: volts, back-emf constant (V s/rad), resistance (ohm), no-load current (A).
+    """A brushless motor on a battery.
+
+    volts: battery voltage, V.
+    emf: back-emf constant, V s/rad.
+    resistance: ohm.
+    idle_current: no-load current, A.
+    windmill: fraction of an idle propeller's negative thrust that is applied.
 
     Beard and McLain, section 4.3, with a current that does not brake (`aircraft/aerosonde/README.md`).
-    windmill: share of the negative thrust of an idle propeller that counts.
     """
 
     propeller: Propeller
@@ -106,25 +122,25 @@ class ElectricMotor:
     place: Place = (0.0, 0.0, 0.0)
 
     def speed(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Speed of the propeller, rad/s."""
+        """Return the propeller speed, rad/s."""
         square, linear, constant = self.propeller.torque_parabola(airspeed, rho)
         k, r = self.emf, self.resistance
         driven = root(square, linear + k * k / r, constant + k * self.idle_current - k * self.volts * throttle / r)
         return max(0.0, driven, root(square, linear, constant + k * self.idle_current))
 
     def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Thrust, N."""
+        """Return the thrust, N."""
         found = self.propeller.thrust_at(self.speed(throttle, airspeed, rho), airspeed, rho)
         return found if found > 0.0 else self.windmill * found
 
     def power(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Power from the battery, W."""
+        """Return the power from the battery, W."""
         volts = self.volts * throttle
         return volts * max(0.0, (volts - self.emf * self.speed(throttle, airspeed, rho)) / self.resistance)
 
     def functions(self, factors: tuple[str, ...]) -> str:
-        """JSBSim functions."""
-        factor = _of(factors)
+        """Return the JSBSim functions."""
+        factor = _factor_element(factors)
         k, r, i0 = self.emf, self.resistance, self.idle_current
         by_speed = factor("motor-speed")
         linear = f"<quotient> <v> {number(k * k / r)} </v> {product(by_speed, by_speed)} </quotient>"
@@ -165,10 +181,12 @@ class ElectricMotor:
 
 @dataclass(frozen=True, slots=True)
 class FuelEngine:
-    """A piston engine on the propeller's shaft, whose torque is the throttle's share of its largest.
+    """A piston engine on the propeller's shaft, with a torque proportional to the throttle.
 
-    torque: largest, at sea level, N m; it falls with the air's density.  friction: N m, what turns it when it idles.
-    efficiency: shaft work by the fuel's heat.  windmill: as of `ElectricMotor`.
+    torque: largest torque at sea level, N m; it falls with the air density.
+    friction: friction torque of the idle engine, N m.
+    efficiency: ratio of shaft work to the fuel's heat.
+    windmill: see `ElectricMotor`.
     """
 
     propeller: Propeller
@@ -180,31 +198,31 @@ class FuelEngine:
     place: Place = (0.0, 0.0, 0.0)
 
     def speed(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Speed of the propeller, rad/s."""
+        """Return the propeller speed, rad/s."""
         square, linear, constant = self.propeller.torque_parabola(airspeed, rho)
-        driving = throttle * self.torque * rho / _SEA_LEVEL
+        driving = throttle * self.torque * rho / _SEA_LEVEL_DENSITY
         return max(0.0, root(square, linear, constant + self.friction - driving))
 
     def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Thrust, N."""
+        """Return the thrust, N."""
         found = self.propeller.thrust_at(self.speed(throttle, airspeed, rho), airspeed, rho)
         return found if found > 0.0 else self.windmill * found
 
     def power(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Heat of the fuel, W."""
-        work = throttle * self.torque * rho / _SEA_LEVEL * self.speed(throttle, airspeed, rho)
+        """Return the heat of the fuel, W."""
+        work = throttle * self.torque * rho / _SEA_LEVEL_DENSITY * self.speed(throttle, airspeed, rho)
         return work / self.efficiency
 
     def functions(self, factors: tuple[str, ...]) -> str:
-        """JSBSim functions."""
-        factor = _of(factors)
+        """Return the JSBSim functions."""
+        factor = _factor_element(factors)
         speed = factor("motor-speed")
         parts = (speed, speed, "<p> motor/throttle-norm </p>", "<p> motor/rho-kg_m3 </p>")
         rest = total("<p> motor/q0 </p>", f"<v> {number(self.friction)} </v>", scaled(-1.0, "motor/drive-n_m"))
         heat = scaled(1.0 / self.efficiency, "motor/drive-n_m", "motor/propeller-rad_sec")
         return f"""    <!-- The engine's torque at this throttle and density; the air turns an idle one. -->
     <function name="motor/drive-n_m">
-      {product(f"<v> {number(self.torque / _SEA_LEVEL)} </v>", *parts)}
+      {product(f"<v> {number(self.torque / _SEA_LEVEL_DENSITY)} </v>", *parts)}
     </function>
 {_parabola(self.propeller)}
     <function name="motor/driven-rad_sec">
@@ -219,11 +237,16 @@ class FuelEngine:
 
 @dataclass(frozen=True, slots=True)
 class ActuatorDisc:
-    """A propeller as a disc that speeds the air up, without a motor of its own (Beard and McLain, first edition, 4.3).
+    """A propeller as a disc that accelerates the air, without a motor model.
 
-    area: of the disc, m^2.  coefficient: C_prop.  exit_speed: of the air behind it at full throttle, m/s.
-    ducted: whether the exit speed goes from the airspeed up (`krisgry/x8`, after Fitzpatrick), or from 0.
-    efficiency: of motor and propeller beyond the disc's own loss: power of the air by that of the battery.  volts: V.
+    Beard and McLain, first edition, section 4.3.
+
+    area: disc area, m^2.
+    coefficient: C_prop.
+    exit_speed: air speed behind the disc at full throttle, m/s.
+    ducted: True if the exit speed rises from the airspeed (`krisgry/x8`, after Fitzpatrick), False if it rises from 0.
+    efficiency: efficiency of motor and propeller beyond the disc's own loss, the power of the air over battery power.
+    volts: V.
 
     The thrust is 0.5 rho S C (v_e^2 - V^2), of a ducted one 0.5 rho S C v_e (v_e - V); it does not brake.
     """
@@ -238,8 +261,8 @@ class ActuatorDisc:
     place: Place = (0.0, 0.0, 0.0)
 
     def functions(self, factors: tuple[str, ...]) -> str:
-        """JSBSim functions."""
-        factor = _of(factors)
+        """Return the JSBSim functions."""
+        factor = _factor_element(factors)
         speed = product(f"<v> {number(self.exit_speed)} </v>", factor("motor-speed"))
         air = "<p> motor/airspeed-mps </p>"
         exit_speed = (
@@ -268,11 +291,15 @@ class ActuatorDisc:
 
 @dataclass(frozen=True, slots=True)
 class ShaftPower:
-    """A propeller whose shaft power follows the throttle, with coefficients of thrust and power as polynomials in J.
+    """A propeller whose shaft power follows the throttle.
 
-    diameter: m.  thrust, power: coefficients of CT and CP by rising power of J.
-    shaft: coefficients of the shaft's power, W, by rising power of the throttle; never below 0.
-    efficiency: of the motor, shaft power by battery power.  volts: V.
+    Its thrust and power coefficients are polynomials in J.
+
+    diameter: m.
+    thrust, power: coefficients of CT and CP by rising power of J.
+    shaft: coefficients of the shaft power, W, by rising power of the throttle; never below 0.
+    efficiency: motor efficiency, shaft power over battery power.
+    volts: V.
     """
 
     diameter: float
@@ -285,8 +312,11 @@ class ShaftPower:
     place: Place = (0.0, 0.0, 0.0)
 
     def functions(self, factors: tuple[str, ...]) -> str:
-        """JSBSim functions.  J follows from P / (rho D^2 V^3) = CP(J) / J^3, whose cube root is tabulated."""
-        factor = _of(factors)
+        """Return the JSBSim functions.
+
+        J follows from P / (rho D^2 V^3) = CP(J) / J^3, whose cube root is tabulated.
+        """
+        factor = _factor_element(factors)
         d = self.diameter
         speed = factor("motor-speed")
         shaft = product(
@@ -322,7 +352,7 @@ class ShaftPower:
     <function name="motor/turns-1_s">
       <quotient> <p> motor/flow-mps </p> {scaled(d, "motor/advance")} </quotient>
     </function>
-    <function name="motor/propeller-rad_sec"> {scaled(_TURN, "motor/turns-1_s")} </function>
+    <function name="motor/propeller-rad_sec"> {scaled(_RAD_PER_TURN, "motor/turns-1_s")} </function>
     <function name="motor/thrust-n"> {pull} </function>
     <function name="motor/torque-n_m">
       <quotient> <p> motor/shaft-power-w </p> <p> motor/propeller-rad_sec </p> </quotient>
@@ -333,10 +363,13 @@ class ShaftPower:
     </function>"""
 
     def _advance_table(self) -> str:
-        """Rows of the cube root of CP(J) / J^3, rising, and of J, from where CP is 0 down to a standing aircraft."""
+        """Return rows of the cube root of CP(J) / J^3, rising, and of J.
+
+        The rows go from J where CP is 0 down to a standing aircraft.
+        """
         high = next(k / 1000.0 for k in range(50, 3000) if _value(self.power, k / 1000.0) <= 0.0)
         rows = [(0.0, high)]
-        # Where the power falls away, the root is steep: finer towards it.
+        # The root is steep where the power vanishes: use finer steps towards it.
         for k in range(1, 201):
             j = high * (1.0 - (k / 200.0) ** 2 * 0.99)
             loading = max(0.0, _value(self.power, j)) ** (1.0 / 3.0) / j
@@ -345,11 +378,12 @@ class ShaftPower:
         return "\n".join(f"          {loading:.9f}  {j:.9f}" for loading, j in rows)
 
 
-_SEA_LEVEL = 1.225
+# Air density at sea level, kg/m^3.
+_SEA_LEVEL_DENSITY = 1.225
 
 
-def _of(factors: tuple[str, ...]) -> Callable[[str], str]:
-    """The element of a factor of the model, or 1 for one that it has not."""
+def _factor_element(factors: tuple[str, ...]) -> Callable[[str], str]:
+    """Return a function for the element of a model factor, or 1 for a factor that the model lacks."""
     return lambda name: f"<p> ident/{name} </p>" if name in factors else "<v> 1 </v>"
 
 
@@ -358,7 +392,7 @@ def _value(coefficients: tuple[float, ...], x: float) -> float:
 
 
 def _polynomial(coefficients: tuple[float, ...], x: str) -> str:
-    """A polynomial in an element, by Horner."""
+    """Return a polynomial in an element, by Horner's method."""
     *rest, last = coefficients
     text = f"<v> {number(last)} </v>"
     for value in reversed(rest):
@@ -367,7 +401,7 @@ def _polynomial(coefficients: tuple[float, ...], x: str) -> str:
 
 
 def _parabola(propeller: Propeller) -> str:
-    """The propeller's torque Q = q2 w^2 + q1 w + q0 at its speed w, rad/s."""
+    """Return the propeller's torque Q = q2 w^2 + q1 w + q0 at its speed w, rad/s."""
     square, linear, constant = propeller.torque_parabola(1.0, 1.0)
     rho, air = "motor/rho-kg_m3", "motor/airspeed-mps"
     return f"""    <!-- Torque of the propeller of {number(propeller.diameter)} m, q2 w^2 + q1 w + q0 at w rad/s. -->
@@ -377,7 +411,7 @@ def _parabola(propeller: Propeller) -> str:
 
 
 def _root_xml(linear: str, constant: str) -> str:
-    """The larger root of ``motor/q2`` w^2 + linear w + constant, without a complex one."""
+    """Return the larger root of ``motor/q2`` w^2 + linear w + constant; clip the discriminant at 0."""
     inside = f"""<difference>
               {product(f"<p> {linear} </p>", f"<p> {linear} </p>")}
               {product("<v> 4 </v>", "<p> motor/q2 </p>", constant)}
@@ -397,7 +431,11 @@ def _thrust_and_torque(propeller: Propeller, windmill: float, factor: Callable[[
     d, (c0, c1, c2) = propeller.diameter, propeller.thrust
     braking = "<min> <v> 0 </v> <p> motor/pull-n </p> </min>"
     w, air = "motor/propeller-rad_sec", "motor/airspeed-mps"
-    pull = total(scaled(c0 * d**4 / _TURN**2, w, w), scaled(c1 * d**3 / _TURN, air, w), scaled(c2 * d**2, air, air))
+    pull = total(
+        scaled(c0 * d**4 / _RAD_PER_TURN**2, w, w),
+        scaled(c1 * d**3 / _RAD_PER_TURN, air, w),
+        scaled(c2 * d**2, air, air),
+    )
     return f"""    <!-- T = rho n^2 D^4 CT(V / n D); below zero the idle propeller's drag. -->
     <function name="motor/pull-n"> {product("<p> motor/rho-kg_m3 </p>", factor("thrust"), pull)} </function>
     <function name="motor/thrust-n">

@@ -1,7 +1,7 @@
-"""Tracking error of an autopilot: its deviation from the legs it follows, for which plans reserve margins.
+"""Tracking error of an autopilot: its deviation from its legs, for which plans reserve margins.
 
-The behaviour of an autopilot at a corner, and the lag with which its height follows a slope, come from its own law and
-parameters; an autopilot's module fills these tables from them. Compiled functions take them as one record.
+The behavior of an autopilot at a corner, and the lag with which its altitude follows a slope, come from its own control
+law and parameters; an autopilot's module fills these tables from them. Compiled functions take them as one record.
 """
 
 import math
@@ -15,18 +15,19 @@ from world.kernels import Record, compiled, inlined, record_dtype
 Floats = NDArray[np.float64]
 
 
-# Turning angles (rad) of the tables, from 0 in equal steps.
+# Turn angles of the tables, from 0 in equal steps, rad.
 TURNS = np.radians(np.linspace(0.0, 150.0, 11))
-# Ground speeds of the tables, as shares of the airspeed: from a headwind of 40 % to a tailwind of 80 % of it.
+# Ground speeds of the tables, as ratios to the airspeed: from a headwind of 40 % to a tailwind of 80 % of it.
 SPEED_SHARES = np.linspace(0.6, 1.8, 4)
-_KNOTS = (TURNS.size, SPEED_SHARES.size)
+# Shape of the tables.
+_TABLE_SHAPE = (TURNS.size, SPEED_SHARES.size)
 # `TrackingError` for compiled code; `has_error` is False for an autopilot without tracking error.
 TRACKING = record_dtype(
     ("has_error", np.bool_),
     "airspeed",
-    ("excursion", np.float64, _KNOTS),
-    ("before", np.float64, _KNOTS),
-    ("after", np.float64, _KNOTS),
+    ("excursion", np.float64, _TABLE_SHAPE),
+    ("before", np.float64, _TABLE_SHAPE),
+    ("after", np.float64, _TABLE_SHAPE),
     "across",
     "up",
     "lag",
@@ -38,18 +39,18 @@ TRACKING = record_dtype(
 class TrackingError:
     """Deviation of an autopilot from its legs.
 
-    airspeed: equivalent airspeed that it is given, m/s; the true airspeed increases with altitude.
+    airspeed: equivalent airspeed command, m/s; the true airspeed increases with altitude.
     acceptance: (t, s) m, at turns `TURNS` and ground speeds `SPEED_SHARES` x airspeed: distance before a corner at
-    which turning to the next leg gives the smallest deviation.
+        which turning to the next leg gives the smallest deviation.
     excursion: (t, s) m, largest distance from the legs near the corner with that acceptance.
-    before, after: (t, s) m, lengths of the legs before and after the corner on which the deviation exceeds that on a
-    straight leg.
-    across, up: lateral and vertical deviation from a straight leg, m, navigation error included.
-    lag: time by which height follows a slope, s.
-    step: a leg that changes height by less than this is flown level at the height of its end, m.
-    climb_rate, sink_rate: fastest change of the height demand, m/s; inf for no limit.
-    own_climb_share, own_sink_share: shares (0..1) of the aircraft's steepest climb and descent that leave it near its
-    height in gusts.
+    before, after: (t, s) m, lengths of the legs before and after the corner on which the deviation exceeds the
+        deviation on a straight leg.
+    across, up: lateral and vertical deviation from a straight leg, m, including navigation error.
+    lag: time by which the altitude lags behind a slope, s.
+    step: smallest altitude change of a leg that is not flown level at its final altitude, m.
+    climb_rate, sink_rate: fastest change of the altitude demand, m/s; inf for no limit.
+    own_climb_share, own_sink_share: fractions (0..1) of the aircraft's steepest climb and descent at which it stays
+        near its altitude in gusts.
     """
 
     airspeed: float
@@ -68,7 +69,7 @@ class TrackingError:
     record: Record = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Make the record of the tables."""
+        """Create the record of the tables."""
         record = np.zeros(1, TRACKING)
         record["has_error"] = True
         for name in ("excursion", "before", "after"):
@@ -79,16 +80,16 @@ class TrackingError:
         object.__setattr__(self, "record", record[0])
 
     def corner_acceptance(self, turn: float, ground_speed: float) -> float:
-        """Distance before a corner of this turn (rad) at which to turn at a ground speed (m/s), m."""
-        return float(_between(np.ascontiguousarray(self.acceptance), self.airspeed, turn, ground_speed))
+        """Return the distance before a corner of this turn (rad) at which to turn at a ground speed (m/s), m."""
+        return float(_interpolate(np.ascontiguousarray(self.acceptance), self.airspeed, turn, ground_speed))
 
     def corner_excursion(self, turn: float, ground_speed: float) -> float:
-        """Largest distance from the legs at a corner of this turn (rad) at a ground speed (m/s), m."""
-        return float(_between(np.ascontiguousarray(self.excursion), self.airspeed, turn, ground_speed))
+        """Return the largest distance from the legs at a corner of this turn (rad) at a ground speed (m/s), m."""
+        return float(_interpolate(np.ascontiguousarray(self.excursion), self.airspeed, turn, ground_speed))
 
 
 def no_tracking() -> Record:
-    """The record of an autopilot that follows its path exactly.
+    """Return the record of an autopilot that follows its path exactly.
 
     >>> bool(no_tracking().has_error)
     False
@@ -99,7 +100,7 @@ def no_tracking() -> Record:
 
 
 def air_density_factor(amsl: float) -> float:
-    """Ratio of true to equivalent airspeed in the standard atmosphere at an altitude, m AMSL.
+    """Return the ratio of true to equivalent airspeed in the standard atmosphere at an altitude, m AMSL.
 
     >>> round(air_density_factor(0.0), 3), round(air_density_factor(1000.0), 3)
     (1.0, 1.05)
@@ -109,7 +110,7 @@ def air_density_factor(amsl: float) -> float:
 
 @compiled
 def density_factor(amsl: float) -> float:  # pragma: no cover - compiled
-    """As `air_density_factor`, for compiled functions."""
+    """Return the same ratio as `air_density_factor`, for compiled functions."""
     # Two terms of (1 - 2.2558e-5 h)^-2.128, accurate to 0.5 % up to 4,000 m; a library's power rounds differently on
     # different machines.
     factor: float = 1.0 + amsl * (4.8e-5 + 1.8e-9 * amsl)
@@ -117,11 +118,13 @@ def density_factor(amsl: float) -> float:  # pragma: no cover - compiled
 
 
 @compiled
-def _between(table: Floats, airspeed: float, turn: float, ground_speed: float) -> float:  # pragma: no cover - compiled
-    """Bilinear interpolation in a table (turns, speeds); its nearest edge outside it."""
+def _interpolate(
+    table: Floats, airspeed: float, turn: float, ground_speed: float
+) -> float:  # pragma: no cover - compiled
+    """Interpolate bilinearly in a table (turns, speeds); use its nearest edge outside it."""
     turns, speeds = table.shape
-    place = min(max(turn / _TURN_STEP, 0.0), turns - 1.0)
-    other = min(max((ground_speed / airspeed - _FIRST_SHARE) / _SHARE_STEP, 0.0), speeds - 1.0)
+    place = min(max(turn / _TURN_STEP_RAD, 0.0), turns - 1.0)
+    other = min(max((ground_speed / airspeed - _FIRST_SPEED_RATIO) / _SPEED_RATIO_STEP, 0.0), speeds - 1.0)
     i, j = min(int(place), turns - 2), min(int(other), speeds - 2)
     v, u = place - i, other - j
     low = table[i, j] + u * (table[i, j + 1] - table[i, j])
@@ -134,25 +137,32 @@ def _between(table: Floats, airspeed: float, turn: float, ground_speed: float) -
 def corner_deviation(
     tracking: Record, turn: float, ground_speed: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Largest distance from the legs at a corner, and lengths of the legs before and after it that are affected, m.
+    """Return the largest distance from the legs at a corner, and the affected lengths around it, m.
 
-    turn: rad, positive. ground_speed: m/s.
+    The first affected length is on the leg before the corner, the second on the leg after it.
+
+    turn: rad, positive.
+    ground_speed: m/s.
     """
     return (
-        _between(tracking.excursion, tracking.airspeed, turn, ground_speed),
-        _between(tracking.before, tracking.airspeed, turn, ground_speed),
-        _between(tracking.after, tracking.airspeed, turn, ground_speed),
+        _interpolate(tracking.excursion, tracking.airspeed, turn, ground_speed),
+        _interpolate(tracking.before, tracking.airspeed, turn, ground_speed),
+        _interpolate(tracking.after, tracking.airspeed, turn, ground_speed),
     )
 
 
-_TURN_STEP = float(TURNS[1])
-_FIRST_SHARE, _SHARE_STEP = float(SPEED_SHARES[0]), float(SPEED_SHARES[1] - SPEED_SHARES[0])
+# Step of `TURNS`, rad.
+_TURN_STEP_RAD = float(TURNS[1])
+# First of `SPEED_SHARES`.
+_FIRST_SPEED_RATIO = float(SPEED_SHARES[0])
+# Step of `SPEED_SHARES`.
+_SPEED_RATIO_STEP = float(SPEED_SHARES[1] - SPEED_SHARES[0])
 
 
 # --- Corridor ---
 
-# Half-width where a scenario states none, m: three times the overshoot of an autopilot at ordinary corners. ArduPlane
-# in SITL overshot corners of up to 25 degrees in 5 m/s of wind by at most 10 m.
+# Half-width if a scenario states none, m: three times the overshoot of an autopilot at ordinary corners. ArduPlane in
+# SITL overshot corners of up to 25 degrees in 5 m/s of wind by at most 10 m.
 MIN_CORRIDOR = 30.0
 # Half-width in acceptance radii. An autopilot that turns one radius before its waypoint cuts a right-angled corner by
 # up to 0.7 radii, and overshoots the next leg by as much if it turns late; the rest is for wind.
@@ -160,10 +170,12 @@ CORRIDOR_RADII = 2.0
 
 
 def corridor_half_width(stated: float | None, acceptance_radius: float | None) -> float:
-    """Half-width of the corridor around the legs of a path, m: the scenario's, or what the autopilot needs.
+    """Return the half-width of the corridor around the legs of a path, m.
 
-    stated: of `[limits] corridor_m`, None if not given. acceptance_radius: at which the autopilot takes a waypoint as
-    reached unless the mission states another, m; None for guidance that flies corners as planned.
+    It is stated by the scenario, or follows from the autopilot's acceptance radius.
+    stated: `[limits] corridor_m`, None if not stated.
+    acceptance_radius: radius at which the autopilot accepts a waypoint unless the mission states another, m; None for
+        guidance that flies corners as planned.
 
     >>> corridor_half_width(None, None), corridor_half_width(None, 90.0), corridor_half_width(12.0, 90.0)
     (30.0, 180.0, 12.0)

@@ -1,7 +1,7 @@
-"""What is not known of an aircraft: the factors of its model, each with a standard deviation, and draws of them all.
+"""Uncertainty of an aircraft: factors of its model with standard deviations, and draws of all of them.
 
-Beside the model stands ``uncertainty.toml`` (of a data sheet) or ``posterior.toml`` (of flight logs), and
-``draws.csv``, a row a draw: the columns are the model's properties, such as ``ident/thrust``.
+Next to the model there is ``uncertainty.toml`` (from a data sheet) or ``posterior.toml`` (from flight logs), and
+``draws.csv`` with one draw per row: the columns are the model's properties, such as ``ident/thrust``.
 """
 
 import csv
@@ -19,18 +19,24 @@ from world.files import did_you_mean, read_small_file, read_toml, utf8_text
 
 Floats = NDArray[np.float64]
 
-# The first that is there counts.
+# Files with uncertainties; the first that exists applies.
 FILES = ("posterior.toml", "uncertainty.toml")
+# File of draws.
 DRAWS_FILE = "draws.csv"
+# Number of draws.
 DRAWS = 512
-# Of the power that an aircraft from a data sheet takes, as a share: that of its least drag, of which most of it comes.
+# Relative standard deviation of the power of an aircraft from a data sheet, mostly from its least drag.
 POWER_SD = 0.25
+# Largest file of draws, bytes.
 MAX_BYTES = 4 * 2**20
+# Prefix of the properties.
 _PREFIX = "ident/"
-# Keys that must be there, those that may, and those of what else `posterior.toml` says of the logs.
-_NEEDED = frozenset({"climb_sd_deg", "descent_sd_deg"})
-_OPTIONAL = frozenset({"source", "quantity", "battery_guessed", "fastest_sd_mps", "power_sd"})
-_OF_LOGS = frozenset({
+# Required keys.
+_REQUIRED_KEYS = frozenset({"climb_sd_deg", "descent_sd_deg"})
+# Optional keys.
+_OPTIONAL_KEYS = frozenset({"source", "quantity", "battery_guessed", "fastest_sd_mps", "power_sd"})
+# Further keys of `posterior.toml`, about the logs.
+_LOG_KEYS = frozenset({
     "base", "mass_kg", "seconds", "battery_current", "airspeed_factor", "airspeed_factor_sd", "dynamics", "held_fixed",
     "log", "correlation",
 })  # fmt: skip
@@ -40,8 +46,10 @@ _OF_LOGS = frozenset({
 class UncertainQuantity:
     """One property of the model that is not known for certain.
 
-    name: of the property.  unit: "factor", or that of an offset.  estimate, sd: mean and standard deviation.
-    reason: where the deviation is from, for a person.
+    name: name of the property.
+    unit: "factor", or the unit of an offset.
+    estimate, sd: mean and standard deviation.
+    reason: source of the deviation, for a person.
     """
 
     name: str
@@ -53,14 +61,14 @@ class UncertainQuantity:
 
 @dataclass(frozen=True, slots=True)
 class Uncertainty:
-    """What is not known of an aircraft.
+    """Uncertainty of an aircraft.
 
-    source: what it was made from: "a data sheet", "flight logs".
+    source: source of the model: "a data sheet", "flight logs".
     climb, descent: standard deviations of the steepest climb and descent at cruise, rad.
-    quantities: of the model.
-    power: standard deviation of the power that flight takes, as a share.
+    quantities: uncertain properties of the model.
+    power: relative standard deviation of the power in flight.
     fastest: standard deviation of the fastest level flight, m/s.
-    battery_guessed: whether nobody stated what its battery holds.
+    battery_guessed: True if the battery's energy was not stated.
     """
 
     source: str
@@ -73,9 +81,9 @@ class Uncertainty:
 
 
 def read_uncertainty(folder: Path) -> Uncertainty | None:
-    """What stands beside the model in an aircraft's folder; None where nothing does.
+    """Read the uncertainty next to the model in an aircraft's folder; return None if there is no file.
 
-    Raises FlightError, in one line, for a file that cannot be read or used.
+    Raise FlightError, in one line, for a file that cannot be read or used.
 
     >>> from aircraft.catalog import load_aircraft
     >>> read_uncertainty(load_aircraft("aerosonde").folder) is None
@@ -107,17 +115,17 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
     power = POWER_SD if file.name == FILES[1] else 0.0
     if "power_sd" in table:
         power = _number(table, "power_sd", file, 0.0, 1.0)
-    # A folder of before it was judged says nothing of it.
+    # Older folders do not state it.
     fastest = _number(table, "fastest_sd_mps", file, 0.0, 100.0) if "fastest_sd_mps" in table else 0.0
     return Uncertainty(source, climb, descent, quantities, power, guessed, fastest)
 
 
 def _check_keys(table: dict[str, Any], file: Path) -> None:
-    """Refuse a file without a deviation, which would be known for certain, or with a key that says nothing."""
-    known = _NEEDED | _OPTIONAL | (_OF_LOGS if file.name == FILES[0] else frozenset())
-    missing, unknown = sorted(_NEEDED - table.keys()), sorted(table.keys() - known)
+    """Refuse a file without a deviation, which would mean certainty, or with an unknown key."""
+    known = _REQUIRED_KEYS | _OPTIONAL_KEYS | (_LOG_KEYS if file.name == FILES[0] else frozenset())
+    missing, unknown = sorted(_REQUIRED_KEYS - table.keys()), sorted(table.keys() - known)
     near = did_you_mean(unknown[0], sorted(known - table.keys())) if unknown else ""
-    # A misspelt key is missing as well; the spelling is the better message.
+    # A misspelled key is missing as well; the spelling is the better message.
     if missing and not near:
         raise FlightError(f"{file}: missing {', '.join(missing)}", file=file, field=missing[0])
     if unknown:
@@ -126,7 +134,7 @@ def _check_keys(table: dict[str, Any], file: Path) -> None:
 
 
 def _number(table: dict[str, Any], key: str, file: Path, low: float, high: float) -> float:
-    """A number of a table.  Raises FlightError for one that is missing or out of range."""
+    """Return a number of a table. Raise FlightError for one that is missing or out of range."""
     value = table.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise FlightError.at(str(file), key, value, f"a number from {low:g} to {high:g} is expected", shown=repr(value))
@@ -141,13 +149,13 @@ def _quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
 
 
 def _check_name(name: object, file: str, key: str, error: type[PlanflyError] = FlightError) -> None:
-    # JSBSim aborts the process over a name with a space in it.
+    # JSBSim aborts the process on a name with a space in it.
     if not isinstance(name, str) or not name.startswith(_PREFIX) or not name.isascii() or len(name.split()) != 1:
         raise error.at(file, key, name, f"a property {_PREFIX}NAME is expected", shown=repr(name))
 
 
 def uncertainty_text(known: Uncertainty) -> str:
-    """The text of an ``uncertainty.toml``."""
+    """Return the text of an ``uncertainty.toml``."""
     lines = [
         "# What is not known of this aircraft.  Each property is a factor in the model, 1 for the estimate.",
         "",
@@ -181,7 +189,9 @@ def uncertainty_text(known: Uncertainty) -> str:
 class Draws:
     """Draws of an aircraft's properties.
 
-    names: (p,) of the properties.  values: (n, p).  source: the file.
+    names: (p,) names of the properties.
+    values: (n, p).
+    source: the file.
     """
 
     names: tuple[str, ...]
@@ -189,16 +199,16 @@ class Draws:
     source: str = ""
 
     def row(self, seed: int) -> int:
-        """Which row a flight with this seed has."""
+        """Return the row that a flight with this seed uses."""
         return seed % len(self.values)
 
     def properties(self, seed: int) -> tuple[tuple[str, float], ...]:
-        """The properties of a flight with this seed, by name."""
+        """Return the properties of a flight with this seed, by name."""
         return tuple(zip(self.names, self.values[self.row(seed)].tolist(), strict=True))
 
 
 def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAWS, seed: int = 1) -> Draws:
-    """Draw each quantity by itself: a factor log-normally, so that it stays positive, anything else normally.
+    """Draw each quantity independently: a factor log-normally, so that it stays positive, others normally.
 
     >>> one = UncertainQuantity("ident/thrust", "factor", 1.0, 0.2)
     >>> drawn = draw_quantities((one,)).values
@@ -217,13 +227,13 @@ def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAW
 
 
 def draws_text(draws: Draws) -> str:
-    """The text of a ``draws.csv``."""
+    """Return the text of a ``draws.csv``."""
     lines = [",".join(draws.names), *(",".join(f"{value:.9g}" for value in row) for row in draws.values.tolist())]
     return "\n".join(lines) + "\n"
 
 
 def read_draws(path: Path, error: type[PlanflyError] = FlightError) -> Draws:
-    """Read a ``draws.csv``.  Raises the error, with the line, for one that cannot be read or used."""
+    """Read a ``draws.csv``. Raise the error, with the line, for one that cannot be read or used."""
     text = utf8_text(read_small_file(path, MAX_BYTES, "draws", error), path, error)
     reader = csv.reader(io.StringIO(text))
     try:

@@ -1,8 +1,8 @@
-"""Small pieces of JSBSim's XML for functions: numbers, products, sums."""
+"""Elements of JSBSim's XML for functions: numbers, products, sums."""
 
 
 def number(value: float) -> str:
-    """A number with all the digits that matter.
+    """Return a number with all significant digits.
 
     >>> number(0.1), number(2.0), number(-1 / 3)
     ('0.1', '2', '-0.333333333333')
@@ -11,7 +11,7 @@ def number(value: float) -> str:
 
 
 def product(*parts: str) -> str:
-    """A product of these elements.
+    """Return a product of these elements.
 
     >>> product("<p> a </p>", "<v> 2 </v>")
     '<product> <p> a </p> <v> 2 </v> </product>'
@@ -20,7 +20,7 @@ def product(*parts: str) -> str:
 
 
 def scaled(value: float, *properties: str) -> str:
-    """A number times properties.
+    """Return a number times properties.
 
     >>> scaled(2.0, "x", "y")
     '<product> <v> 2 </v> <p> x </p> <p> y </p> </product>'
@@ -29,7 +29,7 @@ def scaled(value: float, *properties: str) -> str:
 
 
 def total(*parts: str) -> str:
-    """A sum of these elements.
+    """Return a sum of these elements.
 
     >>> total("<v> 1 </v>", "<p> a </p>")
     '<sum> <v> 1 </v> <p> a </p> </sum>'

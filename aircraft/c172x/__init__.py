@@ -1,1 +1,1 @@
-"""The Cessna 172 that JSBSim ships: only what we need to know of it; the model itself stays JSBSim's."""
+"""The Cessna 172 that JSBSim ships: its metadata only; the model itself stays in JSBSim."""

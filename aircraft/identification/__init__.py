@@ -1,1 +1,1 @@
-"""What an aircraft's flight logs say of its model: lift, drag, thrust and the moments, and what is not known."""
+"""Identification of an aircraft's model from logs: lift, drag, thrust, moments and their uncertainty."""

@@ -1,8 +1,8 @@
-"""The scale of the airspeed sensor, from the wind triangle: velocity over the ground less that through the air is wind.
+"""Scale of the airspeed sensor from the wind triangle: ground velocity minus air velocity is the wind.
 
-The wind does not know which way the aircraft flies.  A sensor that reads too little leaves a part of the airspeed in
-the wind, and that part turns with the aircraft: every turn shows it.  Wind and gusts change as well, but slowly, so
-what counts is how the difference changes from one second to the next.
+The wind does not depend on the aircraft's heading. A sensor that reads too little leaves a part of the airspeed in the
+wind, and that part turns with the aircraft: every turn shows it. Wind and gusts change too, but slowly, so the change
+of the difference from one second to the next is used.
 """
 
 from dataclasses import replace
@@ -17,27 +17,30 @@ from aircraft.identification.regression import fit_with_prior
 
 Floats = NDArray[np.float64]
 
-# Standard deviation of a sensor's factor as it comes, and of what the method leaves at best.
-SCALE_SD, _MIN_SD = 0.02, 0.002
-# Nor is the heading known, rad.
-_HEADING_SD = float(np.radians(3.0))
-# Over how long a gust is forgotten, s (MIL-F-8785C, 3.7.3: 290 m at 150 m above ground, at 25 m/s), and the standard
-# deviation of a mean wind, m/s.
-_GUST_SECONDS, _WIND_SD = 11.5, 30.0
-# Of so many samples one.
+# Standard deviation of an uncalibrated sensor's factor.
+SCALE_SD = 0.02
+# Smallest standard deviation after the estimate.
+_MIN_SD = 0.002
+# Standard deviation of the heading, rad.
+_HEADING_SD_RAD = float(np.radians(3.0))
+# Correlation time of a gust, s (MIL-F-8785C, 3.7.3: 290 m at 150 m above ground, at 25 m/s).
+_GUST_TIME_S = 11.5
+# Standard deviation of a mean wind, m/s.
+_WIND_SD_MPS = 30.0
+# Of this many samples one is used.
 _THINNING = 25
 
 
 def with_airspeed_scale(signals: Signals, flow: Flow) -> Signals:
-    """Signals with the airspeed that fits the wind triangle best, its factor and how sure that is."""
+    """Return signals with the airspeed that fits the wind triangle best, its factor and its sd."""
     factor, sd = airspeed_scale(signals, flow)
     return replace(signals, airspeed=signals.airspeed * factor, airspeed_factor=factor, airspeed_sd=sd)
 
 
 def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
-    """True by measured airspeed, and its standard deviation.
+    """Return the ratio of true to measured airspeed, and its standard deviation.
 
-    The flow counts for the direction of the airspeed alone, to which the scale is indifferent to the first order.
+    The flow is used only for the direction of the airspeed, to which the scale is insensitive to first order.
     """
     from scipy.signal import lfilter
 
@@ -46,15 +49,15 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     ahead, right = thin.extra["ahead"], thin.extra["right"]
     north, east, _ = thin.velocity.T
     stretches = list(zip(thin.edges[:-1], thin.edges[1:], strict=True))
-    # Wind is velocity over the ground less that through the air; the heading's error turns the latter.  A gust is in
-    # the wind, in the airspeed and its direction, and after a while in the velocity over the ground, with which the
-    # aircraft drifts: whatever has the gust in it would count for the scale.  What the scale goes with is therefore the
-    # mean airspeed along the course that is flown, smoothed over the time in which gusts change.
+    # Wind is ground velocity minus air velocity; the heading's error rotates the latter. A gust is in the wind, in the
+    # airspeed and its direction, and after a while in the ground velocity, since the aircraft drifts with it: a
+    #     regressor with the gust in it would bias the scale. The regressor of the scale is therefore the mean airspeed
+    #     along the flown course, smoothed over the time in which gusts change.
     steady = np.empty((2, len(ahead)))
     for first, last in stretches:
         rows = slice(first, last)
         ground, air = np.column_stack([north[rows], east[rows]]), np.column_stack([ahead[rows], right[rows]])
-        course = low_pass(ground - (ground - air).mean(axis=0), 1.0 / _GUST_SECONDS, thin.hertz)
+        course = low_pass(ground - (ground - air).mean(axis=0), 1.0 / _GUST_TIME_S, thin.hertz)
         length = np.maximum(1.0, np.hypot(*course.T))
         steady[:, rows] = (thin.airspeed[rows].mean() / length)[np.newaxis, :] * course.T
     columns = [(steady[0], steady[1]), (-steady[1], steady[0])]
@@ -62,10 +65,10 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
         one = np.zeros(len(ahead))
         one[first:last] = 1.0
         columns += [(one, 0.0 * one), (0.0 * one, one)]
-    keep = float(np.exp(-1.0 / (_GUST_SECONDS * thin.hertz)))
+    keep = float(np.exp(-1.0 / (_GUST_TIME_S * thin.hertz)))
 
-    def fresh(values: Floats) -> Floats:
-        """What is new in each row, of a process that forgets over `_GUST_SECONDS`; each stretch for itself."""
+    def innovations(values: Floats) -> Floats:
+        """Return the innovations of a process with correlation time `_GUST_TIME_S`, each stretch separately."""
         made = np.empty_like(values)
         for first, last in stretches:
             part = values[first:last]
@@ -73,16 +76,16 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
             made[first] = part[0] * np.sqrt(1.0 - keep * keep)
         return made
 
-    table = np.column_stack([np.concatenate([fresh(a), fresh(b)]) for a, b in columns])
-    measured = np.concatenate([fresh(north - ahead), fresh(east - right)])
-    sds = np.concatenate([[SCALE_SD, _HEADING_SD], np.full(2 * len(stretches), _WIND_SD)])
+    table = np.column_stack([np.concatenate([innovations(a), innovations(b)]) for a, b in columns])
+    measured = np.concatenate([innovations(north - ahead), innovations(east - right)])
+    sds = np.concatenate([[SCALE_SD, _HEADING_SD_RAD], np.full(2 * len(stretches), _WIND_SD_MPS)])
     blocks = np.concatenate([thin.block, thin.block + thin.block.max() + 1])
     fit = fit_with_prior(table, measured, np.zeros(len(sds)), sds, blocks)
     return 1.0 + float(fit.estimate[0]), float(np.hypot(_MIN_SD, np.sqrt(fit.covariance[0, 0])))
 
 
 def _through_air(signals: Signals, flow: Flow) -> tuple[Floats, Floats]:
-    """Velocity through the air (n,) to the north and to the east, m/s."""
+    """Return the velocity through the air (n,) to the north and to the east, m/s."""
     roll, pitch, yaw = signals.attitude.T
     u = signals.airspeed * np.cos(flow.alpha) * np.cos(flow.beta)
     v = signals.airspeed * np.sin(flow.beta)

@@ -1,8 +1,8 @@
-"""The clocks of a log: how far the accelerometers run behind the gyros, and the surfaces behind what was commanded.
+"""Alignment of a log's clocks: lags of the accelerometers and of the control surfaces.
 
-A specific force 0.1 s late explains a moment badly however good the model is; so the delays come first.  The
-accelerometers' lag and delay and the servos' lag are those with which pitch, roll and yaw are explained best.
-Everything else is then made as late as the accelerometers.
+The accelerometers lag behind the gyros, and the surfaces behind their commands. A specific force that is 0.1 s late
+explains a moment badly with any model, so the delays are estimated first. The accelerometers' lag and delay and the
+servos' lag are those that explain pitch, roll and yaw best. All other signals are then delayed like the accelerometers.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +20,11 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Clocks:
-    """Of one log, s: the accelerometers' first-order lag and delay behind the gyros, and the servos' lag."""
+    """Clocks of one log, s.
+
+    lag, delay: first-order lag and delay of the accelerometers behind the gyros.
+    servo_lag: lag of the servos.
+    """
 
     lag: float = 0.0
     delay: float = 0.0
@@ -28,18 +32,22 @@ class Clocks:
 
     @property
     def behind(self) -> float:
-        """How far the accelerometers run behind the gyros in all, s."""
+        """Total lag of the accelerometers behind the gyros, s."""
         return self.lag + self.delay
 
 
 @dataclass(frozen=True, slots=True)
 class Signals:
-    """All stretches of some logs behind each other, all of it as late as the accelerometers.
+    """All stretches of some logs in sequence, delayed like the accelerometers.
 
-    Fields as of `FlightRecord`, (n,) or (n, k); rate_changes: (n, 3) of p, q and r, rad/s^2.
-    throttle: (n,) behind the motor's lag.  surfaces: (n, 3) elevator, aileron, rudder behind the servos', rad.
-    airspeed_factor: that the airspeed was multiplied with.  airspeed_sd: standard deviation of what it should be.
-    edges: rows at which each stretch begins, and the end.  block: (n,) number of the block of time of each row.
+    Fields as in `FlightRecord`, (n,) or (n, k).
+    rate_changes: (n, 3) derivatives of p, q and r, rad/s^2.
+    throttle: (n,) after the motor's lag.
+    surfaces: (n, 3) elevator, aileron, rudder after the servos' lag, rad.
+    airspeed_factor: factor that the airspeed was multiplied with.
+    airspeed_sd: relative standard deviation of the airspeed.
+    edges: rows at which each stretch begins, and the end.
+    block: (n,) number of the time block of each row.
     """
 
     acceleration: Floats
@@ -62,22 +70,28 @@ class Signals:
     extra: Mapping[str, Floats] = field(default_factory=dict)
 
     def smooth(self, values: Floats, cutoff: float) -> Floats:
-        """Low-passed (n,) or (n, k), each stretch for itself; cutoff: Hz."""
+        """Return values (n,) or (n, k) low-passed, each stretch separately.
+
+        cutoff: Hz.
+        """
         made = np.empty_like(values)
         for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
             made[first:last] = low_pass(values[first:last], cutoff, self.hertz)
         return made
 
     def thinned(self, every: int, extra: Mapping[str, Floats]) -> "Signals":
-        """Of so many rows one, low-passed before; extra: (n,) more columns that are thinned alike."""
+        """Return one of ``every`` rows, low-passed before.
+
+        extra: (n,) further columns to thin alike.
+        """
         edges, blocks, parts = [0], [], []
-        columns = {name: getattr(self, name) for name in _SAMPLED} | dict(extra)
+        columns = {name: getattr(self, name) for name in _SAMPLED_FIELDS} | dict(extra)
         together = np.column_stack(list(columns.values()))
         for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
             parts.append(low_pass(together[first:last], 0.3 * self.hertz / every, self.hertz)[::every])
             blocks.append(self.block[first:last:every])
             edges.append(edges[-1] + len(blocks[-1]))
-        # Each column in a run of its own again, (n,) or (n, k).
+        # Split into contiguous columns again, (n,) or (n, k).
         whole, at = np.concatenate(parts), 0
         joined: dict[str, Any] = {}
         for name, values in columns.items():
@@ -90,27 +104,30 @@ class Signals:
         )
 
     def delayed(self, values: Floats, delay: float) -> Floats:
-        """Behind by so many s, each stretch for itself."""
+        """Return values delayed by ``delay`` (s), each stretch separately."""
         made = np.empty_like(values)
         for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
             made[first:last] = shifted(values[first:last], delay)
         return made
 
 
-# Fields of `Signals` with a row a sample.
-_SAMPLED = (
+# Fields of `Signals` with one row per sample.
+_SAMPLED_FIELDS = (
     "acceleration", "rates", "rate_changes", "attitude", "velocity", "wind", "airspeed", "density", "surfaces",
     "throttle", "current", "voltage",
 )  # fmt: skip
 # Length of flight through the air within which residuals may be autocorrelated, m: gusts have lengths, and a slower
-# aircraft is longer in each.
+# aircraft stays longer in each.
 BLOCK_METRES = 500.0
-# Airspeed sensors are read 10 times a second; faster than this, Hz, is their noise.
-_AIRSPEED_BAND = 2.0
+# Cutoff of the airspeed, Hz: sensors are read 10 times per second, and faster changes are noise.
+_AIRSPEED_CUTOFF_HZ = 2.0
 
 
 def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: float) -> Signals:
-    """Put stretches behind each other, each on the clock of its accelerometers; motor_lag: s."""
+    """Put stretches in sequence, each on the clock of its accelerometers.
+
+    motor_lag: s.
+    """
     parts: dict[str, list[Floats]] = {}
     edges, blocks, number = [0], [], 0
     for record, clock in zip(records, clocks, strict=True):
@@ -126,7 +143,7 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
             "attitude": np.column_stack([late(np.unwrap(angle)) for angle in record.attitude.T]),
             "velocity": late(record.velocity),
             "wind": record.wind,
-            "airspeed": late(low_pass(record.airspeed, _AIRSPEED_BAND)),
+            "airspeed": late(low_pass(record.airspeed, _AIRSPEED_CUTOFF_HZ)),
             "density": record.density,
             "surfaces": late(lagged(record.controls[:, :3], clock.servo_lag)),
             "throttle": late(lagged(record.controls[:, 3], motor_lag)),
@@ -145,7 +162,7 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
 
 
 def led(values: Floats, lag: float, hertz: float) -> Floats:
-    """(n,) as it was before a first-order lag (s), a sample at a time: values and so much of their rate of change.
+    """Return values (n,) before a first-order lag (s): each plus the lag times its rate of change.
 
     >>> led(np.arange(4.0), 0.5, 10.0)
     array([5., 6., 7., 8.])
@@ -153,14 +170,20 @@ def led(values: Floats, lag: float, hertz: float) -> Floats:
     return np.asarray(values + lag * hertz * np.gradient(values))
 
 
-# The grid that the search begins on, and its limits, s: lag and delay of the accelerometers, lag of the servos.
-_LAGS, _DELAY, _SERVOS = (0.0, 0.03, 0.06, 0.09), 0.015, (0.02, 0.06, 0.1, 0.15)
-_LIMITS = np.array([[0.0, -0.04, 0.0], [0.12, 0.1, 0.25]])
-_STEPS = np.diag([0.02, 0.02, 0.03])
+# Lags of the accelerometers in the grid at which the search starts, s.
+_GRID_LAGS_S = (0.0, 0.03, 0.06, 0.09)
+# Delay of the accelerometers in that grid, s.
+_GRID_DELAY_S = 0.015
+# Lags of the servos in that grid, s.
+_GRID_SERVO_LAGS_S = (0.02, 0.06, 0.1, 0.15)
+# Limits of lag and delay of the accelerometers, and lag of the servos, s.
+_LIMITS_S = np.array([[0.0, -0.04, 0.0], [0.12, 0.1, 0.25]])
+# Steps of the initial simplex in these three, s.
+_SIMPLEX_STEPS_S = np.diag([0.02, 0.02, 0.03])
 
 
 def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
-    """The clocks with the least misfit: the best of a grid, and from there a simplex (Nelder and Mead 1965).
+    """Return the clocks with the smallest misfit: best of a grid, then a simplex (Nelder and Mead 1965).
 
     >>> found = find_clocks(lambda clock: abs(clock.lag - 0.05) + abs(clock.delay - 0.03) + clock.servo_lag)
     >>> round(found.lag, 2), round(found.delay, 2), round(found.servo_lag, 2)
@@ -169,12 +192,12 @@ def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
     from scipy.optimize import minimize
 
     def cost(values: Floats) -> float:
-        inside = np.clip(values, *_LIMITS)
+        inside = np.clip(values, *_LIMITS_S)
         return misfit(Clocks(*inside.tolist())) + 100.0 * float(np.abs(values - inside).sum())
 
-    grid = [np.array([lag, _DELAY, servo]) for lag in _LAGS for servo in _SERVOS]
+    grid = [np.array([lag, _GRID_DELAY_S, servo]) for lag in _GRID_LAGS_S for servo in _GRID_SERVO_LAGS_S]
     start = min(grid, key=cost)
-    simplex = np.vstack([start, *(start + step for step in _STEPS)])
+    simplex = np.vstack([start, *(start + step for step in _SIMPLEX_STEPS_S)])
     options = {"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-4, "maxfev": 70}
     found = minimize(cost, start, method="Nelder-Mead", options=options)
-    return Clocks(*np.clip(found.x, *_LIMITS).tolist())
+    return Clocks(*np.clip(found.x, *_LIMITS_S).tolist())

@@ -1,4 +1,4 @@
-"""The model that an identification begins with, as numbers: mass, geometry, inertia, coefficients and motor."""
+"""Initial model of an identification, as numbers: mass, geometry, inertia, coefficients and motor."""
 
 from dataclasses import dataclass
 
@@ -15,9 +15,12 @@ class Coefficients:
     """Dimensionless coefficients about steady flight, per rad and per rad of rate x length / (2 V).
 
     Signs of the controls: trailing edge down, roll to the right, yaw to the left are positive.
-    drag_zero, drag_induced: CD = drag_zero + drag_induced (CL - lift_least_drag)^2 + drag_elevator elevator, CL of the
-        angle of attack alone.
-    lift_...: of lift.  side_...: of side force.  roll_..., pitch_..., yaw_...: of the moments.
+
+    drag_zero, drag_induced: CD = drag_zero + drag_induced (CL - lift_least_drag)^2 + drag_elevator elevator, with CL
+        from the angle of attack alone.
+    lift_...: lift.
+    side_...: side force.
+    roll_..., pitch_..., yaw_...: moments.
     """
 
     drag_zero: float
@@ -51,13 +54,15 @@ class Coefficients:
 
 @dataclass(frozen=True, slots=True)
 class BaseModel:
-    """The aircraft before its logs are read.
+    """The aircraft before its logs are used.
 
-    mass: kg.  area: m^2.  span, chord: m.
+    mass: kg.
+    area: m^2.
+    span, chord: m.
     inertia: (4,) Ixx, Iyy, Izz and Ixz (the integral of x z dm), kg m^2.
     servo_lag, motor_lag: first-order time constants, s.
-    reacts: whether the propeller's torque rolls it; a flying wing's elevons are rigged against that.
-    induced_factor: drag_induced of the coefficients by that of the aircraft it was scaled from.
+    reacts: True if the propeller's torque rolls it; a flying wing's elevons are rigged against that.
+    induced_factor: ratio of drag_induced to the value of the aircraft that it was scaled from.
     """
 
     mass: float

@@ -1,9 +1,9 @@
-"""Drag and thrust together, from the forward acceleration, and from the battery's current where it is logged.
+"""Estimate drag and thrust together, from forward acceleration and, if logged, the battery's current.
 
-Level flight alone tells only their difference; climbs, glides and other speeds tell more, and the current tells most.
-What else is not known about motor and accelerometer is estimated with them, within what it can be.  What of that is
-the aircraft's own (its motor's resistance, the battery's voltage) is then folded into the parameters: the model has no
-place for it, and without it would fly with another thrust than the one that was measured.
+Level flight alone shows only their difference; climbs, glides and other speeds show more, and the current shows most.
+Other uncertain properties of motor and accelerometer are estimated with them, within their ranges. Those that belong to
+the aircraft (its motor's resistance, the battery's voltage) are then folded into the parameters: the model has no place
+for them, and without them would fly with another thrust than the measured one.
 """
 
 from dataclasses import dataclass
@@ -19,9 +19,12 @@ from aircraft.identification.regression import Fit, fit_with_prior
 
 Floats = NDArray[np.float64]
 
-# Below which forces are compared, Hz, and of so many samples one.
-FORCE_BAND, FORCE_THINNING = 1.0, 10
-# Not known either, and estimated with drag and thrust, of which the log says little: (what, standard deviation).
+# Cutoff below which forces are compared, Hz.
+FORCE_BAND = 1.0
+# Of this many samples one is used.
+FORCE_THINNING = 10
+# Other uncertain quantities, which the log hardly informs, with standard deviations; they are estimated with drag and
+# thrust.
 NUISANCES = {
     "forward accelerometer, m/s2": 0.01,
     "resistance of the motor": 0.2,
@@ -31,27 +34,36 @@ NUISANCES = {
     "angle of attack": 1.0,
     "angle of attack by lift": 1.0,
 }
-# The last two count in standard deviations of `AlphaDoubt`.
+# The last two are in standard deviations of `AlphaDoubt`.
 
-# Of the aircraft, where the others are of its sensors.
-_OF_AIRCRAFT = np.array([name.split()[0] in ("resistance", "idle", "voltage", "drag") for name in NUISANCES])
-# Steps of the folding's search.
-_FOLDING_STEPS = 3
-# Where the battery's voltage is logged, it is known this much better.
-_LOGGED_VOLTAGE = 0.25
-# What no model gets right, m/s^2 and A, and over how long it stays the same, s: a climb, a glide, a level run.
-FORCE_FLOOR, _CURRENT_FLOOR, FLOOR_SECONDS = 0.015, 0.3, 25.0
-_OWN = np.array([parameter.group == "drag" for parameter in PARAMETERS])
-_STEP = 1e-3
-# Steps of a search at most, and how short the last is, as a share of the prior's standard deviations.
-_MAX_STEPS, _CLOSE = 12, 0.01
+# True for quantities of the aircraft, False for quantities of its sensors.
+_IS_OF_AIRCRAFT = np.array([name.split()[0] in ("resistance", "idle", "voltage", "drag") for name in NUISANCES])
+# Number of steps of the search for folded parameters.
+_MAX_FOLDING_STEPS = 3
+# Factor on the voltage's standard deviation if the battery's data are logged.
+_LOGGED_VOLTAGE_FACTOR = 0.25
+# Error of every model in the forward acceleration, m/s^2.
+FORCE_FLOOR = 0.015
+# Error of every model in the current, A.
+_CURRENT_FLOOR_A = 0.3
+# Time over which these errors stay the same, s: a climb, a glide, a level run.
+FLOOR_SECONDS = 25.0
+# Mask of the parameters of drag and motor.
+_IS_DRAG_PARAMETER = np.array([parameter.group == "drag" for parameter in PARAMETERS])
+# Step of the difference quotients.
+_DIFFERENCE_STEP = 1e-3
+# Largest number of steps of a search.
+_MAX_STEPS = 12
+# Largest last step of a search, in standard deviations of the prior.
+_MAX_LAST_STEP = 0.01
 
 
 @dataclass(frozen=True, slots=True)
 class AlphaDoubt:
-    """How sure the angle of attack of the lift curve is.
+    """Uncertainty of the angle of attack from the lift curve.
 
-    angle: standard deviation at a coefficient of lift, middle, rad.  by_lift: of its change by that coefficient, rad.
+    angle: standard deviation at a lift coefficient, ``middle``, rad.
+    by_lift: standard deviation of its change with that coefficient, rad.
     """
 
     angle: float = float(np.radians(0.3))
@@ -61,10 +73,12 @@ class AlphaDoubt:
 
 @dataclass(frozen=True, slots=True)
 class ForwardForces:
-    """Thinned signals, and what of the forward force each unknown makes.
+    """Thinned signals, and the part of the forward force from each unknown.
 
-    known: (n,) N, of lift.  tilts: (2, n) N, of a standard deviation of each doubt about the angle of attack.
-    drags: (2, n) N, of zero-lift and induced drag.  elevator: (n,) N, of its drag.
+    known: (n,) N, part of the lift.
+    tilts: (2, n) N, part of one standard deviation of each uncertainty of the angle of attack.
+    drags: (2, n) N, zero-lift and induced drag.
+    elevator: (n,) N, drag of the elevator.
     """
 
     signals: Signals
@@ -76,12 +90,15 @@ class ForwardForces:
     volts: Floats | float
 
     def predicted(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Forward acceleration (n,), m/s^2, and current (n,), A, low-passed; unknown: parameters, then nuisances."""
+        """Return forward acceleration (n,), m/s^2, and current (n,), A, low-passed.
+
+        unknown: parameters, then nuisances.
+        """
         force, current = self._raw(unknown)
         return self.signals.smooth(force, FORCE_BAND), self.signals.smooth(current, FORCE_BAND)
 
     def _raw(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Both as they are before the low-pass."""
+        """Return both before the low-pass."""
         zero_lift, induced, thrust, speed, torque, bias, resistance, idle, voltage, of_elevator, *tilts = unknown
         motor = self.base.motor.changed(thrust, speed, torque, 1.0 + resistance, 1.0 + idle)
         signals = self.signals
@@ -93,55 +110,56 @@ class ForwardForces:
         return force / self.base.mass + bias, current
 
     def slopes(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """(n, p) of both, by each of what is not known."""
-        steps = _STEP * np.eye(len(unknown))
-        # One low-pass of all columns: a call of it costs far more than a column.
+        """Return the derivatives (n, p) of both by each unknown."""
+        steps = _DIFFERENCE_STEP * np.eye(len(unknown))
+        # One low-pass of all columns: a call costs far more than a column.
         forces, currents = zip(*(self._raw(unknown + step) for step in (0.0 * steps[0], *steps)), strict=True)
         force, current = (self.signals.smooth(np.column_stack(one), FORCE_BAND) for one in (forces, currents))
-        return (force[:, 1:] - force[:, :1]) / _STEP, (current[:, 1:] - current[:, :1]) / _STEP
+        return (force[:, 1:] - force[:, :1]) / _DIFFERENCE_STEP, (current[:, 1:] - current[:, :1]) / _DIFFERENCE_STEP
 
 
 def fit_drag(
     signals: Signals, base: BaseModel, values: Floats, flow: Flow, doubt: AlphaDoubt | None = None
 ) -> tuple[Fit, Floats, Floats]:
-    """Fit, values (5,) of the parameters of drag and motor, and their covariance (5, 5).
+    """Fit drag and motor: the fit, values (5,) of the parameters, and their covariance (5, 5).
 
-    The values are those with which the base's own resistance, idle current, voltage and drag of the elevator make the
-    same forces and currents as the fit does with what it found for those.
+    The values give the same forces and currents with the base's own resistance, idle current, voltage and elevator drag
+    as the fit does with its own.
 
-    values: (n,) of all parameters, of which those of lift count.  doubt: about the lift curve.
+    values: (n,) of all parameters, of which the parameters of lift are used.
+    doubt: uncertainty of the lift curve.
     """
     forces = forward_forces(signals, base, values, flow, AlphaDoubt() if doubt is None else doubt)
     thin = forces.signals
     with_current = bool(np.isfinite(thin.current).all())
     means, sds = drag_priors(with_current=with_current)
-    # From the forces alone to the two together: with the current at once the first steps lead astray.
-    fit = _search(forces, _Goal(thin, with_current=False), means, sds)
+    # First the forces alone, then both: with the current from the start the first steps would diverge.
+    fit = _search(forces, _Measurement(thin, with_current=False), means, sds)
     if with_current:
-        fit = _search(forces, _Goal(thin, with_current=True), means, sds, fit.estimate)
+        fit = _search(forces, _Measurement(thin, with_current=True), means, sds, fit.estimate)
     force, _ = forces.predicted(fit.estimate)
     goal = thin.smooth(thin.acceleration[:, 0], FORCE_BAND)
     explained = 1.0 - float((goal - force).var() / goal.var())
-    five, turn = _folded(forces, fit.estimate)
+    five, turn = _fold_nuisances(forces, fit.estimate)
     return Fit(fit.estimate, fit.covariance, force, goal - force, explained), five, turn @ fit.covariance @ turn.T
 
 
 def drag_priors(*, with_current: bool) -> tuple[Floats, Floats]:
-    """Means and standard deviations (p,) of the parameters of drag and motor, and of `NUISANCES` behind them."""
+    """Return means and standard deviations (p,) of the parameters of drag and motor, then of `NUISANCES`."""
     nuisances = np.array(list(NUISANCES.values()))
-    nuisances[list(NUISANCES).index("voltage of the battery")] *= _LOGGED_VOLTAGE if with_current else 1.0
-    means = np.concatenate([prior_means()[_OWN], np.zeros(len(nuisances))])
-    return means, np.concatenate([prior_sds()[_OWN], nuisances])
+    nuisances[list(NUISANCES).index("voltage of the battery")] *= _LOGGED_VOLTAGE_FACTOR if with_current else 1.0
+    means = np.concatenate([prior_means()[_IS_DRAG_PARAMETER], np.zeros(len(nuisances))])
+    return means, np.concatenate([prior_sds()[_IS_DRAG_PARAMETER], nuisances])
 
 
-def _folded(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Floats]:
-    """Parameters (5,) that do alone what they and the aircraft's nuisances do together, and their slopes (5, p).
+def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Floats]:
+    """Fold the aircraft's nuisances into the parameters: return their values (5,) and derivatives (5, p).
 
-    Least squares over the log's own flow and throttle.  unknown: (p,) as fitted.
+    Least squares over the log's own flow and throttle. unknown: (p,) as fitted.
     """
-    own = int(_OWN.sum())
-    folded = own + np.flatnonzero(_OF_AIRCRAFT)
-    scale = FORCE_FLOOR / _CURRENT_FLOOR
+    own = int(_IS_DRAG_PARAMETER.sum())
+    folded = own + np.flatnonzero(_IS_OF_AIRCRAFT)
+    scale = FORCE_FLOOR / _CURRENT_FLOOR_A
 
     def joined(force: Floats, current: Floats) -> Floats:
         return np.concatenate([force, scale * current])
@@ -149,7 +167,7 @@ def _folded(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Floats]:
     goal = joined(*forces.predicted(unknown))
     alone = unknown.copy()
     alone[folded] = 0.0
-    for _ in range(_FOLDING_STEPS):
+    for _ in range(_MAX_FOLDING_STEPS):
         columns = joined(*forces.slopes(alone))
         left = goal - joined(*forces.predicted(alone))
         alone[:own] += np.linalg.lstsq(columns[:, :own], left, rcond=None)[0]
@@ -159,8 +177,8 @@ def _folded(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Floats]:
     return alone[:own], turn
 
 
-class _Goal:
-    """What is measured: forward acceleration and, with the current, that; (n,) low-passed."""
+class _Measurement:
+    """Measured forward acceleration and, with the current, the current, (n,), low-passed."""
 
     def __init__(self, signals: Signals, *, with_current: bool) -> None:
         self.force = signals.smooth(signals.acceleration[:, 0], FORCE_BAND)
@@ -168,8 +186,8 @@ class _Goal:
         self.block, self.floor = signals.block, FORCE_FLOOR**2 * FLOOR_SECONDS * signals.hertz
 
 
-def _search(forces: ForwardForces, goal: _Goal, means: Floats, sds: Floats, start: Floats | None = None) -> Fit:
-    """Steps of Gauss and Newton from a start, none longer than a standard deviation of the prior."""
+def _search(forces: ForwardForces, goal: _Measurement, means: Floats, sds: Floats, start: Floats | None = None) -> Fit:
+    """Fit by Gauss-Newton steps from a start, each at most one standard deviation of the prior."""
     now = means.copy() if start is None else start.copy()
     for _ in range(_MAX_STEPS):
         force, current = forces.predicted(now)
@@ -177,8 +195,8 @@ def _search(forces: ForwardForces, goal: _Goal, means: Floats, sds: Floats, star
         left, blocks = goal.force - force, goal.block
         goals = left + rows @ now
         if goal.current is not None:
-            # Both count by the scatter of their residuals.
-            off = max(_CURRENT_FLOOR, float((goal.current - current).std()))
+            # Weight both by the scatter of their residuals.
+            off = max(_CURRENT_FLOOR_A, float((goal.current - current).std()))
             scale = max(FORCE_FLOOR, float(left.std())) / off
             rows = np.vstack([rows, scale * second])
             goals = np.concatenate([goals, scale * (goal.current - current + second @ now)])
@@ -186,13 +204,16 @@ def _search(forces: ForwardForces, goal: _Goal, means: Floats, sds: Floats, star
         fit = fit_with_prior(rows, goals, means, sds, blocks, goal.floor)
         step = np.clip(fit.estimate - now, -sds, sds)
         now = now + step
-        if np.abs(step / sds).max() < _CLOSE:
+        if np.abs(step / sds).max() < _MAX_LAST_STEP:
             break
     return Fit(now, fit.covariance, fit.predicted, fit.residual, fit.explained)
 
 
 def forward_forces(signals: Signals, base: BaseModel, values: Floats, flow: Flow, doubt: AlphaDoubt) -> ForwardForces:
-    """What each unknown makes of the forward force, over the thinned signals; values, doubt: as of `fit_drag`."""
+    """Return the part of the forward force from each unknown over the thinned signals.
+
+    values, doubt: see `fit_drag`.
+    """
     c, (slope, zero) = base.coefficients, lift_curve(base, values)
     thin = signals.thinned(FORCE_THINNING, {"alpha": flow.alpha})
     alpha, pressure = thin.extra["alpha"], pressure_of(thin, base)

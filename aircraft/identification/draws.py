@@ -1,4 +1,4 @@
-"""Whole aircraft drawn from an estimate: parameters together, correlated as they are."""
+"""Draw whole aircraft from an estimate, with the correlations of their parameters."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,17 +8,22 @@ from aircraft.identification.parameters import PARAMETERS
 
 Floats = NDArray[np.float64]
 
-COUNT, SEED = 512, 1
-# Draws tried for one that is within the bounds.
-_TRIES = 20
+# Number of draws.
+COUNT = 512
+# Seed of the draws.
+SEED = 1
+# Draws per aircraft that is kept, of which those within the bounds are used.
+_DRAWS_PER_AIRCRAFT = 20
 
 
 def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
-    """(count, n) joint draws of `aircraft.identification.parameters.PARAMETERS`, within their bounds."""
+    """Return joint draws (count, n) of `aircraft.identification.parameters.PARAMETERS` in their bounds."""
     generator = np.random.default_rng(seed)
     low, high = np.array([parameter.bounds for parameter in PARAMETERS]).T
-    many = generator.multivariate_normal(estimate.values, estimate.covariance, _TRIES * count, method="eigh")
+    many = generator.multivariate_normal(
+        estimate.values, estimate.covariance, _DRAWS_PER_AIRCRAFT * count, method="eigh"
+    )
     inside = many[((many >= low) & (many <= high)).all(axis=1)]
-    # Of an estimate close to its bounds too few are within: the rest is held at them.
+    # For an estimate close to its bounds too few draws are within: clip the rest.
     made = np.concatenate([inside, np.clip(many, low, high)])[:count]
     return np.asarray(made)

@@ -1,7 +1,7 @@
-"""An electric motor with a fixed propeller: thrust and current at an airspeed, a throttle and a density.
+"""Electric motor with a fixed propeller: thrust and current by airspeed, throttle and density.
 
 Beard and McLain, Small Unmanned Aircraft, second edition, section 4.3: the motor's torque KQ ((V_in - KV w) / R - i0)
-equals the propeller's q2 w^2 + q1 w + q0.  A motor that does not brake windmills at zero current.
+equals the propeller's torque q2 w^2 + q1 w + q0. A motor that does not brake windmills at zero current.
 """
 
 from dataclasses import dataclass, replace
@@ -16,11 +16,13 @@ Floats = NDArray[np.float64]
 class ElectricMotor:
     """Constants of a motor and its propeller, SI.
 
-    torque: (3,) of rho w^2, rho V w and rho V^2 in the propeller's torque.
-    thrust: (3,) of the same in its thrust.
+    torque: (3,) coefficients of rho w^2, rho V w and rho V^2 in the propeller's torque.
+    thrust: (3,) coefficients of the same terms in its thrust.
     back_voltage: KV, V s/rad, which is also the torque constant KQ.
-    resistance: ohm.  idle_current: i0, A.  voltage: of the battery, V.
-    windmill: share of the formula's thrust that counts where it is below zero.
+    resistance: ohm.
+    idle_current: i0, A.
+    voltage: battery voltage, V.
+    windmill: fraction of the formula's thrust that is applied below zero.
     """
 
     torque: tuple[float, float, float]
@@ -34,7 +36,10 @@ class ElectricMotor:
     def changed(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> "ElectricMotor":
-        """With factors on thrust, motor speed per volt, the propeller's torque, resistance and idle current."""
+        """Return a motor with factors on thrust, speed per volt, torque, resistance and idle current.
+
+        torque: factor on the propeller's torque.
+        """
         return replace(
             self,
             thrust=_times(thrust, self.thrust),
@@ -45,7 +50,7 @@ class ElectricMotor:
         )
 
     def for_voltage(self, volts: float) -> "ElectricMotor":
-        """A motor wound for another voltage: the same torque and power at the same speed."""
+        """Return a motor wound for another voltage, with the same torque and power at the same speed."""
         ratio = volts / self.voltage
         return replace(
             self, voltage=volts, back_voltage=self.back_voltage * ratio, resistance=self.resistance * ratio * ratio,
@@ -53,7 +58,11 @@ class ElectricMotor:
         )  # fmt: skip
 
     def speed(self, airspeed: Floats, throttle: Floats, density: Floats, voltage: Floats | float) -> Floats:
-        """Speed of the propeller (n,), rad/s; throttle 0..1, voltage of the battery, V."""
+        """Return the propeller speed (n,), rad/s.
+
+        throttle: 0..1.
+        voltage: battery voltage, V.
+        """
         q2, q1, q0 = self._torques(airspeed, density)
         kv = self.back_voltage
         driving = kv * voltage * throttle / self.resistance
@@ -64,7 +73,7 @@ class ElectricMotor:
     def thrust_and_current(
         self, airspeed: Floats, throttle: Floats, density: Floats, voltage: Floats | float | None = None
     ) -> tuple[Floats, Floats]:
-        """Thrust (n,), N, and current from the battery (n,), A.
+        """Return thrust (n,), N, and current from the battery (n,), A.
 
         >>> motor = ElectricMotor((4.48e-6, 5.27e-5, -2.18e-3), (1.58e-4, -1.26e-3, -2.78e-2), 0.0659, 0.042, 1.5, 44.4)
         >>> still, full, sea = np.zeros(1), np.ones(1), np.full(1, 1.225)
@@ -81,7 +90,7 @@ class ElectricMotor:
         return thrust, throttle * current
 
     def reaction(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
-        """Torque of the propeller (n,), N m, whose reaction rolls the aircraft left."""
+        """Return the propeller's torque (n,), N m, whose reaction rolls the aircraft left."""
         speed = self.speed(airspeed, throttle, density, self.voltage)
         q2, q1, q0 = self._torques(airspeed, density)
         return np.asarray(q2 * speed * speed + q1 * speed + q0)
@@ -96,5 +105,5 @@ def _times(factor: float, three: tuple[float, float, float]) -> tuple[float, flo
 
 
 def _larger_root(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Of a x^2 + b x + c = 0; where there is none, where the parabola is lowest."""
+    """Return the larger root of a x^2 + b x + c = 0, or the minimum's position if there is none."""
     return np.asarray((np.sqrt(np.maximum(0.0, b * b - 4.0 * a * c)) - b) / (2.0 * a))

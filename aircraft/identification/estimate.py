@@ -1,12 +1,12 @@
-"""The estimate: lift curve, drag with thrust, and the moments, one after the other, with what is not known of each.
+"""Estimate lift curve, drag with thrust, and moments one after the other, each with its uncertainty.
 
-The order matters.  The wind triangle gives the airspeed its scale.  The accelerometer is the vane: lift over the lift
-curve's slope is the angle of attack, gusts included, and sideslip is side force likewise.  The lift curve itself comes
-from frequencies at which the aircraft heaves with the gusts; drag and thrust come from the forward acceleration, the
-moments from the gyros' changes.
+The order matters. The wind triangle gives the airspeed its scale. The accelerometer is the vane: lift over the lift
+curve's slope is the angle of attack, gusts included, and side force gives the sideslip likewise. The lift curve itself
+comes from frequencies at which the aircraft heaves with the gusts; drag and thrust come from the forward acceleration,
+the moments from the gyros' rates of change.
 
-What is held fixed and is not known either (`aircraft.identification.held_fixed`) is changed by its standard deviation,
-one after the other, and everything estimated anew: these shifts are part of the covariance.
+Uncertain quantities that are held fixed (`aircraft.identification.held_fixed`) are changed by their standard deviation
+one after the other, and the estimate is repeated: these shifts are part of the covariance.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,17 +30,17 @@ from aircraft.identification.regression import Fit, correlation_samples
 
 Floats = NDArray[np.float64]
 
-# As much of a log as its clocks are found by, s.
+# Length of a log's part that is used to align its clocks, s.
 ALIGNED_SECONDS = 200.0
-# Rounds of lift curve and drag, each with the angle of attack of the last.
-_ROUNDS = 2
-# Share of an interval below which the logs say next to nothing of a parameter.
+# Number of passes over lift curve and drag, each with the angle of attack of the pass before.
+_PASSES = 2
+# Fraction of an interval's variance below which the logs hardly inform a parameter.
 SILENT = 0.2
-# An axis whose fit explains less of what is measured keeps its prior.
+# Smallest R^2 of an axis; an axis with less keeps its prior.
 MIN_EXPLAINED = 0.6
-# How much wider than computed the interval of a fast motion is.
+# Factor by which the interval of a fast motion is wider than computed.
 FAST_WIDENING = 2.0
-# Title, unit and samples a second of each equation.
+# Title, unit and samples per second of each equation.
 _EQUATIONS: Mapping[Group, tuple[str, str, float]] = {
     "lift": ("angle of attack", "rad", GRID_HZ),
     "drag": ("forward acceleration", "m/s2", GRID_HZ / FORCE_THINNING),
@@ -54,9 +54,12 @@ _EQUATIONS: Mapping[Group, tuple[str, str, float]] = {
 class Equation:
     """One equation of motion as it was fitted.
 
-    name: for people.  unit: of both.  hertz: samples a second.
-    measured, predicted: (n,), low-passed, all stretches behind each other.
-    explained: R^2.  correlation: s over which residuals are autocorrelated.
+    name: title for people.
+    unit: unit of measured and predicted values.
+    hertz: samples per second.
+    measured, predicted: (n,), low-passed, all stretches in sequence.
+    explained: R^2.
+    correlation: time over which residuals are autocorrelated, s.
     """
 
     name: str
@@ -70,15 +73,17 @@ class Equation:
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What logs say of an aircraft.
+    """Estimate of an aircraft's parameters from its logs.
 
-    values: (n,) of `PARAMETERS`.  covariance: (n, n).
-    clocks: of each stretch.  equations: as fitted.
-    shifts: by what is held fixed, (n,): how far the estimate moves with one standard deviation of it.
-    with_current: whether the battery's current was used.
-    dynamics: whether the moments were estimated; their parameters are the prior's otherwise.
-    airspeed: true by measured, of the wind triangle, and its standard deviation.
-    seconds: of flight that were used.
+    values: (n,) of `PARAMETERS`.
+    covariance: (n, n).
+    clocks: clocks of each stretch.
+    equations: the fitted equations.
+    shifts: change (n,) of the estimate for one standard deviation of each quantity that is held fixed.
+    with_current: True if the battery's current was used.
+    dynamics: True if the moments were estimated; their parameters are the prior's otherwise.
+    airspeed: ratio of true to measured airspeed from the wind triangle, and its standard deviation.
+    seconds: length of the flight that was used.
     """
 
     values: Floats
@@ -93,11 +98,11 @@ class Estimate:
 
     @property
     def sds(self) -> Floats:
-        """(n,) standard deviations."""
+        """Standard deviations (n,)."""
         return np.sqrt(np.diag(self.covariance))
 
     def silent(self) -> tuple[str, ...]:
-        """What the logs say next to nothing of, a line each with the manoeuvre that would show it."""
+        """Return the parameters that the logs hardly inform, one line each with the maneuver that would."""
         shares = self.of_log().tolist()
         return tuple(
             f"{parameter.title}: stays the prior's; fly {parameter.show}"
@@ -106,14 +111,17 @@ class Estimate:
         )
 
     def of_log(self) -> Floats:
-        """(n,) share of each interval that is the log's: 1 less the variance that is left of the prior's."""
+        """Return the fraction (n,) of each interval that comes from the logs.
+
+        It is 1 minus the ratio of the remaining variance to the prior's variance.
+        """
         return np.clip(1.0 - np.square(self.sds / prior_sds()), 0.0, 1.0)
 
 
 def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics: bool = True) -> Estimate:
     """Estimate all parameters from stretches of flight.
 
-    dynamics: the moments, too; otherwise lift, drag and thrust alone, for logs that are too slow for the rest.
+    dynamics: True to include the moments; otherwise only lift, drag and thrust, for logs too slow for the rest.
     """
     slow = Clocks(servo_lag=base.servo_lag)
     clocks = align_clocks(records, base) if dynamics else tuple(slow for _ in records)
@@ -125,7 +133,7 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
             changed, model = held.change(signals, base)
             other = fit_all(changed, model, level=held.tilt(changed), dynamics=dynamics)
             shifts[held.name] = other.values - nominal.values
-            hidden += _hidden_by_noise(nominal, other) if held.name == NOISE else 0.0
+            hidden += _noise_bias(nominal, other) if held.name == NOISE else 0.0
     shifts |= _lift_shifts(signals, base, nominal)
     return replace(
         nominal,
@@ -138,11 +146,12 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
     )
 
 
-def _hidden_by_noise(nominal: Estimate, noisier: Estimate) -> Floats:
-    """(n,) by how much the noise that there is draws the moments' parameters away: as far as as much again does.
+def _noise_bias(nominal: Estimate, noisier: Estimate) -> Floats:
+    """Return the bias (n,) of the moments' parameters by sensor noise.
 
-    Noise in a regressor flattens its slope (Cook and Stefanski 1994, with the straight line of their extrapolants).  An
-    axis that the noise leaves to the prior tells nothing.
+    It equals the effect of adding as much noise again. Noise in a regressor flattens its slope (Cook and Stefanski
+    1994, with the straight line of their extrapolants). An axis that keeps its prior under noise gives no estimate of
+    the bias.
     """
     made = np.zeros(len(PARAMETERS))
     explained = {one.name: one.explained for one in noisier.equations}
@@ -154,13 +163,15 @@ def _hidden_by_noise(nominal: Estimate, noisier: Estimate) -> Floats:
 
 
 def aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], base: BaseModel) -> Signals:
-    """All stretches on the clocks of their accelerometers, levelled, with the airspeed of the wind triangle."""
+    """Return all stretches on the clocks of their accelerometers, leveled, with wind-triangle airspeed."""
     signals = levelled(align(records, clocks, base.motor_lag))
     return with_airspeed_scale(signals, vane(signals, base, prior_means()))
 
 
 def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
-    """The covariance (n, n) of fits and shifts (n,) together, the fast motions' wider, none wider than the prior.
+    """Return the covariance (n, n) of fits and shifts (n,).
+
+    It is wider for fast motions, and never wider than the prior.
 
     >>> side = np.zeros(len(PARAMETERS))
     >>> side[0] = 0.04
@@ -171,13 +182,13 @@ def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
     covariance = fitted + sum(np.outer(shift, shift) for shift in shifts.values())
     widening = np.array([FAST_WIDENING if parameter.fast else 1.0 for parameter in PARAMETERS])
     sds = np.sqrt(np.diag(covariance)) * widening
-    # Correlations stay where an interval is cut to the prior's.
+    # Correlations stay where an interval is clipped to the prior's interval.
     factor = widening * np.minimum(1.0, prior_sds() / sds)
     return np.asarray(covariance * np.outer(factor, factor))
 
 
 def align_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Clocks, ...]:
-    """The clocks of the stretches, those of one log together: by `ALIGNED_SECONDS` of its longest stretch."""
+    """Find the clocks of the stretches, common to one log, by `ALIGNED_SECONDS` of its longest stretch."""
     found: dict[str, Clocks] = {}
     for source in {record.source: None for record in records}:
         longest = max((record for record in records if record.source == source), key=lambda record: record.seconds)
@@ -186,19 +197,19 @@ def align_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Cloc
         def misfit(clock: Clocks, part: FlightRecord = part) -> float:
             signals = align([part], [clock], base.motor_lag)
             alpha, beta, _ = vane(signals, base, prior_means())
-            # The clocks are to fit, not the prior.
+            # The clocks are to fit the data, not the prior.
             fits = fit_moments(signals, base, alpha, beta, spread=10.0)
-            return sum(_left(fits[axis], clock.lag) for axis in AXES)
+            return sum(_log_unexplained(fits[axis], clock.lag) for axis in AXES)
 
         found[source] = find_clocks(misfit)
     return tuple(found[record.source] for record in records)
 
 
-def _left(fit: Fit, lag: float) -> float:
-    """Logarithm of the share that a fit leaves unexplained of moments that were made late by a lag, s.
+def _log_unexplained(fit: Fit, lag: float) -> float:
+    """Return the logarithm of the fraction of moments that a fit leaves unexplained, before a lag, s.
 
-    The lag smooths: what is fast and explained badly goes away with it, and the longest would always seem best.  So
-    both are taken as they were before it.
+    The lag smooths: fast and badly explained motion vanishes with it, and the longest lag would always seem best.
+    Therefore both are taken as they were before the lag.
     """
     hertz = GRID_HZ / MOMENT_THINNING
     left, all_of_it = (led(values, lag, hertz) for values in (fit.residual, fit.predicted + fit.residual))
@@ -208,9 +219,10 @@ def _left(fit: Fit, lag: float) -> float:
 def fit_all(
     signals: Signals, base: BaseModel, lift: Floats | None = None, level: float = 0.0, *, dynamics: bool = True
 ) -> Estimate:
-    """Estimate all parameters from aligned signals, everything else held where it is; without shifts.
+    """Estimate all parameters from aligned signals, with all else held fixed, without shifts.
 
-    lift: (2,) values of its slope and offset that are held, too.  level: by which the autopilot's is off, rad.
+    lift: (2,) values of slope and offset of the lift curve to hold fixed too.
+    level: error of the autopilot's level, rad.
     """
     values, covariance = prior_means(), np.diag(np.square(prior_sds()))
     fits: dict[Group, Fit] = {}
@@ -224,7 +236,7 @@ def fit_all(
 
     if lift is not None:
         take("lift", lift, np.zeros((2, 2)))
-    for _ in range(_ROUNDS):
+    for _ in range(_PASSES):
         flow = vane(signals, base, values)
         if lift is None:
             fits["lift"], curve, spread = fit_lift(signals, base, flow.lift, level)
@@ -237,7 +249,7 @@ def fit_all(
     for axis, fit in moments.items():
         fits[axis] = fit
         if fit.explained < MIN_EXPLAINED:
-            # Sensors too noisy, or a structure that the model lacks: the prior stays.
+            # Sensors are too noisy, or the model lacks a structure: keep the prior.
             continue
         count = sum(parameter.group == axis for parameter in PARAMETERS)
         take(axis, fit.estimate[:count], fit.covariance[:count, :count])
@@ -247,19 +259,22 @@ def fit_all(
 
 
 def alpha_doubt(fit: Fit, lift: Floats) -> AlphaDoubt:
-    """What a fit of the lift curve leaves unknown of the angle of attack, and the autopilot's level with it."""
+    """Return the uncertainty of the angle of attack from a fit of the lift curve and from the level."""
     by_lift, angle = np.sqrt(np.diag(fit.covariance)).tolist()
     return AlphaDoubt(float(np.hypot(angle, LEVEL_SD)), by_lift, float(lift.mean()))
 
 
 def _equation(group: Group, fit: Fit) -> Equation:
     title, unit, hertz = _EQUATIONS[group]
-    together = correlation_samples(fit.residual) / hertz
-    return Equation(title, unit, hertz, fit.predicted + fit.residual, fit.predicted, fit.explained, together)
+    correlation = correlation_samples(fit.residual) / hertz
+    return Equation(title, unit, hertz, fit.predicted + fit.residual, fit.predicted, fit.explained, correlation)
 
 
 def _lift_shifts(signals: Signals, base: BaseModel, nominal: Estimate) -> dict[str, Floats]:
-    """How the rest moves with the lift curve, along the two axes of its own uncertainty, which counts already."""
+    """Return the shifts of the other parameters with the lift curve.
+
+    They are along the two principal axes of the lift curve's uncertainty. That uncertainty itself is already included.
+    """
     sizes, axes = np.linalg.eigh(nominal.covariance[:2, :2])
     made = {}
     for k in range(2):

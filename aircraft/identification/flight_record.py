@@ -1,4 +1,4 @@
-"""What an identification reads: the sensors and controls of one flight, on one clock and one grid of times."""
+"""Input of an identification: sensors and controls of one flight, on one clock and one time grid."""
 
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -9,27 +9,27 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# Samples a second of the grid.
+# Samples per second of the grid.
 GRID_HZ = 50.0
 
 
 @dataclass(frozen=True, slots=True)
 class FlightRecord:
-    """One stretch of flight without a gap, as its log has it: nothing is shifted yet.  SI and radians.
+    """One stretch of flight without a gap, as logged: nothing is shifted yet. SI and radians.
 
-    time: (n,) s, `GRID_HZ` a second.
-    acceleration: (n, 3) specific force that the accelerometers read, body axes forward, right, down, m/s^2.
+    time: (n,) s, `GRID_HZ` samples per second.
+    acceleration: (n, 3) specific force of the accelerometers, body axes forward, right, down, m/s^2.
     rates: (n, 3) p, q, r of the gyros, rad/s.
     attitude: (n, 3) roll, pitch, yaw, rad.
     velocity: (n, 3) north, east, down over the ground, m/s.
-    wind: (n, 2) north, east, the way the air moves, as the autopilot estimates it, m/s.
+    wind: (n, 2) north, east, direction of air motion, as the autopilot estimates it, m/s.
     airspeed: (n,) true, m/s.
     density: (n,) kg/m^3.
-    height: (n,) m above sea level.
+    height: (n,) m AMSL.
     controls: (n, 4) elevator, aileron, rudder (rad, positive as in the model) and throttle (0..1) as commanded.
-    current: (n,) A from the battery; NaN of a log without.
-    voltage: (n,) V of the battery; NaN of a log without.
-    source: the log, for people.
+    current: (n,) A from the battery; NaN for a log without it.
+    voltage: (n,) V of the battery; NaN for a log without it.
+    source: name of the log for people.
     """
 
     time: Floats
@@ -48,11 +48,11 @@ class FlightRecord:
 
     @property
     def seconds(self) -> float:
-        """Its length, s."""
+        """Length of the stretch, s."""
         return len(self.time) / GRID_HZ
 
     def part(self, seconds: float) -> "FlightRecord":
-        """Its middle, at most so long."""
+        """Return the central part, at most ``seconds`` long."""
         rows = round(seconds * GRID_HZ)
         first = max(0, (len(self.time) - rows) // 2)
         cut = {one.name: getattr(self, one.name)[first : first + rows] for one in fields(self) if one.name != "source"}
@@ -60,22 +60,24 @@ class FlightRecord:
 
     @property
     def has_current(self) -> bool:
-        """Whether the battery's current is known throughout."""
+        """True if the battery's current is known throughout."""
         return bool(np.isfinite(self.current).all())
 
 
 @cache
 def _sections(cutoff: float, hertz: float) -> Floats:
-    # Imported here, and in its neighbours: scipy is in an extra, without which `planfly` still has this module's names.
+    # Imported here, as in the neighboring modules: scipy is an extra, without which `planfly` still has this module's
+    # names.
     from scipy.signal import butter
 
     return np.asarray(butter(2, cutoff, fs=hertz, output="sos"))
 
 
 def low_pass(values: Floats, cutoff: float, hertz: float = GRID_HZ) -> Floats:
-    """Smooth (n,) or (n, k) forwards and backwards, so that nothing is delayed.
+    """Smooth (n,) or (n, k) forwards and backwards, without delay.
 
-    cutoff: Hz, of a Butterworth filter of the second order.  hertz: samples a second.
+    cutoff: Hz, of a second-order Butterworth filter.
+    hertz: samples per second.
 
     >>> steady = low_pass(np.full(200, 3.0), 0.5)
     >>> bool(np.allclose(steady, 3.0))
@@ -84,13 +86,13 @@ def low_pass(values: Floats, cutoff: float, hertz: float = GRID_HZ) -> Floats:
     from scipy.signal import sosfiltfilt
 
     sections = _sections(cutoff, hertz)
-    # The ends are mirrored over one period of the cutoff, or what there is.
+    # The ends are mirrored over one period of the cutoff, or over the available samples.
     length = min(len(values) - 1, round(hertz / cutoff))
     return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=length))
 
 
 def shifted(values: Floats, delay: float) -> Floats:
-    """Delay (n,) or (n, k) by s seconds, between samples by a straight line; negative takes it earlier.
+    """Delay (n,) or (n, k) by ``delay`` seconds with linear interpolation; a negative delay advances.
 
     >>> shifted(np.arange(5.0), 0.02)
     array([0., 0., 1., 2., 3.])
@@ -104,7 +106,9 @@ def shifted(values: Floats, delay: float) -> Floats:
 
 
 def lagged(values: Floats, time_constant: float) -> Floats:
-    """(n,) or (n, k) behind a first-order lag with this time constant, s; exact for values held over a sample.
+    """Return (n,) or (n, k) after a first-order lag with this time constant, s.
+
+    It is exact for values held over a sample.
 
     >>> lagged(np.array([0.0, 1.0, 1.0]), 0.0)
     array([0., 1., 1.])
@@ -123,5 +127,5 @@ def lagged(values: Floats, time_constant: float) -> Floats:
 
 
 def derivative(values: Floats) -> Floats:
-    """Rate of change of (n,) or (n, k), a second, by central differences."""
+    """Return the rate of change of (n,) or (n, k) per second, by central differences."""
     return np.asarray(np.gradient(values, 1.0 / GRID_HZ, axis=0))

@@ -1,7 +1,7 @@
 """Angle of attack and sideslip without vanes: from the accelerometers, and from attitude and velocity.
 
-Lift over its curve's slope is the angle of attack, whatever gusts there are; side force is sideslip likewise.  Attitude
-and velocity give the angle of attack in air without a vertical part, which holds at low frequencies alone.
+Lift over the lift curve's slope is the angle of attack, gusts included; side force gives the sideslip likewise.
+Attitude and velocity give the angle of attack in air without vertical motion, which is valid only at low frequencies.
 """
 
 from typing import NamedTuple
@@ -16,12 +16,12 @@ from aircraft.identification.parameters import INDEX
 
 Floats = NDArray[np.float64]
 
-# The vane is smoothed below this, Hz.
+# Cutoff of the vane, Hz.
 VANE_BAND = 8.0
 
 
 class Flow(NamedTuple):
-    """Angle of attack and sideslip, rad, and the coefficient of lift of the angle of attack alone, (n,) each."""
+    """Angle of attack and sideslip, rad, and lift coefficient from the angle of attack alone, (n,) each."""
 
     alpha: Floats
     beta: Floats
@@ -29,38 +29,41 @@ class Flow(NamedTuple):
 
 
 def lift_curve(base: BaseModel, values: Floats) -> tuple[float, float]:
-    """Slope (per rad) and coefficient at zero, of values (n,) of `aircraft.identification.parameters.PARAMETERS`."""
+    """Return slope (per rad) and value at zero of the lift coefficient.
+
+    values: (n,) of `aircraft.identification.parameters.PARAMETERS`.
+    """
     c = base.coefficients
     return c.lift_alpha * float(values[INDEX["lift-slope"]]), c.lift_zero + float(values[INDEX["lift-offset"]])
 
 
 def motor_of(base: BaseModel, values: Floats) -> Motor:
-    """The motor with one set of values (n,)."""
+    """Return the motor with one set of values (n,)."""
     thrust, speed, torque = (float(values[INDEX[name]]) for name in ("thrust", "motor-speed", "propeller-torque"))
     return base.motor.changed(thrust, speed, torque)
 
 
 def voltage_of(signals: Signals, base: BaseModel) -> Floats | float:
-    """Of the battery, V: as logged, or the base's."""
+    """Return the battery's voltage, V: the logged voltage, or the base model's voltage."""
     return signals.voltage if np.isfinite(signals.voltage).all() else base.motor.voltage
 
 
 def pressure_of(signals: Signals, base: BaseModel) -> Floats:
-    """Dynamic pressure times wing area (n,), N."""
+    """Return dynamic pressure times wing area (n,), N."""
     return np.asarray(0.5 * signals.density * np.square(signals.airspeed) * base.area)
 
 
 def other_lift(signals: Signals, base: BaseModel) -> Floats:
-    """Coefficient of lift (n,) of pitch rate and elevator, which are held as the base has them."""
+    """Return the lift coefficient (n,) of pitch rate and elevator, which are held at the base's values."""
     c = base.coefficients
     pitching = signals.rates[:, 1] * base.chord / (2.0 * signals.airspeed)
     return np.asarray(c.lift_rate * pitching + c.lift_elevator * signals.surfaces[:, 0])
 
 
 def vane(signals: Signals, base: BaseModel, values: Floats) -> Flow:
-    """The flow that the accelerometers tell of.
+    """Return the flow according to the accelerometers.
 
-    values: (n,) of `aircraft.identification.parameters.PARAMETERS`, of which those of lift and motor count.
+    values: (n,) of `aircraft.identification.parameters.PARAMETERS`, of which the parameters of lift and motor are used.
     """
     c, (slope, zero) = base.coefficients, lift_curve(base, values)
     pressure, other = pressure_of(signals, base), other_lift(signals, base)
@@ -82,9 +85,9 @@ def vane(signals: Signals, base: BaseModel, values: Floats) -> Flow:
 
 
 def attitude_alpha(signals: Signals, level: float = 0.0) -> Floats:
-    """Angle of attack (n,), rad, of attitude, velocity over the ground and the estimated wind, which is level.
+    """Return the angle of attack (n,), rad, from attitude, ground velocity and estimated horizontal wind.
 
-    level: by how much the autopilot's level is above the model's, rad.
+    level: angle of the autopilot's level above the model's level, rad.
     """
     roll, pitch, yaw = signals.attitude.T
     pitch = pitch + level

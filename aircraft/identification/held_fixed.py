@@ -1,4 +1,4 @@
-"""What an identification holds fixed and does not know: each with the standard deviation by which it is changed."""
+"""Uncertain quantities that an identification holds fixed, with their standard deviations."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -11,18 +11,19 @@ from aircraft.identification.base_model import BaseModel
 from aircraft.identification.flow import VANE_BAND
 
 Floats = NDArray[np.float64]
+# Signals and model after a change.
 Changed = tuple[Signals, BaseModel]
 
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """One thing that is held fixed.
+    """One quantity that is held fixed.
 
-    name: for people, with its standard deviation.
-    change: signals and model with it one standard deviation further.
-    level: rad, by which the autopilot's level is changed.
-    air: m/s, by which air that rises is changed.
-    of_current: whether it only counts where the battery's current was logged.
+    name: name for people, with its standard deviation.
+    change: function for signals and model with the quantity one standard deviation higher.
+    level: change of the autopilot's level, rad.
+    air: change of the vertical air velocity, m/s.
+    of_current: True if it applies only to logs with the battery's current.
     """
 
     name: str
@@ -32,16 +33,18 @@ class Held:
     of_current: bool = False
 
     def tilt(self, signals: Signals) -> float:
-        """By how much the flow's angle to the level is changed, rad."""
+        """Return the change of the flow angle to the level, rad."""
         return self.level + (self.air / float(signals.airspeed.mean()) if self.air else 0.0)
 
     def applies(self, *, with_current: bool) -> bool:
-        """Whether it counts for logs with or without the battery's current."""
+        """Return True if it applies to logs with or without the battery's current."""
         return with_current or not self.of_current
 
 
 def _further(value: float, share: float, least: float) -> float:
-    """A value one standard deviation further from 0: a share of it, and no less than what its class has.
+    """Return a value one standard deviation further from 0.
+
+    share, least: standard deviation as a ratio to the value, and its smallest value.
 
     >>> _further(-2.0, 0.5, 0.1), _further(0.0, 0.5, 0.1)
     (-3.0, 0.1)
@@ -58,7 +61,11 @@ def _coefficient(name: str, share: float, least: float = 0.0) -> Callable[[Signa
 
 
 def _product_of_inertia(share: float, least: float) -> Callable[[Signals, BaseModel], Changed]:
-    """least: of the geometric mean of Ixx and Izz."""
+    """Return a change of the product of inertia.
+
+    share: standard deviation as a ratio to Ixz.
+    least: smallest standard deviation, as a ratio to the geometric mean of Ixx and Izz.
+    """
 
     def change(signals: Signals, base: BaseModel) -> Changed:
         ixx, iyy, izz, ixz = base.inertia
@@ -80,9 +87,10 @@ def _acceleration(axis: int, bias: float) -> Callable[[Signals, BaseModel], Chan
 
 
 def _noise(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Changed]:
-    """As much noise of the accelerometers again as there is: what it hides of a slope, more of it hides as much again.
+    """Return a change that doubles the noise power of the accelerometers.
 
-    Cook and Stefanski 1994 (SIMEX).  The noise is what is faster than the vane, taken as white.
+    It shows the bias of the slopes: the noise that is present has the same effect again (Cook and Stefanski 1994,
+    SIMEX). The noise is the signal above the vane's cutoff, taken as white.
     """
 
     def change(signals: Signals, base: BaseModel) -> Changed:
@@ -114,14 +122,17 @@ def _current(factor: float) -> Callable[[Signals, BaseModel], Changed]:
     return lambda signals, base: (replace(signals, current=signals.current * factor), base)
 
 
-def _same(signals: Signals, base: BaseModel) -> Changed:
+def _unchanged(signals: Signals, base: BaseModel) -> Changed:
     return signals, base
 
 
+# Name of the quantity for the accelerometers' noise.
 NOISE = "noise of the accelerometers"
-_LEVEL = float(np.radians(0.2))
-# Doubts are shares of the base's value.  Bases leave out what is small, and a value of 0 is no more certain than the
-# Aerosonde's (Beard and McLain, Small Unmanned Aircraft, second edition, table E.2): its doubt is the least.
+# Standard deviation of the autopilot's level, rad.
+_LEVEL_SD_RAD = float(np.radians(0.2))
+# Standard deviations are ratios to the base's value. Base models leave out small values, and a value of 0 is no more
+# certain than the Aerosonde's (Beard and McLain, Small Unmanned Aircraft, second edition, table E.2), which gives the
+# smallest standard deviation.
 HELD_FIXED = (
     Held("lift of the elevator (50 %)", _coefficient("lift_elevator", 0.5)),
     Held("lift of the pitch rate (50 %)", _coefficient("lift_rate", 0.5)),
@@ -133,9 +144,9 @@ HELD_FIXED = (
     Held("clock of the accelerometers (15 ms)", _late_force(0.015)),
     Held("clock of the servos (15 ms)", _late_surfaces(0.015)),
     Held("airspeed (as the wind triangle has it)", _airspeed),
-    # A level that is off shows as a bias of the forward accelerometer as well, which is taken off.
-    Held("level of the autopilot (0.2 deg)", _acceleration(0, _LEVEL * 9.80665), level=_LEVEL),
-    Held("mean vertical air (0.04 m/s)", _same, air=0.04),
+    # An error of the level also shows as a bias of the forward accelerometer, which is removed.
+    Held("level of the autopilot (0.2 deg)", _acceleration(0, _LEVEL_SD_RAD * 9.80665), level=_LEVEL_SD_RAD),
+    Held("mean vertical air (0.04 m/s)", _unchanged, air=0.04),
     Held("downward accelerometer (0.03 m/s2)", _acceleration(2, 0.03)),
     Held(NOISE, _noise((1, 2))),
     Held("scale of the current (2 %)", _current(1.02), of_current=True),

@@ -1,4 +1,4 @@
-"""The level: what the accelerometers read ahead in steady flight beyond what was gained in speed and height."""
+"""Level of the autopilot: forward acceleration in steady flight beyond the gain in speed and altitude."""
 
 from dataclasses import replace
 
@@ -8,19 +8,22 @@ from numpy.typing import NDArray
 from aircraft.identification.alignment import Signals
 
 Floats = NDArray[np.float64]
+# Standard gravity, m/s^2.
 GRAVITY = 9.80665
 
-# Standard deviations by which what the accelerometers' forward axis reads too much in steady flight is shared between
-# a level that is off, rad, and the accelerometer itself, m/s^2.
-LEVEL_SD, FORWARD_SD = float(np.radians(0.2)), 0.03
-# Straight flight: banked less than this, rad.
-_STRAIGHT = 0.1
+# Standard deviation of the autopilot's level, rad. An excess of the forward accelerometer in steady flight is divided
+# between a level error and the accelerometer's bias by their standard deviations.
+LEVEL_SD = float(np.radians(0.2))
+# Standard deviation of the forward accelerometer's bias, m/s^2.
+FORWARD_SD = 0.03
+# Largest bank of straight flight, rad.
+_MAX_STRAIGHT_BANK_RAD = 0.1
 
 
 def forward_excess(signals: Signals) -> list[float]:
-    """By how much the accelerometers read more ahead than the aircraft gained in speed and height, m/s^2, each stretch.
+    """Return the forward accelerometer's excess over the gain in speed and altitude per stretch, m/s^2.
 
-    The mean over straight flight, by attitude and velocity over the ground.  What is left is a level that is off or an
+    It is the mean over straight flight, from attitude and ground velocity. The excess is a level error or an
     accelerometer's bias; either would be taken for drag.
     """
     found = []
@@ -28,17 +31,17 @@ def forward_excess(signals: Signals) -> list[float]:
         rows = slice(first, last)
         roll, pitch, yaw = signals.attitude[rows].T
         x, y, z = signals.acceleration[rows].T
-        # Level ahead, along the nose's heading.
+        # Horizontal acceleration along the nose's heading.
         ahead = x * np.cos(pitch) + (y * np.sin(roll) + z * np.cos(roll)) * np.sin(pitch)
         change = np.gradient(signals.velocity[rows], 1.0 / signals.hertz, axis=0)
         gained = change[:, 0] * np.cos(yaw) + change[:, 1] * np.sin(yaw)
-        straight = np.abs(roll) < _STRAIGHT
+        straight = np.abs(roll) < _MAX_STRAIGHT_BANK_RAD
         found.append(float((ahead - gained)[straight].mean()) if straight.any() else 0.0)
     return found
 
 
 def levelled(signals: Signals) -> Signals:
-    """Signals with the accelerometers' forward excess shared between the level and the accelerometer."""
+    """Return signals with the forward excess divided between the level and the accelerometer."""
     share = LEVEL_SD**2 / (LEVEL_SD**2 + (FORWARD_SD / GRAVITY) ** 2)
     attitude, acceleration = signals.attitude.copy(), signals.acceleration.copy()
     for excess, first, last in zip(forward_excess(signals), signals.edges[:-1], signals.edges[1:], strict=True):

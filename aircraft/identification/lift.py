@@ -1,7 +1,7 @@
-"""The lift curve, by the reverse regression: the angle of attack of the attitude on the coefficient of lift.
+"""Fit the lift curve by reverse regression: the attitude's angle of attack on the lift coefficient.
 
-At low frequencies an aircraft heaves with the gusts: its lift does not know of them, the angle of attack that
-attitude and velocity give does.  So lift is the regressor without errors, and the angle of attack has them.
+At low frequencies an aircraft heaves with the gusts: its lift does not contain them, but the angle of attack from
+attitude and velocity does. Therefore lift is the regressor without errors, and the angle of attack has the errors.
 """
 
 import numpy as np
@@ -15,17 +15,21 @@ from aircraft.identification.regression import Fit, fit_with_prior
 
 Floats = NDArray[np.float64]
 
-# Below which lift and angle of attack are compared, Hz.
+# Cutoff below which lift and angle of attack are compared, Hz.
 LIFT_BAND = 0.15
 
 
 def fit_lift(signals: Signals, base: BaseModel, lift: Floats, level: float = 0.0) -> tuple[Fit, Floats, Floats]:
-    """Fit, values (2,) of slope and offset, and their covariance (2, 2); lift: (n,) coefficient; level: rad."""
+    """Fit the lift curve: the fit, values (2,) of slope and offset, and their covariance (2, 2).
+
+    lift: (n,) lift coefficient.
+    level: rad.
+    """
     measured = signals.smooth(attitude_alpha(signals, level), LIFT_BAND)
     smooth = signals.smooth(lift, LIFT_BAND)
     c = base.coefficients
     slope_sd, offset_sd = prior_sds()[:2]
-    # About the mean lift, where slope and angle do not depend on each other.
+    # About the mean lift, where slope and angle are uncorrelated.
     middle = float(smooth.mean())
     columns = np.column_stack([smooth - middle, np.ones(len(smooth))])
     inverse = 1.0 / c.lift_alpha

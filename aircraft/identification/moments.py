@@ -1,7 +1,7 @@
-"""Pitch, roll and yaw: the equations of rotation fitted to the gyros' rates of change.
+"""Fit pitch, roll and yaw: the equations of rotation for the gyros' rates of change.
 
-Euler's equations with a product of inertia (Etkin and Reid, Dynamics of Flight, third edition, section 4.6).  Only
-moments over the moments of inertia are seen.
+Euler's equations with a product of inertia (Etkin and Reid, Dynamics of Flight, third edition, section 4.6). Only
+moments relative to the moments of inertia are observable.
 """
 
 import numpy as np
@@ -15,12 +15,15 @@ from aircraft.identification.parameters import PARAMETERS, Group
 from aircraft.identification.regression import Fit, fit_with_prior
 
 Floats = NDArray[np.float64]
+# Axes in the order in which they are fitted.
 AXES: tuple[Group, ...] = ("pitch", "roll", "yaw")
 
-# Below which moments are compared, Hz, and of so many samples one.
-MOMENT_BAND, MOMENT_THINNING = 4.0, 2
-# Coefficient of the moment by which an aircraft is not quite symmetrical, standard deviation.
-_ASYMMETRY = 0.01
+# Cutoff below which moments are compared, Hz.
+MOMENT_BAND = 4.0
+# Of this many samples one is used.
+MOMENT_THINNING = 2
+# Standard deviation of the moment coefficient from an aircraft's asymmetry.
+_ASYMMETRY_SD = 0.01
 
 
 def fit_moments(
@@ -31,13 +34,15 @@ def fit_moments(
     motor: Motor | None = None,
     spread: float = 1.0,
 ) -> dict[Group, Fit]:
-    """The three fits by their axis; roll and yaw have a constant behind their parameters that is not kept.
+    """Return the three fits by axis; roll and yaw have an additional constant, which is not kept.
 
-    alpha, beta: (n,) rad.  motor: whose torque rolls; None for the base's.  spread: factor on the priors' deviations.
+    alpha, beta: (n,) rad.
+    motor: motor whose torque rolls the aircraft; None for the base's motor.
+    spread: factor on the priors' standard deviations.
     """
     thin = signals.thinned(MOMENT_THINNING, {"alpha": alpha, "beta": beta})
     pressure = pressure_of(thin, base)
-    turning = _turning(thin, base, base.motor if motor is None else motor)
+    turning = _required_moments(thin, base, base.motor if motor is None else motor)
     terms = _terms(thin, base)
     fits = {}
     ixx, iyy, izz, _ = base.inertia
@@ -46,7 +51,7 @@ def fit_moments(
         chosen = [parameter for parameter in PARAMETERS if parameter.group == axis]
         means, sds = [parameter.prior for parameter in chosen], [parameter.sd for parameter in chosen]
         if axis != "pitch":
-            columns, means, sds = [*columns, np.ones(len(known))], [*means, 0.0], [*sds, _ASYMMETRY]
+            columns, means, sds = [*columns, np.ones(len(known))], [*means, 0.0], [*sds, _ASYMMETRY_SD]
         scale = pressure * length / inertia
         table = thin.smooth(np.column_stack([scale * column for column in columns]), MOMENT_BAND)
         goal = thin.smooth(turning[axis] / inertia - scale * known, MOMENT_BAND)
@@ -54,8 +59,11 @@ def fit_moments(
     return fits
 
 
-def _turning(signals: Signals, base: BaseModel, motor: Motor) -> dict[Group, Floats]:
-    """Aerodynamic moments (n,), N m, that the motion needs; the propeller's torque rolls to the left."""
+def _required_moments(signals: Signals, base: BaseModel, motor: Motor) -> dict[Group, Floats]:
+    """Return the aerodynamic moments (n,), N m, that the motion requires.
+
+    The propeller's torque rolls to the left.
+    """
     ixx, iyy, izz, ixz = base.inertia
     p, q, r = signals.rates.T
     dp, dq, dr = signals.rate_changes.T
@@ -68,7 +76,7 @@ def _turning(signals: Signals, base: BaseModel, motor: Motor) -> dict[Group, Flo
 
 
 def _terms(signals: Signals, base: BaseModel) -> dict[Group, list[Floats]]:
-    """Coefficients (n,) of each axis as the base has them: what is held, then a term a parameter."""
+    """Return the coefficients (n,) of each axis: a fixed term, then one term per parameter."""
     c = base.coefficients
     alpha, beta = signals.extra["alpha"], signals.extra["beta"]
     elevator, aileron, rudder = signals.surfaces.T

@@ -1,4 +1,4 @@
-"""What identification needs of a motor with its propeller, whatever its form."""
+"""Interface of a motor with its propeller for identification."""
 
 from typing import Protocol, Self
 
@@ -13,20 +13,20 @@ class Motor(Protocol):
 
     @property
     def voltage(self) -> float:
-        """Of the battery, V."""
+        """Battery voltage, V."""
 
     def changed(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> Self:
-        """With factors on thrust, motor speed per volt, the torque or power that a thrust takes, and losses."""
+        """Return a motor with factors on thrust, speed per volt, torque or power for a thrust, and losses."""
 
     def for_voltage(self, volts: float) -> Self:
-        """One for a battery of another voltage, with the same thrust and power at full throttle."""
+        """Return a motor for another battery voltage, with the same thrust and power at full throttle."""
 
     def thrust_and_current(
         self, airspeed: Floats, throttle: Floats, density: Floats, voltage: Floats | float | None = None
     ) -> tuple[Floats, Floats]:
-        """Thrust (n,), N, and current from the battery (n,), A."""
+        """Return thrust (n,), N, and current from the battery (n,), A."""
 
     def reaction(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
-        """Torque of the propeller (n,), N m, whose reaction rolls the aircraft left."""
+        """Return the propeller's torque (n,), N m, whose reaction rolls the aircraft left."""

@@ -1,7 +1,7 @@
-"""What is estimated: each parameter with the model's property that carries it, its prior and its bounds.
+"""Estimated parameters: each with the model's property that carries it, its prior and its bounds.
 
-A parameter is a factor on a coefficient of the base model, 1 before any log, or an offset to it, 0.  Forces count as
-they are; moments count over the moment of inertia, which no log tells apart from them.
+A parameter is a factor on a coefficient of the base model, 1 without logs, or an offset to it, 0 without logs. Forces
+are absolute; moments are relative to the moment of inertia, from which no log can separate them.
 """
 
 from dataclasses import dataclass
@@ -11,20 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+# Equations in which parameters are estimated.
 Group = Literal["lift", "drag", "pitch", "roll", "yaw"]
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One quantity that is not known.
+    """One unknown quantity.
 
-    name: after ``ident/`` in the model.  title: for people.
+    name: name after ``ident/`` in the model.
+    title: name for people.
     kind: "factor" on the base's coefficient, or "offset" to it.
-    sd: of the prior, 1 standard deviation, about 1 or 0.
-    group: the equation that it is estimated in.
-    bounds: beyond which no aircraft of this kind is.
-    fast: of a motion as fast as the servos, whose interval is widened by 2: lag and damping look alike.
-    show: the manoeuvre that would show it.
+    sd: standard deviation of the prior, about 1 or 0.
+    group: equation in which it is estimated.
+    bounds: range of all aircraft of this kind.
+    fast: True for a motion as fast as the servos, whose interval is doubled: lag and damping look alike.
+    show: maneuver that would inform it.
     """
 
     name: str
@@ -38,7 +40,7 @@ class Parameter:
 
     @property
     def property_name(self) -> str:
-        """Of JSBSim."""
+        """Name of the JSBSim property."""
         return f"ident/{self.name}"
 
     @property
@@ -47,13 +49,17 @@ class Parameter:
         return 1.0 if self.kind == "factor" else 0.0
 
 
+# Maneuver for lift, drag and pitch offset.
 _SPEEDS = "level runs of 20 s at several speeds"
+# Maneuver for pitch.
 _PULLS = "elevator doublets of 1 s"
+# Maneuver for roll.
 _ROLLS = "aileron doublets of 1 s, or an AUTOTUNE flight"
+# Maneuver for yaw.
 _YAWS = "rudder doublets of 1 s"
 
-# Priors: 1 sd, of an aircraft scaled from another of its class; docs/from-your-log-to-your-verdict.md says what
-# they were tuned on.
+# Priors: 1 standard deviation, for an aircraft scaled from another of its class; docs/from-your-log-to-your-verdict.md
+# describes the data that they were tuned on.
 PARAMETERS = (
     Parameter("lift-slope", "lift slope", "factor", 0.12, "lift", (0.5, 1.6), show=_SPEEDS),
     Parameter("lift-offset", "lift at zero angle of attack", "offset", 0.15, "lift", (-0.6, 0.6), show=_SPEEDS),
@@ -76,15 +82,17 @@ PARAMETERS = (
     Parameter("adverse-yaw", "yaw from ailerons", "factor", 0.6, "yaw", (-3.0, 4.5), fast=True, show=_ROLLS),
     Parameter("rudder-power", "rudder power", "factor", 0.4, "yaw", (0.1, 3.0), fast=True, show=_YAWS),
 )
+# Names of the parameters.
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
+# Index of each parameter by its name.
 INDEX = {name: k for k, name in enumerate(NAMES)}
 
 
 def prior_means() -> Floats:
-    """(n,) of `PARAMETERS`."""
+    """Return the means (n,) of the priors of `PARAMETERS`."""
     return np.array([parameter.prior for parameter in PARAMETERS])
 
 
 def prior_sds() -> Floats:
-    """(n,) of `PARAMETERS`."""
+    """Return the standard deviations (n,) of the priors of `PARAMETERS`."""
     return np.array([parameter.sd for parameter in PARAMETERS])

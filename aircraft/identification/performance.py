@@ -1,7 +1,7 @@
-"""Steady flight of a model with any values of its parameters: climb at full throttle, sink at idle, power in cruise.
+"""Steady flight for any parameter values: climb at full throttle, sink at idle, power in cruise.
 
-Closed formulas about a point mass with a trimmed elevator, for many draws at once; JSBSim's own trims stay the
-authority (`flight.dynamics.trim`), and tests hold the two against each other.
+Closed formulas for a point mass with a trimmed elevator, for many draws at once; JSBSim's own trims remain the
+reference (`flight.dynamics.trim`), and tests compare the two.
 """
 
 from dataclasses import dataclass
@@ -13,14 +13,18 @@ from aircraft.identification.base_model import BaseModel
 from aircraft.identification.parameters import INDEX
 
 Floats = NDArray[np.float64]
+# Standard gravity, m/s^2.
 GRAVITY = 9.80665
 
 
 @dataclass(frozen=True, slots=True)
 class Performance:
-    """Of each of m draws, (m,): climb and sink are path angles to the air, rad, sink positive downwards.
+    """Performance of each of m draws, (m,).
 
-    drag: N, level.  throttle: 0..1, level.  power: W from the battery, level.
+    climb, sink: path angles to the air, rad, sink positive downwards.
+    drag: N, in level flight.
+    throttle: 0..1, in level flight.
+    power: W from the battery, in level flight.
     """
 
     climb: Floats
@@ -31,7 +35,12 @@ class Performance:
 
 
 def performance(base: BaseModel, values: Floats, airspeed: float, density: float, idle: float = 0.0) -> Performance:
-    """Of parameter values (m, n) at an airspeed (m/s, true) and a density (kg/m^3); idle: throttle when gliding."""
+    """Return the performance for parameter values (m, n).
+
+    airspeed: m/s, true.
+    density: kg/m^3.
+    idle: throttle in a glide.
+    """
     values = np.atleast_2d(values)
     count = len(values)
     level = np.zeros(count)
@@ -44,20 +53,23 @@ def performance(base: BaseModel, values: Floats, airspeed: float, density: float
         throttle = 0.5 * (low + high)
     _, amps = _thrust(base, values, airspeed, throttle, density)
     return Performance(
-        climb=_steady(base, values, airspeed, density, np.ones(count)),
-        sink=-_steady(base, values, airspeed, density, np.full(count, idle)),
+        climb=_path_angle(base, values, airspeed, density, np.ones(count)),
+        sink=-_path_angle(base, values, airspeed, density, np.full(count, idle)),
         drag=drag,
         throttle=throttle,
         power=amps * base.motor.voltage,
     )
 
 
-# Between which the fastest level flight is looked for, m/s.
-_SPEEDS = (3.0, 150.0)
+# Range of the search for the fastest level flight, m/s.
+_SPEED_RANGE_MPS = (3.0, 150.0)
 
 
 def fastest_level(base: BaseModel, values: Floats, density: float) -> Floats:
-    """(m,) fastest level flight, at full throttle, m/s, of parameter values (m, n); density: kg/m^3."""
+    """Return the fastest level flight (m,) at full throttle, m/s, for parameter values (m, n).
+
+    density: kg/m^3.
+    """
     values = np.atleast_2d(values)
     count = len(values)
     full, level = np.ones(count), np.zeros(count)
@@ -67,11 +79,11 @@ def fastest_level(base: BaseModel, values: Floats, density: float) -> Floats:
         alpha, drag = _flow(base, values, speed, density, thrust, level)
         return np.asarray(thrust * np.cos(alpha) - drag)
 
-    # From above: there is a slower speed at which thrust is drag again, on the back side of the power curve.
-    high = np.full(count, _SPEEDS[1])
+    # From above: on the back side of the power curve there is a slower speed at which thrust equals drag again.
+    high = np.full(count, _SPEED_RANGE_MPS[1])
     low = high.copy()
     for _ in range(200):
-        short = (spare(low) < 0.0) & (low > _SPEEDS[0])
+        short = (spare(low) < 0.0) & (low > _SPEED_RANGE_MPS[0])
         if not short.any():
             break
         high = np.where(short, low, high)
@@ -83,8 +95,8 @@ def fastest_level(base: BaseModel, values: Floats, density: float) -> Floats:
     return np.asarray(0.5 * (low + high))
 
 
-def _steady(base: BaseModel, values: Floats, airspeed: float, density: float, throttle: Floats) -> Floats:
-    """Path angle (m,), rad, at a throttle."""
+def _path_angle(base: BaseModel, values: Floats, airspeed: float, density: float, throttle: Floats) -> Floats:
+    """Return the path angle (m,), rad, at a throttle."""
     thrust, _ = _thrust(base, values, airspeed, throttle, density)
     angle = np.zeros(len(values))
     for _ in range(12):
@@ -96,13 +108,13 @@ def _steady(base: BaseModel, values: Floats, airspeed: float, density: float, th
 def _flow(
     base: BaseModel, values: Floats, airspeed: Floats | float, density: float, thrust: Floats, angle: Floats
 ) -> tuple[Floats, Floats]:
-    """Angle of attack and drag (m,) of flight at a path angle, with the elevator that balances it."""
+    """Return angle of attack and drag (m,) at a path angle, with the elevator in balance."""
     c = base.coefficients
     pressure = 0.5 * density * airspeed * airspeed * base.area
     column = {name: values[:, k] for name, k in INDEX.items()}
     slope = c.lift_alpha * column["lift-slope"]
     zero = c.lift_zero + column["lift-offset"]
-    # A constant, an angle of attack and an elevator that cancel.
+    # The constant, the angle of attack and the elevator balance in pitch.
     power = c.pitch_elevator * column["elevator-power"]
     per_alpha = -c.pitch_alpha * column["pitch-stiffness"] / power
     at_zero = -(c.pitch_zero + column["pitch-offset"]) / power
@@ -121,8 +133,8 @@ def _flow(
 def _thrust(
     base: BaseModel, values: Floats, airspeed: Floats | float, throttle: Floats, density: float
 ) -> tuple[Floats, Floats]:
-    """Thrust, N, and the battery's current, A, (m,)."""
-    # Arrays over the draws in place of the motor's constants: its formulas take them as they are.
+    """Return thrust, N, and battery current, A, (m,)."""
+    # Arrays over the draws replace the motor's constants: its formulas accept them unchanged.
     thrust, speed, torque = (values[:, INDEX[name]] for name in ("thrust", "motor-speed", "propeller-torque"))
     many = base.motor.changed(thrust, speed, torque)  # type: ignore[arg-type]
     return many.thrust_and_current(np.zeros(len(values)) + airspeed, throttle, np.full(len(values), density))

@@ -1,7 +1,7 @@
-"""A propeller as a disc that speeds the air up: thrust and current at an airspeed, a throttle and a density.
+"""Propeller as a disc that accelerates the air: thrust and current by airspeed, throttle and density.
 
-Beard and McLain, Small Unmanned Aircraft, first edition, section 4.3; the throttle goes with the speed of the air
-behind the disc.  Published models of flying wings have this form.
+Beard and McLain, Small Unmanned Aircraft, first edition, section 4.3; the throttle sets the speed of the air behind the
+disc. Published models of flying wings have this form.
 """
 
 from dataclasses import dataclass, replace
@@ -17,10 +17,11 @@ class PropellerDisc:
     """Constants of a disc, SI.
 
     pull: half of its area times C_prop, m^2.
-    exit_speed: of the air behind it at full throttle and the stated voltage, m/s.
-    ducted: whether the exit speed goes from the airspeed up, or from 0.
-    losses: what motor and propeller lose beside the air's own power, as a share of that.
-    voltage: of the battery, V.  nominal: at which the exit speed is as stated, V.
+    exit_speed: air speed behind it at full throttle and nominal voltage, m/s.
+    ducted: True if the exit speed rises from the airspeed, False if it rises from 0.
+    losses: losses of motor and propeller, as a ratio to the power of the air.
+    voltage: battery voltage, V.
+    nominal: voltage of the stated exit speed, V.
     power: factor on all power.
 
     The thrust is pull rho (v_e^2 - V^2), of a ducted one pull rho v_e (v_e - V), and never brakes.
@@ -37,9 +38,9 @@ class PropellerDisc:
     def changed(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> "PropellerDisc":
-        """With factors on thrust, exit speed, the power that a thrust takes, and losses.
+        """Return a disc with factors on thrust, exit speed, power for a thrust, and losses.
 
-        idle: of no effect; a disc has no idle current.
+        idle: has no effect; a disc has no idle current.
         """
         del idle
         return replace(
@@ -51,13 +52,13 @@ class PropellerDisc:
         )
 
     def for_voltage(self, volts: float) -> "PropellerDisc":
-        """The same thrust and power with a battery of another voltage."""
+        """Return a disc with the same thrust and power for another battery voltage."""
         return replace(self, voltage=volts, nominal=volts)
 
     def thrust_and_current(
         self, airspeed: Floats, throttle: Floats, density: Floats, voltage: Floats | float | None = None
     ) -> tuple[Floats, Floats]:
-        """Thrust (n,), N, and current from the battery (n,), A.
+        """Return thrust (n,), N, and current from the battery (n,), A.
 
         >>> disc = PropellerDisc(0.0157, 20.0, False, 2.0 / 3.0, 10.0, 10.0)
         >>> thrust, current = disc.thrust_and_current(np.full(1, 15.0), np.ones(1), np.full(1, 1.2))
@@ -73,6 +74,6 @@ class PropellerDisc:
         return thrust, np.asarray(power / volts)
 
     def reaction(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
-        """Torque (n,), N m: none, of a disc."""
+        """Return the torque (n,), N m, which is zero for a disc."""
         del throttle, density
         return np.zeros_like(airspeed)

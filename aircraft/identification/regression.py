@@ -1,4 +1,4 @@
-"""Least squares with a prior, and a covariance that allows for residuals that are autocorrelated."""
+"""Least squares with a prior, and a covariance that allows for autocorrelated residuals."""
 
 from dataclasses import dataclass
 
@@ -11,11 +11,13 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """A regression.
+    """Result of a regression.
 
-    estimate: (p,).  covariance: (p, p), of blocks of residuals and the prior.
-    predicted: (n,) of what was measured.  residual: (n,) measured less predicted.
-    explained: R^2, share of the measured variance that the prediction explains.
+    estimate: (p,).
+    covariance: (p, p), from blocks of residuals and the prior.
+    predicted: (n,) prediction of the measured values.
+    residual: (n,) measured minus predicted.
+    explained: R^2, fraction of the measured variance that the prediction explains.
     """
 
     estimate: Floats
@@ -26,7 +28,9 @@ class Fit:
 
 
 def correlation_samples(residual: Floats, most: int = 500) -> float:
-    """How many samples of a series (n,) count as one: the sum of its autocorrelation up to its first zero.
+    """Return the correlation length of a series (n,) in samples.
+
+    It is the sum of the autocorrelation up to its first zero: that many samples carry the information of one.
 
     >>> round(correlation_samples(np.random.default_rng(1).normal(size=4000)))
     1
@@ -49,13 +53,14 @@ def correlation_samples(residual: Floats, most: int = 500) -> float:
 def fit_with_prior(
     columns: Floats, measured: Floats, mean: Floats, sd: Floats, blocks: Ints, floor: float = 0.0
 ) -> Fit:
-    """Most probable coefficients of columns (n, p) for measured (n,), with independent normal priors.
+    """Return the most probable coefficients of columns (n, p) for measured (n,), with normal priors.
 
-    mean, sd: (p,) of the priors; an infinite sd is none.  blocks: (n,) numbers of the blocks of rows.
-    floor: least variance of a residual times the samples over which it is autocorrelated, for what no model gets right.
+    mean, sd: (p,) of the independent priors; an infinite sd means no prior.
+    blocks: (n,) block number of each row.
+    floor: smallest variance of a residual times its correlation length in samples, for errors of every model.
 
-    The data's weight counts independent samples alone, by the residual's autocorrelation; the covariance is the robust
-    one over blocks (White 1980, Liang and Zeger 1986), with the prior's share.
+    The data's weight counts only independent samples, by the residual's autocorrelation; the covariance is the robust
+    one over blocks (White 1980, Liang and Zeger 1986), plus the prior's contribution.
 
     >>> x = np.linspace(0.0, 1.0, 50)
     >>> fit = fit_with_prior(x[:, None], 3.0 * x, np.zeros(1), np.full(1, np.inf), np.arange(50) // 5)
@@ -79,7 +84,7 @@ def fit_with_prior(
     count = int(blocks.max()) + 1
     sums = np.zeros((count, len(mean)))
     np.add.at(sums, blocks, scores)
-    # Few blocks know little of their own scatter.
+    # Correct for a small number of blocks, whose scatter is underestimated.
     robust = sums.T @ sums * count / max(1, count - len(mean))
     if floor > 0.0:
         robust = robust + weight * normal

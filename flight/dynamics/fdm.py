@@ -2,7 +2,7 @@
 
 The only module that imports JSBSim; feet and slugs stay in it and in `flight.dynamics.jsbsim_properties`. JSBSim never
 reports an error: after a NaN, below ground or after a crash it continues. The caller must check the state that it
-    reads.
+reads.
 """
 
 import contextlib

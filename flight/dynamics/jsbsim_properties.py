@@ -86,7 +86,9 @@ FLAT_DENSITY = 1.2682
 # ----------------------------------------------------------------------
 # JSBSim properties by name, bound to functions that read and set them.
 
+# Function that reads a property.
 Getter = Callable[[], float]
+# Function that sets a property.
 Setter = Callable[[float], object]
 
 

@@ -139,8 +139,9 @@ def idle_throttle(aircraft: Aircraft, fdm: Fdm, level: Trim) -> float:
 def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
     """Return all gains of an aircraft by the rule of this module.
 
-    fdm: simulation of the aircraft with its engine at rest; None creates one. Raise FlightError as `airframe_gains`
-        does.
+    fdm: simulation of the aircraft with its engine at rest; None creates one.
+
+    Raise FlightError as `airframe_gains` does.
     """
     fdm = Fdm(aircraft) if fdm is None else fdm
     level = _level(aircraft, fdm)

@@ -3,7 +3,7 @@
 A fly-by arc has the bank-limited radius for the highest ground speed in the turn, and the corners of a loiter have the
 loiter's radius. If the legs are too short for their turns, arcs are drawn tighter than the bank limit so that the path
 stays continuous: the flight will then leave it, and the verdict says so. A fly-over waypoint is passed through: its
-    corner stays sharp, as do U-turns.
+corner stays sharp, as do U-turns.
 """
 
 import math

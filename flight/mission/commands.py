@@ -247,9 +247,11 @@ _REFUSED = Treatment.REFUSED
 
 # Purposes of commands without an effect on the path.
 CAMERA = "the camera's, nothing to fly"
+# Reason for commands that point a gimbal.
 _GIMBAL = "points a camera, not the aircraft"
 # ArduPlane: `Plane::start_command` does not know such a command, `Plane::verify_command` reports it as done.
 PASSED_OVER = "ArduPlane takes it and passes it over"
+# Reason for conditions.
 _HOLDS_BACK = "holds back the commands behind it; open where one of them is flown"
 
 # Treatment of each command that at least one autopilot accepts; both refuse any other.
@@ -345,6 +347,7 @@ SUPPORT: dict[Command, Support] = {
 # Commands that do nothing themselves, and that other commands or modes lead to.
 MARKS = frozenset({C.DO_RETURN_PATH_START, C.DO_LAND_START, C.DO_GO_AROUND, C.JUMP_TAG})
 
+# Treatment of a command that is not in the table.
 _UNKNOWN = Support(_REFUSED, _REFUSED, "no autopilot takes it in a mission")
 
 

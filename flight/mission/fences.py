@@ -140,8 +140,10 @@ def fence_problem(
 ) -> tuple[str, int] | None:
     """Return the first fence that a position violates, as text and its first item's number, or None.
 
-    fences: items 5001..5004, a polygon's corners together. A position must be inside all inclusions.
-    east, north: m on the map about ``origin``. Raise MissionError for a polygon with fewer corners than stated.
+    fences: items 5001..5004, a polygon's corners together.
+    east, north: m on the map about ``origin``.
+
+    A position must be inside all inclusions. Raise MissionError for a polygon with fewer corners than stated.
 
     >>> radius = (500.0, 0.0, 0.0, 0.0)
     >>> circle = MissionItem(0, Command.NAV_FENCE_CIRCLE_INCLUSION, Frame.GLOBAL, radius, 36.5, -84.2, 0.0)
@@ -174,11 +176,13 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
     """Return a mission with a scenario's area, threats and zones as fence, and notes for people.
 
     The area becomes an inclusion polygon of four corners, and each missile's kill radius an exclusion circle without
-    altitude limits. Radars are left out: detection is not forbidden. Zones follow as `zone_fences` converts them. The
+    altitude limits. Radars are left out: detection is not forbidden. Zones are converted by `zone_fences`. The
     mission's own fence is kept. An exclusion that the mission passes above or below, according to ``passes``, is left
-    out: an autopilot with such a fence refuses the mission or aborts it. Rally points are the first and last position
-    of the mission, at the mission's height above home; a mission with rally points, and one from or to the ground,
-    keeps its own. The notes list what a fence cannot represent, and what was left out.
+    out: an autopilot with such a fence refuses the mission or aborts it.
+
+    Rally points are the first and last position of the mission, at the mission's height above home; a mission with
+    rally points, and one from or to the ground, keeps its own. The notes list what a fence cannot represent, and what
+    was left out.
 
     >>> from world.scenario import load_scenario
     >>> fenced, notes = with_fences(Mission(None, ()), load_scenario("tight"), lambda shape: False)

@@ -46,9 +46,9 @@ def plan_mission(
 
     The acceptance radius is the fly-by offset R(1/cos(theta/2) - 1), the distance at which a turn at this speed and
     bank passes its waypoint with the scenario's wind from behind, plus `ACCEPTANCE_TOLERANCE`, rounded up to a whole
-    meter: no arc of the flight misses it. PX4 has its own radius on fixed wings. If the tracking error of an autopilot
-    is known, the
-    radius is the one with the smallest error: ArduPlane turns to the next leg at that distance before a waypoint.
+    meter, so that no arc of the flight misses it. PX4 has its own radius on fixed wings. If the tracking error of an
+    autopilot is known, the radius is the one with the smallest error: ArduPlane turns to the next leg at that distance
+    before a waypoint.
 
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
@@ -149,7 +149,7 @@ def acceptance_radii(
     turns, pull = turning_angles(points), GRAVITY * math.tan(max_bank)
     radii = np.full(len(points), ACCEPTANCE_TOLERANCE)
     radii[1:-1] += _fly_by_offsets(np.minimum(turns, _MAX_OFFSET_TURN_RAD), (airspeed + wind) ** 2 / pull)
-    # Arcs are drawn with a margin for a gust; a sharper turn's arc passes wherever it passes, a U-turn's at infinity.
+    # Arcs are drawn with a margin for a gust. The limit on the turn keeps the offset finite: a U-turn has no arc.
     gust = 0.1 * W20[scenario.wind.turbulence]
     arcs = _fly_by_offsets(np.minimum(turns, _MAX_ARC_TURN_RAD), (airspeed + wind + gust) ** 2 / pull)
     radii[1:-1] = np.maximum(radii[1:-1], arcs)

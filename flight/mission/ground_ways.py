@@ -216,8 +216,9 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
 def airborne_route(route: Route, ways: GroundWays, begun: Floats | None) -> Route:
     """Return the part of a route that is flown in the air, to which the usual rules apply.
 
-    begun: (3,) m, where the take-off ended and the first leg begins; None for the start of the route. The leg to the
-        landing point is left out; numbers of legs and waypoints stay.
+    begun: (3,) m, where the take-off ended and the first leg begins; None for the start of the route.
+
+    The leg to the landing point is left out; numbers of legs and waypoints stay.
     """
     points = np.array(route.waypoints)
     if ways.take_off is not None and begun is not None:

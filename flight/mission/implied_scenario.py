@@ -22,8 +22,8 @@ Floats = NDArray[np.float64]
 
 # Margin of the area around the mission's positions, and of the ceiling above its highest, m.
 AREA_BUFFER = 2000.0
-# Largest distance between home and the first position, m: a home further away is not the mission's, since ground
-# stations write a default position of their own if none was set.
+# Largest distance between home and the first position, m: a home further away does not belong to the mission, since
+# ground stations write a default position of their own if none was set.
 _MAX_HOME_DISTANCE_M = 100_000.0
 
 

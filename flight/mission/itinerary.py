@@ -334,7 +334,7 @@ class _Steps:
 
 
 class _NotesOfBothReadings:
-    """Notes for both readings of a speed change, ArduPlane's and PX4's."""
+    """Notes for both readings of a speed change, by ArduPlane and by PX4."""
 
     def __init__(self) -> None:
         self.usual, self.by_value = Notes(), Notes()

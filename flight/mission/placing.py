@@ -167,7 +167,8 @@ def home_place(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> 
 def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[LandingStart, ...]:
     """Return the starts of a mission's landing sequences: the first place after each DO_LAND_START.
 
-    A mission without a home has none, since it has nowhere to return to. An altitude that is not stated is home's.
+    A mission without a home has none, since it has nowhere to return to. Without a stated altitude a start has the
+    altitude of home.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> start = MissionItem(1, Command.DO_LAND_START, Frame.MISSION, (0.0,) * 4, 0.0, 0.0, 0.0)

@@ -18,6 +18,7 @@ from flight.mission.itinerary import UNLIMITED, ItineraryStop
 from flight.mission.loiter_circles import CORNER, Node, RoutePoint, circle_corners, is_joined, on_rim, tangent_course
 from world.geometry import wrap
 
+# East, north, up, m.
 Place = tuple[float, float, float]
 
 
@@ -283,7 +284,7 @@ def lay_return(
     dive = min(ability.dive, rules.sink / ability.airspeed)
     plan = _ReturnBuilder(circle, target.slope_base, rules.least_slope, ability, dive, here, onward)
     if _distance(here, target.position) <= abs(radius) + _MIN_TANGENT_M:
-        # Start near the target: it is on the circle as soon as it has crossed to it.
+        # The return starts inside the loiter: fly straight on to its circle.
         plan.circle_from(*_rim_ahead(here, course, circle))
         return plan.points
     course = plan.turn_gently(course, rules)

@@ -215,9 +215,9 @@ def fly_over_waypoints(
     turn_distance: see `RouteRules`.
 
     An arc that turns by ``turn`` passes its waypoint at R(1/cos(turn/2) - 1). At 25 m/s and 30 degrees of bank R is 110
-    m: the arc passes a corner of 90 degrees at 46 m, one of 120 degrees at 110 m, and one of 174 degrees at 2 km. It
-    misses the waypoint if that distance exceeds the acceptance radius that the mission states, or, if it states none,
-    the autopilot's own turn distance; the autopilot then flies on to that distance before it turns.
+    m, and the arc passes a corner of 90 degrees at 46 m, one of 120 degrees at 110 m, and one of 174 degrees at 2 km.
+    It misses the waypoint if that distance exceeds the acceptance radius that the mission states, or, if it states
+    none, the autopilot's own turn distance; the autopilot then flies on to that distance before it turns.
 
     >>> from types import SimpleNamespace
     >>> from aircraft.path_limits import PerformanceTable
@@ -360,7 +360,7 @@ def make_route(
     terrain: None if unknown; heights above terrain are then an error.
     default_airspeed: airspeed until the mission sets one, m/s (the cruiseSpeed of a `.plan` file, a ground station's
         estimate, sets none).
-    fly_over: True to fly over all waypoints; otherwise only over those of `fly_over_waypoints`.
+    fly_over: True to fly over all waypoints; otherwise only over the waypoints of `fly_over_waypoints`.
     limits: limits of the aircraft for those arcs, for the radius of a loiter that states none (80 m if None), and for
         the slope of a spiral (5 % if None).
     rules: rules by which the autopilot flies a route.
@@ -620,7 +620,7 @@ def _with_airspeed(place: PlacedStop, default: float, by_value: bool) -> PlacedS
     return PlacedStop(replace(place.stop, airspeed=default if math.isnan(stated) else stated), place.position)
 
 
-# Relative difference beyond which a ground station's speed estimate is likely that of another aircraft.
+# Relative difference beyond which a ground station's speed estimate is likely for another aircraft.
 FAR_SPEED = 0.2
 
 

@@ -1,6 +1,6 @@
 """Change the layout of a survey: longer turn-arounds, interleaved lines, or lines on another course.
 
-Items that do not belong to the survey stay as they are, and each line keeps its items, including the camera's.
+Items that do not belong to the survey stay as they are, and each line keeps its items, including camera commands.
 """
 
 import math
@@ -199,12 +199,12 @@ def _in_flying_order(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line
     unit = (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
     right = np.array([unit[1], -unit[0]])
     offsets = [float((line.corners[[0, -1]].mean(axis=0) - start) @ right) for line in lines]
-    aside = sorted(range(len(lines)), key=lambda k: offsets[k])
+    lateral = sorted(range(len(lines)), key=lambda k: offsets[k])
     if (offsets[0] > 0.5 * (min(offsets) + max(offsets))) is not layout.backwards:
-        aside.reverse()
+        lateral.reverse()
     out: list[_Line] = []
     for begin in range(layout.every):
-        for k in aside[begin :: layout.every]:
+        for k in lateral[begin :: layout.every]:
             line, ahead = lines[k], len(out) % 2 == 0
             along = float((line.corners[-1] - line.corners[0]) @ unit) > 0.0
             out.append(line if along == ahead else _reversed(line))
@@ -251,13 +251,13 @@ def _with_course(lines: Sequence[_Line], survey: Survey, course: float, origin: 
         return None
     unit = np.array([math.sin(course), math.cos(course)])
     right = np.array([unit[1], -unit[0]])
-    aside, along = hull @ right, hull @ unit
-    count = max(1, round((aside.max() - aside.min()) / survey.spacing))
-    margin = 0.5 * (aside.max() - aside.min() - (count - 1) * survey.spacing)
+    lateral, along = hull @ right, hull @ unit
+    count = max(1, round((lateral.max() - lateral.min()) / survey.spacing))
+    margin = 0.5 * (lateral.max() - lateral.min() - (count - 1) * survey.spacing)
     pattern, out = lines[0], list[Floats]()
     for k in range(count):
-        at = float(aside.min()) + margin + k * survey.spacing
-        crossed = _crossing(aside, along, at)
+        at = float(lateral.min()) + margin + k * survey.spacing
+        crossed = _crossing(lateral, along, at)
         if crossed is None or crossed[1] - crossed[0] < _MIN_LINE_LENGTH_M:
             continue
         out.append(np.array([at * right + metres * unit for metres in crossed]))
@@ -302,11 +302,11 @@ def _is_bent(corners: Floats) -> bool:
     return bool(np.abs(off).max() > _BEND_TOLERANCE_M)
 
 
-def _crossing(aside: Floats, along: Floats, at: float) -> tuple[float, float] | None:
+def _crossing(lateral: Floats, along: Floats, at: float) -> tuple[float, float] | None:
     """Return where a line enters and leaves a convex outline, m along it, or None if it does not cross it."""
     found = []
-    for k in range(len(aside)):
-        one, other = aside[k - 1] - at, aside[k] - at
+    for k in range(len(lateral)):
+        one, other = lateral[k - 1] - at, lateral[k] - at
         if one * other <= 0.0 and one != other:
             found.append(float(along[k - 1] + (along[k] - along[k - 1]) * one / (one - other)))
     return (min(found), max(found)) if len(found) >= 2 else None

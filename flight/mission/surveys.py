@@ -40,9 +40,9 @@ _MAX_TURN_AROUND_RUNS = 12
 _MAX_TURN_AROUND_RATIO = 2.0
 # A turn-around up to this length is accepted in any case, m: lines at the tip of a field are short.
 _SHORT_TURN_AROUND_M = 250.0
-# A parallel run is not a line if a later run is nearer than this ratio of its distance,
+# A parallel run is not a line if both conditions hold: a later run is nearer than this ratio of its distance,
 _NEARER_LINE_RATIO = 0.5
-# and if it is shorter than this ratio of that later run.
+# and it is shorter than this ratio of that later run.
 _STUB_LENGTH_RATIO = 0.2
 # A line between two lines of another survey, shorter than this ratio of both, is a turn-around of that survey.
 _TURN_AROUND_LENGTH_RATIO = 0.5
@@ -52,9 +52,9 @@ _SPACING_RATIO_LIMIT = 2.0
 _MIN_LEGS_WITH_LEADS = 3
 # Tolerance for equal leads, m.
 _LEAD_LENGTH_TOLERANCE_M = 1.0
-# Smallest number of lines in a survey, at different lateral positions: there and back is not a survey,
+# Smallest number of lines with different lateral positions in a survey: there and back is not a survey.
 _MIN_LINES = 3
-# unless the camera is on.
+# The same number for lines with the camera on.
 _MIN_LINES_WITH_PHOTOS = 2
 # A gap smaller than this fraction of both its neighbors is no gap, but one line flown twice.
 _DUPLICATE_LINE_FRACTION = 0.2
@@ -200,8 +200,8 @@ def camera_spacing(mission: Mission, route: Route) -> Floats:
 def survey_plan(mission: Mission, survey: Survey) -> SurveyPlan | None:
     """Return the survey settings that the mission's author stored for a survey, or None if there are none.
 
-    They are identified by the distance between photos. If several stored surveys share that distance, which of them
-    applies is unknown, and none is returned for it.
+    They are identified by the distance between photos. If no stored survey, or more than one, has that distance, the
+    settings for any survey are returned.
     """
     photo = survey.lines[0].photo
     same = {
@@ -450,9 +450,9 @@ def _make_survey(
 def _line_gaps(places: Floats) -> list[float]:
     """Return the gaps (m) between lines at sorted positions (n,) m, ignoring lines flown twice."""
     gaps = [float(gap) for gap in np.diff(places) if gap >= _MIN_LINE_SPACING_M]
-    beside = [[gaps[k] for k in (i - 1, i + 1) if 0 <= k < len(gaps)] for i in range(len(gaps))]
+    neighbors = [[gaps[k] for k in (i - 1, i + 1) if 0 <= k < len(gaps)] for i in range(len(gaps))]
     return [
-        gap for gap, near in zip(gaps, beside, strict=True) if not near or gap > _DUPLICATE_LINE_FRACTION * min(near)
+        gap for gap, near in zip(gaps, neighbors, strict=True) if not near or gap > _DUPLICATE_LINE_FRACTION * min(near)
     ]
 
 
@@ -494,8 +494,8 @@ def _without_leads(
     if float(np.ptp(leads)) > _LEAD_LENGTH_TOLERANCE_M:
         return lines
     # The entry to the first line and the exit of the last may be longer than the other leads, so find a lead as long as
-    # the others; or the camera shows it, which goes on at the first line's photos and off at the end of the last
-    # line's.
+    # the others there; or use the camera, which goes on at the first line's photos and off after the last line's
+    # photos.
     alike = np.abs(lengths - np.median(leads)) <= _LEAD_LENGTH_TOLERANCE_M
     begins = np.flatnonzero(alike[into.first : into.last - 1]) + into.first + 1
     ends = np.flatnonzero(alike[out.first + 1 : out.last]) + out.first + 1

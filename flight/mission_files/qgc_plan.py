@@ -55,8 +55,9 @@ def expand_items(items: list[Any], source: str, warnings: list[str], plans: list
 
     Add a warning for each replaced item.
 
-    plans: list to which the settings of its surveys are added. Raise MissionError, naming the kind, for one that cannot
-        be expanded. The contents of an item are checked later.
+    plans: list to which the settings of its surveys are added.
+
+    Raise MissionError, naming the kind, for one that cannot be expanded. The contents of an item are checked later.
     """
     out: list[Any] = []
     for k, item in enumerate(items):
@@ -466,8 +467,8 @@ def plan_file_text(mission: Mission) -> str:
 
     cruiseSpeed is the mission's speed, or its first DO_CHANGE_SPEED, or QGC's default. It is written in whole m/s, as
     hoverSpeed is: they are integers in Mission Planner's `MissionFile.Mission`, whose reader refuses "25.0"; QGC reads
-        both as numbers, and sends neither to an aircraft. firmwareType is that of the mission's autopilot, 0 for
-        planfly's own guidance, which no ground station knows.
+    both as numbers, and sends neither to an aircraft. firmwareType names the mission's autopilot, 0 for planfly's own
+    guidance, which no ground station knows.
     """
     mission = renumbered(mission)
     home = mission.home or Home(0.0, 0.0, 0.0)

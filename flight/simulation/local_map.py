@@ -47,7 +47,7 @@ class LocalMap:
         low, high = points.min(axis=0) - MAP_BUFFER, points.max(axis=0) + MAP_BUFFER
         outline = np.array([[e, n] for e in (low[0], 0.5 * (low[0] + high[0]), high[0]) for n in (low[1], high[1])])
         lat, lon = (np.radians(values) for values in to_geo(origin, outline[:, 0], outline[:, 1]))
-        # Longitudes relative to the origin's, so that an area may include the 180th meridian.
+        # Longitudes relative to the origin, so that an area may include the 180th meridian.
         here = math.radians(origin.lon_deg)
         lon = here + (lon - here + math.pi) % (2.0 * math.pi) - math.pi
         bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])

@@ -161,7 +161,7 @@ class ImportedLog:
     mission: source of the mission: "CMD of the log, at 22.4 s", or a file.
     missing: items of that mission that the log lacks; None if it is judged in full.
     plan_heights: True if the mission states altitudes.
-    aircraft_known: True if the aircraft was named; otherwise none of its limits apply.
+    aircraft_known: True if the aircraft was named; otherwise its limits are not applied.
     begins_in_flight: True if the log begins after the flight did.
     gaps: pauses between rows, over all imported data.
     faults: faults of its rows.
@@ -311,7 +311,7 @@ class FlightSetup:
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
-    """Return the limits of a path: the scenario's, and the aircraft's where the scenario states none.
+    """Return the limits of a path: the scenario's limits, or the aircraft's limits if it states none.
 
     airspeed: m/s.
     max_bank: rad; the smaller of it and the envelope's limit applies.

@@ -58,6 +58,7 @@ PLACE = record_dtype(
     "ground",  # m AMSL, NaN where it is unknown
     "clearance",  # m above it
 )
+# Mean wind and turbulence of the scenario.
 MEAN_WIND = record_dtype(
     "speed",  # m/s at the reference height
     "cos",  # of the map course that the wind blows to
@@ -66,11 +67,13 @@ MEAN_WIND = record_dtype(
     "reference_amsl",  # m
     "w20",  # m/s, turbulence's wind at 20 ft
 )
+# Time and rows of the flight.
 TIMING = record_dtype(
     ("tick", np.int64),  # number of ticks flown
     ("row", np.int64),  # index of the next row of the block
     "dt",  # s
 )
+# Constants of the flight.
 SETTINGS = record_dtype(
     "slowest",  # m/s, loss of control below this airspeed
     "battery",  # Wh; a flight that has used this energy ends
@@ -88,6 +91,7 @@ PATH_ROW = record_dtype(("piece", PIECE), ("node", NODE), ("waypoint", WAYPOINT)
 OUTPUT = record_dtype(*field_names(COMMANDS), "gust_north", "gust_east", "gust_down", "ground")
 # Unit normal random numbers of a tick.
 NOISE = record_dtype(("turbulence", np.float64, (3,)), ("navigation", np.float64, (3,)))
+# All data of a tick but the path.
 WORKSPACE = record_dtype(
     ("state", STATE),
     ("state_factors", STATE),  # factors from JSBSim's units to SI
@@ -223,7 +227,10 @@ ENDS = {
     NO_MOTOR: "not launched: the motor never started",
     TIPPED: "ground contact: not on its belly or wheels",
 }
-_STATE_FIELDS, _OUTPUT_FIELDS = field_names(STATE), field_names(OUTPUT)
+# Names of the state's fields.
+_STATE_FIELDS = field_names(STATE)
+# Names of the output's fields.
+_OUTPUT_FIELDS = field_names(OUTPUT)
 
 
 @inner

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aircraft.envelope import GRAVITY, UNDECIDED, Envelope, _at, ground_slope, ground_speed, turn_radius
+from aircraft.envelope import GRAVITY, UNDECIDED, Envelope, _interpolate_rows, ground_slope, ground_speed, turn_radius
 from logs.verdict import tolerances
 from tests.setups import falling_envelope
 
@@ -59,7 +59,7 @@ def test_between_the_slowest_level_flight_and_the_slowest_trim_the_trim_counts()
 def test_a_table_between_heights_is_numpys_interpolation(values: list[float], amsl: float) -> None:
     heights, table = np.array([0.0, 1.5, 4.0, 10.0]), np.array(values).reshape(2, 4)
     wanted = [np.interp(amsl, heights, row) for row in table]
-    np.testing.assert_array_equal(_at(heights, table, amsl), wanted)
+    np.testing.assert_array_equal(_interpolate_rows(heights, table, amsl), wanted)
 
 
 def test_wind_bends_the_slope_over_the_ground() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aircraft.identification.alignment import align, led
-from aircraft.identification.estimate import _left, align_clocks
+from aircraft.identification.estimate import _log_unexplained, align_clocks
 from aircraft.identification.flight_record import GRID_HZ, lagged
 from aircraft.identification.regression import Fit
 from tests.aircraft.identification.flown_truth import flown_truth
@@ -60,7 +60,7 @@ def test_what_a_lag_smooths_away_still_counts_as_unexplained() -> None:
 
     predicted, residual = late(0.5), 0.1 * late(3.0)
     fit = Fit(np.zeros(1), np.eye(1), predicted, residual, 0.0)
-    assert _left(fit, 0.05) == pytest.approx(np.log(0.01 / 1.01), abs=0.15)
+    assert _log_unexplained(fit, 0.05) == pytest.approx(np.log(0.01 / 1.01), abs=0.15)
     assert np.log(residual.var() / (predicted + residual).var()) < np.log(0.01 / 1.01) - 0.5
 
 

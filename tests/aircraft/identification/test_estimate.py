@@ -11,7 +11,7 @@ from aircraft.identification.estimate import (
     MIN_EXPLAINED,
     Equation,
     Estimate,
-    _hidden_by_noise,
+    _noise_bias,
     aligned_signals,
     fit_all,
     total_covariance,
@@ -122,10 +122,10 @@ def test_what_noise_hides_is_what_as_much_again_hides_where_the_axis_is_still_ex
         equations = tuple(Equation(name, "rad/s2", 25.0, flat, flat, share, 1.0) for name, share in names)
         return Estimate(np.full(n, value), np.eye(n), (), equations)
 
-    hidden = _hidden_by_noise(made(1.0, 0.7), made(0.8, MIN_EXPLAINED - 0.01))
+    hidden = _noise_bias(made(1.0, 0.7), made(0.8, MIN_EXPLAINED - 0.01))
     expected = {"pitch": -0.2, "yaw": -0.2, "roll": 0.0, "lift": 0.0, "drag": 0.0}
     assert hidden == pytest.approx([expected[parameter.group] for parameter in PARAMETERS])
-    assert not _hidden_by_noise(replace(made(1.0, 0.7), dynamics=False), made(0.8, 0.9)).any()
+    assert not _noise_bias(replace(made(1.0, 0.7), dynamics=False), made(0.8, 0.9)).any()
 
 
 def test_what_noise_hides_is_given_back_to_the_moments() -> None:
