@@ -33,7 +33,7 @@ USUAL_PORT = 8790
 # Interval between two checks whether to stop, s.
 _POLL_INTERVAL_S = 0.1
 # Time after which open requests are given up at the end, s.
-_CLOSE_TIMEOUT_S = 2
+_GRACE_S = 2
 # Greatest number of connections; a page has a few.
 _MAX_SOCKETS = 32
 
@@ -163,7 +163,7 @@ async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], b
     config = uvicorn.Config(
         app,
         log_level="critical", access_log=False, server_header=False, date_header=False, lifespan="off",
-        ws="websockets-sansio", ws_max_size=MAX_DROPPED_MESSAGE + MAX_MESSAGE, timeout_graceful_shutdown=_CLOSE_TIMEOUT_S,
+        ws="websockets-sansio", ws_max_size=MAX_DROPPED_MESSAGE + MAX_MESSAGE, timeout_graceful_shutdown=_GRACE_S,
         limit_concurrency=_MAX_SOCKETS, h11_max_incomplete_event_size=16_384, http=ShortLived,
     )  # fmt: skip
     web = Quiet(config)
