@@ -1,4 +1,4 @@
-"""The places of a log in order: rows that are doubled, late or impossible are dropped and counted, none is made up.
+"""Places of a log in order: doubled, late or impossible rows are dropped and counted, none is added.
 
 First the clock is made steady, then rows are sorted, then places that no aircraft can have been at are taken out.
 """
@@ -19,18 +19,20 @@ Flags = NDArray[np.bool_]
 
 
 # ----------------------------------------------------------------------
-# The clock: jumps back for good are taken out, and rows that came late find their place.
+# The clock: permanent jumps back are removed, and late rows are sorted.
 
-# A clock that is behind by this (s) over this many rows in a row has jumped; less is a row out of order.
-BEHIND, ROWS_BEHIND = 1.0, 8
+# A clock that is behind by more than this has jumped if it stays behind; less is a row out of order, s.
+BEHIND = 1.0
+# Number of successive rows for which a clock that jumped is behind.
+ROWS_BEHIND = 8
 
 
 @dataclass(frozen=True, slots=True)
 class SteadyClock:
-    """Times as a steady clock would have them.
+    """Times on a steady clock.
 
-    time: (n,) s, those after a jump moved on.
-    jumps: s, of the steady clock, at which the clock went back for good.
+    time: (n,) s, shifted after each jump.
+    jumps: times on the steady clock at which the clock went back permanently, s.
     """
 
     time: Floats
@@ -38,10 +40,10 @@ class SteadyClock:
 
 
 def steady_clock(time: Floats, usual: float = 0.1) -> SteadyClock:
-    """Times (n,) of a log's rows in the order of the file, without jumps back.
+    """Remove jumps back from the times (n,) of a log's rows in the order of the file.
 
-    A clock that goes back and stays there has been set anew: what follows is moved on, so that it comes ``usual`` s
-    after what was before.  A row that alone is out of order keeps its time.
+    A clock that goes back and stays there has been reset: later rows are shifted to follow ``usual`` s after the row
+    before.  A single row out of order keeps its time.
 
     >>> steady_clock(np.array([10.0, 11.0, *range(2, 14)]), usual=1.0).time.tolist()
     [10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 23.0]
@@ -65,7 +67,7 @@ def steady_clock(time: Floats, usual: float = 0.1) -> SteadyClock:
 
 
 def _first_for_good(behind: Ints, time: Floats, latest: Floats) -> int:
-    """The first row from which on as many rows are behind as make a jump, or all to the end; -1 for none."""
+    """Return the first row from which enough rows are behind for a jump, or all to the end; -1 without one."""
     for k in behind.tolist():
         until = min(k + ROWS_BEHIND, time.size)
         if until - k >= min(ROWS_BEHIND, 2) and (time[k:until] < latest[k - 1] - BEHIND).all():
@@ -76,30 +78,39 @@ def _first_for_good(behind: Ints, time: Floats, latest: Floats) -> int:
 # ----------------------------------------------------------------------
 # Places, gaps and glitches.
 
-# A pause between rows longer than this (s), or than so many usual steps where rows are rarer, is a gap.
-LONGEST_STEP, USUAL_STEPS = 1.0, 1.5
-# A place that takes this much (m/s) more than so many times the usual speed to get to and back from is none: GPS
+# A pause between rows longer than this is a gap, s.
+LONGEST_STEP = 1.0
+# The same in usual steps, if rows are rarer.
+USUAL_STEPS = 1.5
+# A place that requires this much more than `GLITCH_TIMES` the usual speed to reach and leave is a glitch, m/s: GPS
 # receivers jump by kilometres, and no aircraft gains as much between two rows.
-GLITCH_SPEED, GLITCH_TIMES = 60.0, 3.0
-# As many rows in a row may be out of place; more is a new place.
+GLITCH_SPEED = 60.0
+# Multiple of the usual speed in that test.
+GLITCH_TIMES = 3.0
+# Greatest number of successive rows of a glitch; more is a new place.
 GLITCH_ROWS = 20
-# A pause (s) over which the aircraft went no further than in this many usual steps is the clock's.
-JUMP, JUMP_STEPS = 5.0, 6.0
-# Below this speed (m/s) nothing is said of it: an aircraft on the ground goes nowhere in any time.
+# A pause longer than this without a corresponding distance is a jump of the clock, s.
+JUMP = 5.0
+# Distance in usual steps that an aircraft travels at most in a jump of the clock.
+JUMP_STEPS = 6.0
+# Least usual speed for that test, m/s: an aircraft on the ground travels no distance in any time.
 MOVING = 5.0
-# m on a degree of latitude, on the sphere of WGS 84's mean radius.
+# Length of a degree of latitude, m, on a sphere of the mean radius of WGS 84.
 DEGREE = math.radians(1.0) * 6_371_008.8
-_LOWEST, _HIGHEST = -1000.0, 50_000.0
+# Lowest altitude that is accepted, m.
+_MIN_ALTITUDE_M = -1000.0
+# Highest altitude that is accepted, m.
+_MAX_ALTITUDE_M = 50_000.0
 
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Where the vehicle was, in order.
+    """Places of the vehicle, in order.
 
-    time: (n,) s, increasing.  lat, lon: (n,) degrees.  up: (n,) m, NaN where the log has none.
-    faults: what was put right, in numbers.
+    time: (n,) s, increasing.  lat, lon: (n,) degrees.  up: (n,) m, NaN if not in the log.
+    faults: numbers of corrected faults.
     gaps: pauses.
-    shifts: times from which on, and seconds by which, the log's clock was moved back to take out its jumps.
+    shifts: times from which on, and seconds by which, the log's clock was shifted back to remove its jumps.
     """
 
     time: Floats
@@ -111,7 +122,7 @@ class Places:
     shifts: tuple[tuple[float, float], ...] = ()
 
     def on_clock(self, time: Floats) -> Floats:
-        """Times of the log's clock on the clock without jumps."""
+        """Convert times of the log's clock to the clock without jumps."""
         moved = np.array(time, dtype=np.float64)
         for start, seconds in self.shifts:
             moved[np.asarray(time) >= start] -= seconds
@@ -119,9 +130,9 @@ class Places:
 
 
 def clean_places(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> Places:
-    """Put rows of latitude, longitude and height in order.
+    """Clean and sort rows of latitude, longitude and altitude.
 
-    earlier_jumps: of the clock, that the reader has taken out already.
+    earlier_jumps: jumps of the clock that the reader has removed already.
 
     >>> rows = np.array([[46.0, 8.0, 500.0], [46.0002, 8.0, 500.0], [46.0002, 8.0, 500.0], [47.0, 8.0, 500.0]])
     >>> more = np.array([[46.0004 + 0.0002 * k, 8.0, 500.0] for k in range(4)])
@@ -135,7 +146,7 @@ def clean_places(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> Pl
     unusable = int(good.size - good.sum())
     time, values = time[good], values[good]
     order = np.argsort(time, kind="stable")
-    # A row that came after one of a later time.
+    # Rows that came after a row of a later time.
     unordered = int((time < np.maximum.accumulate(time)).sum()) if time.size else 0
     time, values = time[order], values[order]
     fresh = np.concatenate([[True], np.diff(time) > 0.0]) if time.size else np.zeros(0, bool)
@@ -143,7 +154,7 @@ def clean_places(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> Pl
     time, values = time[fresh], values[fresh]
     out = _glitches(time, values)
     time, values = time[~out], values[~out]
-    near = _near_others(time)
+    near = _is_in_main_group(time)
     time, shifts = _without_jumps(time[near], values[near])
     held = time < LATEST
     time, values = time[held], values[near][held]
@@ -155,17 +166,17 @@ def clean_places(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> Pl
 
 
 def find_gaps(time: Floats) -> tuple[Gap, ...]:
-    """Pauses between rows (n,) s."""
+    """Return the pauses between rows (n,) s."""
     if time.size < 2:
         return ()
     steps = np.diff(time)
     most = max(LONGEST_STEP, USUAL_STEPS * float(np.median(steps)))
-    # A hair more, so that a second between rows is none whatever its last bit.
+    # The tolerance covers rounding: a second between rows is no gap.
     return tuple(Gap(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(steps > most + 1e-6))
 
 
 def metres_between(lat: Floats, lon: Floats) -> Floats:
-    """Distance from each place (n,) to the next, m: (n - 1,), across the 180th meridian where that is shorter."""
+    """Return distances between successive places (n,), m: (n - 1,), also across the 180th meridian."""
     north = np.diff(lat) * DEGREE
     east = (np.diff(lon) + 180.0) % 360.0 - 180.0
     return np.hypot(north, east * DEGREE * np.cos(np.radians(0.5 * (lat[1:] + lat[:-1]))))
@@ -175,14 +186,14 @@ def _usable(time: Floats, values: Floats) -> Flags:
     lat, lon, up = values.T
     with np.errstate(invalid="ignore"):
         placed = (np.abs(lat) <= 90.0) & (np.abs(lon) <= 180.0) & ((lat != 0.0) | (lon != 0.0))
-        # A log without heights has none at all; a height that is none is another matter.
-        high = ~np.isfinite(up) | ((up > _LOWEST) & (up < _HIGHEST))
+        # A log without altitudes has none in any row; otherwise a row without altitude is unusable.
+        high = ~np.isfinite(up) | ((up > _MIN_ALTITUDE_M) & (up < _MAX_ALTITUDE_M))
         known = np.isfinite(up) if np.isfinite(up).any() else np.ones(up.size, bool)
         return np.asarray((time >= 0.0) & (time < 1e9) & placed & high & known)
 
 
 def _glitches(time: Floats, values: Floats) -> Flags:
-    """Rows that the vehicle cannot have been at, for it was elsewhere before and after."""
+    """Return the rows at which the vehicle cannot have been, because it was elsewhere before and after."""
     out = np.zeros(time.size, bool)
     if time.size < 5:
         return out
@@ -194,12 +205,12 @@ def _glitches(time: Floats, values: Floats) -> Flags:
     leaps = np.flatnonzero((speed > most) | (np.nan_to_num(rise) > most))
     k = 0
     while k < leaps.size:
-        # Gone at one leap and back at one of the next.
+        # Away with one leap and back with a later one.
         begin = int(leaps[k])
         for back in leaps[k + 1 :].tolist():
             if back - begin > GLITCH_ROWS:
                 break
-            if _near(time, values, begin, back + 1, most):
+            if _is_reachable(time, values, begin, back + 1, most):
                 out[begin + 1 : back + 1] = True
                 k = int(np.searchsorted(leaps, back))
                 break
@@ -212,7 +223,7 @@ def _glitches(time: Floats, values: Floats) -> Flags:
     return out
 
 
-def _near(time: Floats, values: Floats, one: int, other: int, most: float) -> bool:
+def _is_reachable(time: Floats, values: Floats, one: int, other: int, most: float) -> bool:
     pair = [one, other]
     away = float(metres_between(values[pair, 0], values[pair, 1])[0])
     rise = abs(float(values[other, 2] - values[one, 2]))
@@ -220,15 +231,15 @@ def _near(time: Floats, values: Floats, one: int, other: int, most: float) -> bo
     return max(away, 0.0 if math.isnan(rise) else rise) <= most * seconds
 
 
-def _near_others(time: Floats) -> Flags:
-    """Rows, by their times in order (n,), that are not a few alone, further from all others than a log can hold."""
+def _is_in_main_group(time: Floats) -> Flags:
+    """Select rows, by their sorted times (n,), except small groups far away in time from all others."""
     parts = np.cumsum(np.concatenate([[0], np.diff(time) > LATEST])) if time.size else np.zeros(0, np.int64)
     counts = np.bincount(parts)
     return np.asarray((counts >= min(ROWS_BEHIND, int(counts.max(initial=0))))[parts])
 
 
 def _without_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[float, float], ...]]:
-    """Times without jumps forward: pauses in which a vehicle on the move got no further than in a usual step."""
+    """Remove jumps forward: pauses in which a moving vehicle got no further than in a usual step."""
     shifts: list[tuple[float, float]] = []
     if time.size < 20:
         return time, ()

@@ -1,9 +1,9 @@
-"""The messages of an ArduPilot dataflash log: where each begins, and its fields as columns.
+"""Messages of an ArduPilot dataflash log: the start of each, and its fields as columns.
 
 A message is 0xA3, 0x95, its type, and a body whose length and fields the log itself states in messages named FMT
-(ArduPilot, libraries/AP_Logger/LogStructure.h).  There are no checksums: a message counts where the next one, or the
-file's end, begins right behind it.  pymavlink's `DFReader` counts no damage, stopped at message 471 of 4,737 in a log
-with 400 wrong bytes, and takes 6 to 14 times as long.
+(ArduPilot, libraries/AP_Logger/LogStructure.h).  There are no checksums: a message is valid if the next one, or the
+end of the file, follows immediately.  pymavlink's `DFReader` reports no damage, stopped at message 471 of 4,737 in a
+log with 400 wrong bytes, and takes 6 to 14 times as long.
 """
 
 import mmap
@@ -25,16 +25,16 @@ Ints = NDArray[np.int64]
 
 
 # ----------------------------------------------------------------------
-# The bytes of a log without its size in memory: mapped, and let go of again piece by piece.
+# Bytes of a log without its size in memory: mapped, and released piece by piece.
 
-# Bytes that are looked at before they are let go of.
+# Bytes that are read before they are released.
 PIECE = 16 * 2**20
 
 
 class MappedFile:
-    """A file's bytes as an array.
+    """Bytes of a file as a memory-mapped array.
 
-    data: (n,) of them.
+    data: (n,) its bytes.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -50,14 +50,14 @@ class MappedFile:
         self.data: Bytes = np.frombuffer(self._map, np.uint8)
 
     def let_go(self) -> None:
-        """Give back what the system holds of the file in memory; it is read anew where it is looked at again."""
-        # Windows has no such call, and counts mapped pages otherwise.
+        """Release the memory of the mapped file; it is read again when needed."""
+        # Windows has no such call, and accounts for mapped pages differently.
         if hasattr(self._map, "madvise"):
             self._map.madvise(mmap.MADV_DONTNEED)
 
 
 def pieces(size: int, let_go: Callable[[], None]) -> Iterator[int]:
-    """Ends of pieces of so many bytes, the last of them all; after each the file is let go of.
+    """Yield the ends of pieces of the file, the last being its size; the file is released after each.
 
     >>> list(pieces(3, lambda: None)), list(pieces(PIECE + 1, lambda: None)) == [PIECE, PIECE + 1]
     ([3], True)
@@ -70,14 +70,14 @@ def pieces(size: int, let_go: Callable[[], None]) -> Iterator[int]:
 
 
 # ----------------------------------------------------------------------
-# Messages: their formats, where they begin, and their fields as columns.
+# Messages: their formats, their starts, and their fields as columns.
 
 HEADER = 3
 FMT = 128
 _FMT_LENGTH = 89
-# Block-wise storage fills its last page with what was there before: so many bytes at the end are no damage.
+# Block-wise storage leaves old bytes in its last page: this number of bytes at the end is no damage.
 TRAILING = 528
-# What the letters of a format stand for: numpy's type, and by how much numbers are multiplied (ArduPilot,
+# Format letters: numpy type, and the factor that stored numbers are multiplied by (ArduPilot,
 # libraries/AP_Logger/LogStructure.h, "Format characters in the format string").
 FIELDS: dict[str, tuple[str, int]] = {
     "a": ("S64", 1), "b": ("i1", 1), "B": ("u1", 1), "h": ("<i2", 1), "H": ("<u2", 1), "i": ("<i4", 1), "I": ("<u4", 1),
@@ -88,7 +88,7 @@ FIELDS: dict[str, tuple[str, int]] = {
 
 
 class MessageFormat(NamedTuple):
-    """What a FMT message states of messages.
+    """Content of a FMT message, the format of other messages.
 
     number: of the type.  length: of a message, bytes.  columns: names of the fields.  letters: their types.
     """
@@ -101,18 +101,18 @@ class MessageFormat(NamedTuple):
 
     @property
     def dtype(self) -> np.dtype[np.void]:
-        """A message's body."""
+        """Type of the body of a message."""
         return np.dtype([(name, FIELDS[one][0]) for name, one in zip(self.columns, self.letters, strict=True)])
 
     @property
     def scales(self) -> dict[str, int]:
-        """By how much fields are multiplied, of those that are."""
+        """Factors of the scaled fields, by name."""
         named = zip(self.columns, self.letters, strict=True)
         return {name: FIELDS[one][1] for name, one in named if FIELDS[one][1] != 1}
 
 
 def _text(value: bytes) -> str:
-    """Text up to its first zero; what is no UTF-8 is written as escapes."""
+    """Decode text up to its first zero; bytes that are not UTF-8 become escapes."""
     return value.partition(b"\0")[0].decode(errors="backslashreplace")
 
 
@@ -120,9 +120,9 @@ def _text(value: bytes) -> str:
 class Messages:
     """All messages of one name, in the order of the file.
 
-    at: (n,) where each begins.
+    at: (n,) the start of each.
     rows: (n,) of the format's fields, as stored.
-    scales: by how much the fields are multiplied that are.
+    scales: factors of the scaled fields.
     """
 
     at: Ints
@@ -130,37 +130,37 @@ class Messages:
     scales: dict[str, int]
 
     def __len__(self) -> int:
-        """How many there are."""
+        """Return the number of messages."""
         return len(self.at)
 
     def has(self, *names: str) -> bool:
-        """Whether there are messages with all these fields."""
+        """Return True if there are messages with all these fields."""
         return len(self.at) > 0 and set(names) <= set(self.rows.dtype.names or ())
 
     def column(self, name: str) -> Floats:
-        """A field of numbers, in the format's unit."""
+        """Return a field of numbers, in the unit of the format."""
         values = self.rows[name].astype(np.float64)
-        # Divided, so that a number is the nearest to its decimal digits.
+        # Division gives the number nearest to its decimal digits.
         return np.asarray(values / self.scales.get(name, 1))
 
     def texts(self, name: str) -> list[str]:
-        """A field of text."""
+        """Return a field of text."""
         return [_text(value) for value in self.rows[name].tolist()]
 
     def only(self, keep: NDArray[np.bool_]) -> "Messages":
-        """Some of them."""
+        """Return the selected messages."""
         return Messages(self.at[keep], self.rows[keep], self.scales)
 
 
 @dataclass(frozen=True, slots=True)
 class Dataflash:
-    """An indexed log.
+    """Indexed log.
 
     data: its bytes.
-    starts: for each type of message, where its messages begin.
-    formats: of each type.
+    starts: for each type of message, the starts of its messages.
+    formats: by type.
     names: of the messages that the log holds.
-    damage: what could not be read.
+    damage: parts that could not be read.
     """
 
     data: Bytes
@@ -171,7 +171,7 @@ class Dataflash:
     let_go: Callable[[], None] = lambda: None
 
     def messages(self, name: str) -> Messages:
-        """All messages of a name; none for one that the log does not hold."""
+        """Return all messages of a name; an empty object if there are none."""
         for number, known in self.formats.items():
             if known.name == name and number in self.starts:
                 return _columns(self.data, self.starts[number], known, self.let_go)
@@ -181,9 +181,9 @@ class Dataflash:
 def index_dataflash(data: Bytes, names: Collection[str], let_go: Callable[[], None] = lambda: None) -> Dataflash:
     """Find the messages of some names in a log (n,) of bytes.
 
-    let_go: called now and then, to give back the memory of what was looked at.
+    let_go: called regularly, to release memory.
 
-    Twice through the log: for the formats, and for the messages of those names, so that what is kept of a large log is
+    The log is read twice: for the formats, and for the messages of those names, so that the index of a large log is
     small.
     """
     only_formats = np.zeros(256, np.bool_)
@@ -202,7 +202,7 @@ def index_dataflash(data: Bytes, names: Collection[str], let_go: Callable[[], No
     second = _find_messages(data, wanted, let_go)
     order = np.argsort(second.kinds, kind="stable")
     numbers, firsts = np.unique(second.kinds[order], return_index=True)
-    # Of no messages numpy makes one empty part.
+    # Without messages numpy returns one empty part.
     starts = {
         int(number): found for number, found in zip(numbers, np.split(second.at[order], firsts[1:]), strict=False)
     }
@@ -211,8 +211,8 @@ def index_dataflash(data: Bytes, names: Collection[str], let_go: Callable[[], No
     return Dataflash(data, starts, formats, held, damage, let_go)
 
 
-class _Found(NamedTuple):
-    """Where the wanted messages begin and of which type each is; how many there are of each type; what is lost."""
+class _FoundMessages(NamedTuple):
+    """Starts and types of the wanted messages, the number of messages of each type, and the damage."""
 
     at: Ints
     kinds: Bytes
@@ -222,7 +222,7 @@ class _Found(NamedTuple):
     cut: bool
 
 
-def _find_messages(data: Bytes, wanted: NDArray[np.bool_], let_go: Callable[[], None]) -> _Found:
+def _find_messages(data: Bytes, wanted: NDArray[np.bool_], let_go: Callable[[], None]) -> _FoundMessages:
     state, lengths, counts = np.zeros(6, np.int64), np.zeros(256, np.int64), np.zeros(256, np.int64)
     state[_READING], lengths[FMT] = 1, _FMT_LENGTH
     at, kinds = [np.zeros(0, np.int64)], [np.zeros(0, np.uint8)]
@@ -232,14 +232,14 @@ def _find_messages(data: Bytes, wanted: NDArray[np.bool_], let_go: Callable[[], 
         kinds.append(found[1])
     places, size, behind = int(state[_PLACES]), int(state[_LOST]), int(state[_BEHIND])
     if not state[_READING] and behind and data.size - behind < TRAILING:
-        # The rest of the last page.
+        # The rest of the last page is no damage.
         places -= 1
         size -= min(size, data.size - HEADER + 1 - behind)
-    return _Found(np.concatenate(at), np.concatenate(kinds), counts, places, size, bool(state[_CUT]))
+    return _FoundMessages(np.concatenate(at), np.concatenate(kinds), counts, places, size, bool(state[_CUT]))
 
 
 def _format(body: bytes) -> MessageFormat | None:
-    """The format that a FMT message states; None for one that cannot be one."""
+    """Return the format stated by a FMT message; None for an invalid one."""
     if len(body) < _FMT_LENGTH - HEADER:
         return None
     number, length, *texts = struct.unpack("<BB4s16s64s", body)
@@ -267,9 +267,18 @@ def _columns(data: Bytes, starts: Ints, known: MessageFormat, let_go: Callable[[
     return Messages(starts, rows, known.scales)
 
 
-# Of a walk: the next byte, places where no message begins, their bytes, the end of the last message, whether it was
-# one, and whether it is cut.
-_AT, _PLACES, _LOST, _BEHIND, _READING, _CUT = range(6)
+# Indices into the state of a walk: the next byte,
+_AT = 0
+# the number of places where no message begins,
+_PLACES = 1
+# the number of bytes there,
+_LOST = 2
+# the end of the last message,
+_BEHIND = 3
+# 1 while messages follow each other,
+_READING = 4
+# and 1 if the last message is cut.
+_CUT = 5
 
 
 @compiled
@@ -284,7 +293,7 @@ def _walk_messages(
     trailing: int,
     wanted: NDArray[np.bool_],
 ) -> tuple[Ints, Bytes]:  # pragma: no cover - compiled
-    """Wanted messages that begin before a byte, and their types; the walk goes on from its state."""
+    """Return starts and types of wanted messages before a byte, continuing from the state."""
     at, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
     count, end = 0, data.size
     places, size, k, behind = state[_PLACES], state[_LOST], state[_AT], state[_BEHIND]
@@ -294,7 +303,7 @@ def _walk_messages(
         if data[k] == 0xA3 and data[k + 1] == 0x95:
             length = lengths[data[k + 2]]
         after = k + length
-        # What follows has to be a message, too, unless the file ends there.
+        # Another message has to follow, unless the file ends there.
         follows = after >= end - 1 or (data[after] == 0xA3 and data[after + 1] == 0x95) or end - after < trailing
         if length == 0 or not follows:
             places += reading

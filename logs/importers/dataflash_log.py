@@ -1,7 +1,7 @@
-"""ArduPilot's dataflash logs (`.BIN`): the messages that say where the vehicle was, what it felt, and what it was told.
+"""ArduPilot's dataflash logs (`.BIN`): positions, measurements and commands of the vehicle.
 
-`logs.importers.dataflash_frames` finds the messages; here they become a `RawLog`.  Names of messages and fields are
-those of ArduPilot's log documentation; of older releases those that stood there then.
+`logs.importers.dataflash_frames` finds the messages; here they become a `RawLog`.  Names of messages and fields follow
+ArduPilot's log documentation, in older releases as documented then.
 """
 
 import math
@@ -27,16 +27,16 @@ Floats = NDArray[np.float64]
 # Missions: the messages CMD, and home from ORGN where they hold none.
 
 _NUMBERS = ("CNum", "CId", "Prm1", "Prm2", "Prm3", "Prm4", "Lat", "Lng", "Alt")
-# Items that a mission can have, and the largest number of one: 16 bits (ArduPilot's log documentation, CMD).
+# Largest item number: 16 bits (ArduPilot's log documentation, CMD).
 _MAX_ITEMS = 65535.0
-# ORGN.Type of home; the other is where the estimator's map has its origin.
+# ORGN.Type of home; the other type is the origin of the estimator's map.
 _HOME = 1
 
 
 def dataflash_missions(commands: Messages, time: Floats, origins: Messages, source: str) -> Iterator[LoggedMission]:
-    """Missions in the order in which they were logged: each whole, items that are flown again left out.
+    """Yield missions in the order of the log: each whole, without repetitions of flown items.
 
-    commands: CMD.  time: (n,) s, of each.  origins: ORGN.  source: the log's name.
+    commands: CMD.  time: (n,) s, of each.  origins: ORGN.  source: name of the log.
 
     >>> none = Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
     >>> list(dataflash_missions(none, np.zeros(0), none, "a.BIN"))
@@ -51,10 +51,10 @@ def dataflash_missions(commands: Messages, time: Floats, origins: Messages, sour
     rows = []
     for row, (stamp, total, frame) in enumerate(zip(time.tolist(), totals, frames, strict=True)):
         number, command, p1, p2, p3, p4, lat, lon, up = (column[row] for column in table)
-        # Garbage that looks like a message, or a hostile log: nothing is made for millions of items that are not there.
+        # Garbage that looks like a message, or a hostile log: make nothing for millions of items that do not exist.
         if not (0.0 <= number <= _MAX_ITEMS and math.isfinite(command) and math.isfinite(frame)):
             continue
-        # A float32 has seven digits; a mission file has six behind the point.
+        # A float32 has seven digits; a mission file has six after the decimal point.
         place = (on_grid(lat), on_grid(lon), round(up, 6))
         item = MissionItem(int(number), int(command), int(frame), (p1, p2, p3, p4), *place)
         rows.append(Item(stamp, int(total) if 0.0 <= total <= _MAX_ITEMS else 0, item))
@@ -68,7 +68,7 @@ def dataflash_missions(commands: Messages, time: Floats, origins: Messages, sour
 
 
 def logged_home(origins: Messages) -> Home | None:
-    """Home as the vehicle last had it, of the messages ORGN; None where they do not say."""
+    """Return the last home of the vehicle, from ORGN; None if not logged."""
     if not origins.has("Type", "Lat", "Lng", "Alt"):
         return None
     homes = origins.only(origins.column("Type") == _HOME)
@@ -80,7 +80,7 @@ def logged_home(origins: Messages) -> Home | None:
 
 
 FORMAT = "ArduPilot dataflash log"
-# VER.BT: which vehicle the program was built for.
+# Vehicle by VER.BT, the vehicle that the program was built for.
 _BUILDS: dict[int, VehicleKind] = {
     1: "rover", 2: "copter", 3: "plane", 4: "tracker", 7: "submarine", 12: "blimp", 13: "copter"
 }  # fmt: skip
@@ -93,26 +93,28 @@ _PROGRAMS: dict[str, VehicleKind] = {
     "ArduSub": "submarine",
     "AntennaTracker": "tracker",
     "Blimp": "blimp",
-    # As they were named until 2018.
+    # Names until 2018.
     "APM:Plane": "plane",
     "APM:Copter": "copter",
     "APM:Rover": "rover",
 }
 _PROGRAM = re.compile(rf"^({'|'.join(_PROGRAMS)})\b")
-# Days from 1970 to GPS's beginning, s, and leap seconds since, as they have stood since 2017.
-_GPS_EPOCH, _LEAP = 315_964_800.0, 18.0
-_WEEK = 604_800.0
+# Time from 1970 to the epoch of GPS, s.
+_GPS_EPOCH_S = 315_964_800.0
+# Leap seconds since then, constant since 2017, s.
+_LEAP_SECONDS_S = 18.0
+_WEEK_S = 604_800.0
 
 
 def read_dataflash(path: Path) -> RawLog:
-    """Read a log.  Raises LogError for one without a message that says where the vehicle was."""
+    """Read a log.  Raises LogError for one without positions."""
     file = MappedFile(path)
     index = index_dataflash(file.data, _READ, file.let_go)
     return _Reader(index, str(path)).read()
 
 
 def program_and_vehicle(texts: Iterable[str], version: Messages) -> tuple[str, VehicleKind]:
-    """What flew, by the texts of MSG, or by VER where they do not say.
+    """Return program and vehicle, from the texts of MSG, or from VER.
 
     >>> none = Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
     >>> program_and_vehicle(["ArduCopter V4.5.7"], none), program_and_vehicle([], none)
@@ -128,12 +130,12 @@ def program_and_vehicle(texts: Iterable[str], version: Messages) -> tuple[str, V
 
 
 class _Reader:
-    """One log; the parts of it that `RawLog` has."""
+    """Reader of one log, part by part of `RawLog`."""
 
     def __init__(self, index: Dataflash, source: str) -> None:
         self._index, self._source = index, source
         self._cache: dict[str, Messages] = {}
-        self._clock = self._steady()
+        self._clock = self._clock_shifts()
 
     def read(self) -> RawLog:
         series = {name: found for name, found in self._series() if found is not None and len(found.time)}
@@ -162,19 +164,19 @@ class _Reader:
         )
 
     def _messages(self, name: str) -> Messages:
-        """Messages of a name, of the first instance where there are several."""
+        """Return the messages of a name, of the first instance if there are several."""
         if name not in self._cache:
             found = self._index.messages(name)
             for column in ("I", "C", "Inst", "Instance"):
-                # Earlier releases have a mode's number or a count under these names; those are no instances.
+                # Earlier releases have a mode number or a counter under these names, which are no instances.
                 if name in _WITH_INSTANCES and found.has(column) and found.rows.dtype[column].kind in "ui":
                     number = found.rows[column]
                     found = found.only(number == number.min())
             self._cache[name] = found
         return self._cache[name]
 
-    def _steady(self) -> tuple[NDArray[np.int64], Floats, tuple[float, ...]]:
-        """Where the log's clock has to be moved: from which byte on, by how much (s), and when."""
+    def _clock_shifts(self) -> tuple[NDArray[np.int64], Floats, tuple[float, ...]]:
+        """Return the shifts of the log's clock: from which byte on, by how much (s), and when."""
         times, at = [], []
         for name in ("POS", "ATT", "GPS", "MODE"):
             found = self._messages(name)
@@ -228,12 +230,12 @@ class _Reader:
         found = self._first((("GPS", ("Lat", "Lng", "Alt")),))
         if found is None or not gps.has("Status"):
             return found
-        # Below a fix in three dimensions there is no height.
+        # Without a 3-D fix there is no altitude.
         fixed = gps.column("Status") >= 3
         return LogSeries("GPS", found.time[fixed], found.values[fixed])
 
     def _velocity(self) -> LogSeries | None:
-        """East, north, up."""
+        """Return east, north, up."""
         for name in ("XKF1", "NKF1", "EKF1"):
             found = self._table(name, ("VE", "VN", "VD"))
             if found is not None and len(found.time):
@@ -247,11 +249,11 @@ class _Reader:
 
     def _wind(self) -> LogSeries | None:
         found = self._first([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
-        # An estimate that was never made stays at nothing.
+        # Without an estimate the wind stays zero.
         return found if found is not None and np.any(found.values) else None
 
     def _airspeed(self) -> LogSeries | None:
-        """True airspeed: ArduPilot's are equivalent ones."""
+        """Return true airspeed, converted from ArduPilot's equivalent airspeed."""
         sensor = self._messages("ARSP")
         found = self._table("ARSP", ("Airspeed",))
         if found is not None and sensor.has("U"):
@@ -276,7 +278,7 @@ class _Reader:
         return np.array([true_by_equivalent(float(height)) for height in up])
 
     def _battery(self) -> LogSeries | None:
-        """Current, and energy used so far."""
+        """Return current and used energy."""
         found = self._table("BAT", ("Curr", "EnrgTot"))
         if found is None or not len(found.time):
             found = self._table("CURR", ("Curr", "EnrgTot"))
@@ -343,12 +345,12 @@ class _Reader:
         found = self._messages("GPS")
         for weeks, millis in (("GWk", "GMS"), ("Week", "TimeMS")):
             if found.has(weeks, millis, "TimeUS"):
-                # Before it has a fix a receiver makes a week up.
+                # Without a fix a receiver may report a wrong week.
                 good = (found.column(weeks) > 1000) & (found.column("Status") >= 3 if found.has("Status") else True)
                 if good.any():
                     k = int(np.argmax(good))
-                    seconds = found.column(weeks)[k] * _WEEK + found.column(millis)[k] * 1e-3
-                    return float(_GPS_EPOCH - _LEAP + seconds - self._time(found)[k])
+                    seconds = found.column(weeks)[k] * _WEEK_S + found.column(millis)[k] * 1e-3
+                    return float(_GPS_EPOCH_S - _LEAP_SECONDS_S + seconds - self._time(found)[k])
         return math.nan
 
 

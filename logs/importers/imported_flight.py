@@ -23,15 +23,17 @@ Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
-# The flights of a log, and the stretches of them that were flown along a mission.
+# Flights of a log, and the parts of them that were flown along a mission.
 
-# m/s over the ground as a median over `_OVER` s: more is flight.  An aircraft against the wind may be slower for so
-# many seconds.
-FLYING, SLOWER_FOR = 6.0, 60.0
-_OVER = 5.0
-# s.  A flight that is no further from the log's first row, or its last, is cut by it.
-IN_THE_AIR = _OVER
-# s.  A flight lasts this long at least.
+# Median ground speed above which the aircraft flies, m/s.
+FLYING = 6.0
+# Longest time for which an aircraft in flight may be slower, against the wind, s.
+SLOWER_FOR = 60.0
+# Window of the median ground speed, s.
+_MEDIAN_WINDOW_S = 5.0
+# A flight within this time of the first or last row of the log is cut off by the log, s.
+IN_THE_AIR = _MEDIAN_WINDOW_S
+# Least duration of a flight, s.
 SHORTEST = 20.0
 
 
@@ -67,7 +69,7 @@ def flown_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[float, flo
     if time.size < 3:
         return []
     speed = metres_between(lat, lon) / np.maximum(np.diff(time), 1e-3)
-    width = max(1, int(_OVER / max(1e-3, float(np.median(np.diff(time))))))
+    width = max(1, int(_MEDIAN_WINDOW_S / max(1e-3, float(np.median(np.diff(time))))))
     fast = _running_median(speed, width) > FLYING
     spans: list[list[float]] = []
     for k in np.flatnonzero(fast).tolist():
@@ -138,21 +140,23 @@ def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> i
 
 
 def choose_part(parts: Sequence[FlightPart]) -> int:
-    """Which flight is judged: the one that was flown along its mission for the longest, or the longest."""
+    """Return the index of the flight to judge: the one flown along its mission for longest, or the longest."""
     return max(range(len(parts)), key=lambda k: (parts[k].along_mission, parts[k].end - parts[k].start))
 
 
-# s.  What is shown before and after a flight.
+# Time that is shown before and after a flight, s.
 BESIDE = 10.0
-# A value is taken from rows that are no further apart than this (s), or than so many usual steps of its own.
-_NEAR, _NEAR_STEPS = 1.0, 2.5
-# s.  Over which heights are compared at the start.
-_COMPARED = 5.0
+# Greatest time between rows that a value is interpolated from, s.
+_MAX_INTERPOLATED_STEP_S = 1.0
+# The same as a multiple of the usual step of the series.
+_MAX_INTERPOLATED_STEPS = 2.5
+# Time at the start over which altitudes are compared, s.
+_COMPARED_TIME_S = 5.0
 _REFUSED: dict[VehicleKind, str] = {
     "copter": "a copter's", "rover": "a rover's", "boat": "a boat's", "submarine": "a submarine's",
     "tracker": "an antenna tracker's", "blimp": "a blimp's",
 }  # fmt: skip
-_HELD: tuple[Quantity, ...] = ("velocity", "attitude", "airspeed", "wind", "battery", "throttle")
+_OPTIONAL_QUANTITIES: tuple[Quantity, ...] = ("velocity", "attitude", "airspeed", "wind", "battery", "throttle")
 _MAX_ROWS = 4_000_000
 
 
@@ -213,7 +217,7 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     places = clean_places(series, raw.clock_jumps)
     spans = flown_spans(places.time, places.lat, places.lon)
     if not spans:
-        raise LogError(f"{raw.source}: no flight in it: {_why_none(places)}", file=raw.source)
+        raise LogError(f"{raw.source}: no flight in it: {_reason_without_flight(places)}", file=raw.source)
     last = float(places.time[-1])
     modes = [type(one)(float(places.on_clock(np.array([one.time]))[0]), one.name, one.automatic) for one in raw.modes]
     parts = flight_parts(spans, modes, raw.missions, last)
@@ -223,24 +227,24 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
             raise LogError.of_argument("flight", number, f"it holds flights 1..{len(parts)}", file=raw.source)
         chosen = number - 1
     others = tuple((part.start, part.along_mission) for k, part in enumerate(parts) if k != chosen)
-    return _cut(raw, places, parts[chosen], chosen + 1, len(parts), others)
+    return _cut_out(raw, places, parts[chosen], chosen + 1, len(parts), others)
 
 
-def _why_none(places: Places) -> str:
+def _reason_without_flight(places: Places) -> str:
     if places.time.size < 2:
         bad = places.faults.unusable
         return f"{places.time.size} usable places" + (f", {bad:,} without a place or a time" if bad else "")
     return f"in {places.time[-1] - places.time[0]:.0f} s it never went faster than a person for long"
 
 
-def _cut(
+def _cut_out(
     raw: RawLog, places: Places, part: FlightPart, number: int, count: int, others: tuple[tuple[float, float], ...]
 ) -> LoggedFlight:
     keep = (places.time >= part.start - BESIDE) & (places.time <= part.end + BESIDE)
     time = places.time[keep]
-    columns = {name: _at(raw.series.get(name), name, time, places) for name in COLUMNS if name != "height"}
+    columns = {name: _interpolate_at(raw.series.get(name), name, time, places) for name in COLUMNS if name != "height"}
     up = places.up[keep]
-    holds: list[Quantity] = [name for name in _HELD if np.isfinite(columns[name]).any()]
+    holds: list[Quantity] = [name for name in _OPTIONAL_QUANTITIES if np.isfinite(columns[name]).any()]
     if np.isfinite(up).all():
         holds.append("heights")
     start = part.stretches[0].start if part.stretches else part.start
@@ -266,8 +270,8 @@ def _cut(
     )
 
 
-def _at(series: LogSeries | None, name: str, time: Floats, places: Places) -> Floats:
-    """A series at the times of the places (n,), NaN where it has no rows near."""
+def _interpolate_at(series: LogSeries | None, name: str, time: Floats, places: Places) -> Floats:
+    """Interpolate a series at the times of the places (n,), NaN without rows nearby."""
     width = len(COLUMNS[name])
     out = np.full((time.size, width), math.nan)
     if series is None:
@@ -280,7 +284,7 @@ def _at(series: LogSeries | None, name: str, time: Floats, places: Places) -> Fl
     own, values = own[fresh], values[fresh]
     if own.size < 2:
         return out
-    near = max(_NEAR, _NEAR_STEPS * float(np.median(np.diff(own))))
+    near = max(_MAX_INTERPOLATED_STEP_S, _MAX_INTERPOLATED_STEPS * float(np.median(np.diff(own))))
     after = np.clip(np.searchsorted(own, time), 1, own.size - 1)
     within = (own[after] - own[after - 1] <= near) & (time >= own[0] - near) & (time <= own[-1] + near)
     exact = np.isclose(own[after], time, atol=1e-9) | np.isclose(own[after - 1], time, atol=1e-9)
@@ -296,11 +300,11 @@ def _at(series: LogSeries | None, name: str, time: Floats, places: Places) -> Fl
 
 
 def _heights(raw: RawLog, places: Places, start: float) -> Heights:
-    """Which height was taken, and how much higher the others are in the first seconds of what is judged."""
+    """Return the chosen altitude, and the offsets of the others in the first seconds of the judged flight."""
     offsets = []
     for other in raw.heights:
         time = places.on_clock(other.series.time)
-        first = (time >= start) & (time <= start + _COMPARED) & np.isfinite(other.series.values[:, 0])
+        first = (time >= start) & (time <= start + _COMPARED_TIME_S) & np.isfinite(other.series.values[:, 0])
         if first.any() and np.isfinite(places.up).any():
             own = np.interp(time[first], places.time, places.up)
             offsets.append(HeightOffset(other.name, float(np.median(other.series.values[first, 0] - own))))
@@ -344,7 +348,7 @@ _MAX_WIND = 30.0
 
 @dataclass(frozen=True, slots=True)
 class MeanWind:
-    """Mean wind: m/s, rad clockwise from north where it comes from, and the message it is of."""
+    """Mean wind: m/s, rad clockwise from north where it comes from, and its message."""
 
     speed: float
     from_course: float
@@ -374,7 +378,8 @@ def mean_wind(flight: LoggedFlight) -> MeanWind | None:
 
 
 # ----------------------------------------------------------------------
-# The rows of an imported flight as a track; what the log does not hold is NaN there.
+# ----------------------------------------------------------------------
+# Rows of an imported flight as a track; quantities that are not logged are NaN.
 
 
 def track_of_flight(flight: LoggedFlight, origin: GeoOrigin) -> Track:

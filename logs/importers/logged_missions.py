@@ -1,4 +1,4 @@
-"""What several formats hold alike: missions, ArduPlane's parameters and flight modes, by the names of any release."""
+"""Content common to several log formats: missions, and ArduPlane and PX4 flight modes."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -9,14 +9,14 @@ from flight.simulation.setup import MissingItems
 from logs.importers.raw_log import LoggedMission
 
 # ----------------------------------------------------------------------
-# Missions out of items as logs hold them: one by one, whole missions again and again, and items as they are flown.
+# Missions from logged items: logged one by one, as whole missions repeatedly, and as items that are flown.
 
 
 class Item(NamedTuple):
-    """An item as logged.
+    """Item as logged.
 
-    time: s.  total: of how many items its mission is; 0 where that is not logged.
-    begins: whether the log shows that a mission anew begins with it.
+    time: s.  total: number of items of its mission; 0 if not logged.
+    begins: true if the log shows that a new mission begins with it.
     """
 
     time: float
@@ -26,9 +26,9 @@ class Item(NamedTuple):
 
 
 class LoggedItems(NamedTuple):
-    """The items of a mission, by rising number: since when they hold (s), and how many there are said to be.
+    """Items of a mission, by rising number, the time from which they apply (s), and announced number.
 
-    total: 0 where the log does not say.
+    total: 0 if not logged.
     """
 
     time: float
@@ -37,10 +37,10 @@ class LoggedItems(NamedTuple):
 
 
 def gather_items(rows: Iterable[Item]) -> list[LoggedItems]:
-    """Missions that items, in the order of the log, come to.
+    """Combine items, in the order of the log, into missions.
 
-    Items from number 0 on are a mission anew, also where some are lost behind it.  An item alone is one that is flown
-    if it is as it was, and else one that was changed.  A mission that is logged twice, each time in part, is one.
+    Items from number 0 on begin a new mission, even if later ones are lost.  A single item is a flown item if it is
+    unchanged, and otherwise an edited one.  A mission that is logged twice, each time in part, is one mission.
 
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
     >>> logged = [Item(1.0, 3, way[0]), Item(1.0, 3, way[1]), Item(1.0, 3, way[2]), Item(9.0, 3, way[1])]
@@ -48,14 +48,18 @@ def gather_items(rows: Iterable[Item]) -> list[LoggedItems]:
     [(1.0, 3, 3)]
     """
     found: list[tuple[float, dict[int, MissionItem]]] = []
-    # The number of items that was last announced for each of them.
+    # The last announced number of items, for each mission.
     totals: list[int] = []
     ordered = list(rows)
     for k, (time, total, item, begins) in enumerate(ordered):
         following = ordered[k + 1].item if k + 1 < len(ordered) else None
-        if not found or begins or (item.seq == 0 and len(found[-1][1]) > 1 and _is_of_another(following, found[-1][1])):
+        if (
+            not found
+            or begins
+            or (item.seq == 0 and len(found[-1][1]) > 1 and _begins_mission(following, found[-1][1]))
+        ):
             found.append((time, {}))
-        elif item.seq in found[-1][1] and not _same(found[-1][1][item.seq], item):
+        elif item.seq in found[-1][1] and not _is_same_item(found[-1][1][item.seq], item):
             found.append((time, dict(found[-1][1])))
         found[-1][1][item.seq] = item
         if len(totals) < len(found):
@@ -64,7 +68,7 @@ def gather_items(rows: Iterable[Item]) -> list[LoggedItems]:
     out: list[LoggedItems] = []
     for (start, items), total in zip(found, totals, strict=True):
         logged = LoggedItems(start, total, tuple(items[seq] for seq in sorted(items)))
-        if out and _are_one(out[-1], logged):
+        if out and _is_same_mission(out[-1], logged):
             both = {item.seq: item for item in (*out[-1].items, *logged.items)}
             out[-1] = LoggedItems(out[-1].time, total or out[-1].total, tuple(both[seq] for seq in sorted(both)))
         else:
@@ -72,40 +76,39 @@ def gather_items(rows: Iterable[Item]) -> list[LoggedItems]:
     return out
 
 
-def _is_of_another(following: MissionItem | None, known: Mapping[int, MissionItem]) -> bool:
-    """Whether what follows an item 0 shows that a mission begins with it: item 1, or one that is not known as it is."""
+def _begins_mission(following: MissionItem | None, known: Mapping[int, MissionItem]) -> bool:
+    """Return True if the item after an item 0 shows a new mission: item 1, or an unknown or changed one."""
     if following is None or following.seq == 0:
         return False
-    return following.seq == 1 or following.seq not in known or not _same(known[following.seq], following)
+    return following.seq == 1 or following.seq not in known or not _is_same_item(known[following.seq], following)
 
 
-def _are_one(one: LoggedItems, other: LoggedItems) -> bool:
-    """Whether two are the same mission: item by item; or where the same number is announced, in the items of both.
+def _is_same_mission(one: LoggedItems, other: LoggedItems) -> bool:
+    """Return True for the same mission: all items equal; or announced number and common items equal.
 
-    Home, item 0, is the same in all that is flown from a place: it alone in common tells nothing.
+    Home, item 0, is the same in all missions flown from a place: it alone in common is no evidence.
     """
     known = {item.seq: item for item in one.items}
     common = [item for item in other.items if item.seq in known]
     whole = len(common) == len(one.items) == len(other.items)
     announced = one.total == other.total > 0 and any(item.seq > 0 for item in common)
-    return (whole or announced) and all(_same(known[item.seq], item) for item in common)
+    return (whole or announced) and all(_is_same_item(known[item.seq], item) for item in common)
 
 
-def _same(one: MissionItem, other: MissionItem) -> bool:
+def _is_same_item(one: MissionItem, other: MissionItem) -> bool:
     return _content(one) == _content(other)
 
 
 def _content(item: MissionItem) -> tuple[object, ...]:
-    # As text: what is unset is NaN, which equals nothing.
+    # Compare as text, because an unset number is NaN, which equals nothing.
     return item.seq, item.command, repr((item.params, item.lat_deg, item.lon_deg, item.alt))
 
 
 def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMission | None:
-    """The mission of logged items, the first of number 0 being home; None where that is all, or all but one item.
+    """Make the mission of logged items, with item 0 as home; None if fewer than two other items remain.
 
-    An item that no autopilot could make sense of is left out and told.  Where items are missing, the mission is the
-    longest run of items without a gap.
-    source: the log's name.  origin: what of the log holds the items, for people.
+    An invalid item is left out with a warning.  If items are missing, the mission is the longest run without a gap.
+    source: name of the log.  origin: messages that hold the items, for people.
 
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
     >>> made = logged_mission(LoggedItems(1.0, 5, tuple(way)), "a.BIN", "CMD").mission
@@ -137,7 +140,7 @@ def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMissi
 
 
 def px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
-    """Items of PX4, which counts from 0, counted from 1.
+    """Renumber the items of PX4, which counts from 0, from 1.
 
     After a vertical take-off PX4 flies to its place (docs.px4.io, "Mission Mode (VTOL)"), as after any other.
 
@@ -150,11 +153,10 @@ def px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
 
 
 def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission | None:
-    """A mission whose items are numbered from 1, if it is whole, or its longest run of items without a gap.
+    """Return a mission numbered from 1 if it is whole, or with its longest run of items without a gap.
 
-    total: how many items it is said to have, 0 where that is not known.  end: the number of its last item, as far as
-    that is known.
-    None for a whole mission of fewer than two items; of one that is not whole, even none may be left.
+    total: announced number of items, 0 if not known.  end: number of its last item, as far as known.
+    None for a whole mission of fewer than two items; an incomplete mission may be left without any item.
     """
     held = {item.seq for item in logged.mission.items}
     missing = tuple(sorted(set(range(1, end + 1)) - held))
@@ -167,7 +169,7 @@ def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission |
 
 
 def _longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
-    """The most items that follow each other, up to a jump to another; the first of several such runs."""
+    """Return the longest run of successive items, up to a jump out of it; the first of several such runs."""
     runs: list[list[MissionItem]] = [[]]
     for item in items:
         if runs[-1] and item.seq != runs[-1][-1].seq + 1:
@@ -177,11 +179,11 @@ def _longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
 
 
 def _before_jump_out(run: Sequence[MissionItem]) -> Sequence[MissionItem]:
-    """The items of a run before the first jump to an item that is not among them."""
+    """Return the items of a run before the first jump to an item outside it."""
     at = {float(item.seq): k for k, item in enumerate(run)}
     end = len(run)
     jumps = [(at.get(item.params[0], end), k) for k, item in enumerate(run) if item.command == Command.DO_JUMP]
-    # The farthest first: what one cuts off, those behind it in this order may lead to.
+    # The farthest targets first: items cut off by one jump may be the targets of the next.
     for target, k in sorted(jumps, reverse=True):
         if target >= end:
             end = min(end, k)
@@ -206,13 +208,14 @@ _PX4_STATES = {
     12: "DESCEND", 13: "TERMINATION", 14: "OFFBOARD", 15: "STAB", 17: "TAKEOFF", 18: "LAND", 21: "ORBIT",
 }  # fmt: skip
 # Main modes of PX4's custom_mode, and the sub-modes of AUTO (PX4, src/modules/commander/px4_custom_mode.h).
-_PX4_AUTO, _PX4_AUTO_MISSION = 4, 4
+_PX4_AUTO = 4
+_PX4_AUTO_MISSION = 4
 _PX4_MAIN = {1: "MANUAL", 2: "ALTCTL", 3: "POSCTL", 5: "ACRO", 6: "OFFBOARD", 7: "STABILIZED", 8: "RATTITUDE"}
 _PX4_SUB = {2: "TAKEOFF", 3: "LOITER", 4: "MISSION", 5: "RTL", 6: "LAND", 7: "RTGS", 8: "FOLLOWME"}
 
 
 def plane_mode(number: int) -> tuple[str, bool]:
-    """ArduPlane's name of a mode, and whether it follows the mission.
+    """Return ArduPlane's name of a mode, and whether it follows the mission.
 
     >>> plane_mode(10), plane_mode(5)
     (('AUTO', True), ('FBWA', False))
@@ -221,7 +224,7 @@ def plane_mode(number: int) -> tuple[str, bool]:
 
 
 def px4_state(number: int) -> tuple[str, bool]:
-    """PX4's name of a navigation state, and whether it follows the mission.
+    """Return PX4's name of a navigation state, and whether it follows the mission.
 
     >>> px4_state(3), px4_state(5)
     (('MISSION', True), ('RTL', False))
@@ -230,7 +233,7 @@ def px4_state(number: int) -> tuple[str, bool]:
 
 
 def px4_mode(custom_mode: int) -> tuple[str, bool]:
-    """PX4's name of a mode as a heartbeat carries it, and whether it follows the mission.
+    """Return PX4's name of the mode in a heartbeat, and whether it follows the mission.
 
     >>> px4_mode(4 << 24 | 4 << 16)
     ('MISSION', True)

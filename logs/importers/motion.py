@@ -1,7 +1,7 @@
-"""The motion of an aircraft as a log holds it, unthinned: inertial sensors, servo outputs, attitude, air data, battery.
+"""Motion of an aircraft in a log, unthinned: inertial sensors, servos, attitude, air data, battery.
 
-`logs.importers.raw_log` holds what a verdict needs, the vehicle's positions; this module holds what identifies the
-aircraft's model.  `logs.importers.motion_log` reads it from logs.
+`logs.importers.raw_log` holds the vehicle's positions, for a verdict; this module holds the data that identify a model
+of the aircraft.  `logs.importers.motion_log` reads it from logs.
 """
 
 from collections.abc import Mapping
@@ -30,28 +30,28 @@ class Samples:
 
     @property
     def rate(self) -> float:
-        """Rows a second, by the median step; 0 of fewer than two."""
+        """Median rate of rows, Hz; 0 for fewer than two rows."""
         return float(1.0 / max(1e-6, np.median(np.diff(self.time)))) if len(self.time) > 1 else 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class MotionLog:
-    """A log's motion.  SI and radians; none of a kind has no rows.
+    """Motion in a log, in SI units and radians; data that are not logged have no rows.
 
-    source: the file.  sha256: of its bytes.  program: what flew.  vehicle: what it is.
+    source: the file.  sha256: of its bytes.  program: name of the program.  vehicle: kind of vehicle.
     inertial: (n, 6) specific force forward, right, down, and p, q, r, of the first inertial sensor.
     outputs: (n, 14) servo outputs, microseconds, the first in column 0.
-    attitude: (n, 3) roll, pitch, yaw.  velocity: (n, 3) north, east, down.  wind: (n, 2) north, east, as it moves.
-    airspeed: (n, 1) equivalent, m/s, of a sensor that was in use.  ratio: (n, 1) true by equivalent airspeed.
-    height: (n, 1) m above sea level.  battery: (n, 2) V and A.
-    modes: time and number of the flight mode.  parameters: by name; those that changed in flight keep the last.
-    program_kind: whose log it is.
-    controls: (n, 4) pitch up, roll and yaw to the right as shares of full travel, and throttle (0..1), of a log that
-        has those in place of pulses.
-    elevons: whether the controls are made by elevons.
-    hovering: stretches (s) on lifting motors that the log names itself.
-    home: latitude and longitude, degrees, and m above sea level: as the vehicle had it last (ORGN), or its first
-        position on the ground; None where neither is logged.
+    attitude: (n, 3) roll, pitch, yaw.  velocity: (n, 3) north, east, down.  wind: (n, 2) north, east, as the air moves.
+    airspeed: (n, 1) equivalent, m/s, of a sensor that was in use.  ratio: (n, 1) of true to equivalent airspeed.
+    height: (n, 1) m AMSL.  battery: (n, 2) V and A.
+    modes: time and number of the flight mode.  parameters: by name, the last value of each.
+    program_kind: kind of program that wrote the log.
+    controls: (n, 4) pitch up, roll and yaw to the right as fractions of full travel, and throttle (0..1), of a log that
+        has them instead of pulses.
+    elevons: true if the controls are made by elevons.
+    hovering: periods on lifting motors (s) that the log itself names.
+    home: latitude and longitude, degrees, and m AMSL: the last home of the vehicle (ORGN), or its first position on the
+        ground; None if neither is logged.
     """
 
     source: str
@@ -77,12 +77,12 @@ class MotionLog:
 
     @property
     def moved(self) -> Samples:
-        """What was told to the surfaces: controls where the log has them, or else pulses."""
+        """Commands to the surfaces: controls if logged, otherwise pulses."""
         return self.controls if len(self.controls.time) else self.outputs
 
 
 def first_on_ground(position: Samples, velocity: Samples) -> tuple[float, float, float] | None:
-    """The first position at which a vehicle stood still; None of a log that begins in flight.
+    """Return the first position at which a vehicle stood still; None for a log that begins in flight.
 
     position: (n, 3) latitude, longitude (degrees) and height (m).  velocity: (n, 3) m/s.
 
@@ -103,7 +103,7 @@ def first_on_ground(position: Samples, velocity: Samples) -> tuple[float, float,
 
 
 def rising(time: Floats, values: Floats) -> Samples:
-    """Rows in the order of their times; those that are no numbers and those of the same time left out."""
+    """Sort rows by time, without repeated times and rows that are no numbers."""
     good = np.isfinite(time) & np.isfinite(values).all(axis=1)
     time, values = time[good], values[good]
     order = np.argsort(time, kind="stable")

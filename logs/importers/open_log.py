@@ -1,4 +1,4 @@
-"""Flight logs of other programs: which formats there are, how a file's is told, and what reads it."""
+"""Formats of flight logs of other programs: detect the format of a file, and find its reader."""
 
 import re
 from collections.abc import Callable
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 class LogFormat(NamedTuple):
-    """One format.
+    """Format of a log.
 
     name: for messages.
     suffixes: of its files, in lower case.
-    content: what the first bytes of such a file hold, a regular expression.
-    reader: module and function, which takes a path, gives a `RawLog` and raises LogError; imported where it is needed,
-    for each brings its own library along.
-    extra: that the library is in; "" for none.
+    content: regular expression for the first bytes of such a file.
+    reader: module and function, which takes a path, returns a `RawLog` and raises LogError; imported when needed,
+    because each needs another library.
+    extra: the extra that contains the library; "" for none.
     """
 
     name: str
@@ -34,7 +34,7 @@ class LogFormat(NamedTuple):
     extra: str = ""
 
 
-# Every format that is read; where a file's first bytes fit several, its suffix decides, and then the order here.
+# All formats; if the first bytes of a file fit several, its suffix decides, and then this order.
 FORMATS = (
     LogFormat("PX4 .ulg", (".ulg",), rb"\AULog\x01\x12\x35", "px4_log.read_px4", "px4-logs"),
     LogFormat("ArduPilot .BIN", (".bin",), rb"\xa3\x95", "dataflash_log.read_dataflash"),
@@ -45,15 +45,17 @@ FORMATS = (
     LogFormat(".kml or .kmz", (".kml", ".kmz"), rb"<kml|\APK\x03\x04", "track_files.read_kml"),
 )
 SUFFIXES = tuple(suffix for known in FORMATS for suffix in known.suffixes)
-# A dataflash log as text, which is refused, and the suffix that such files have.
-_AS_TEXT, _TEXT_SUFFIX = rb"\A\s*FMT, ?128,", ".log"
-# A day of a vehicle that logs all it can takes less.
+# Content of a dataflash log as text, which is refused.
+_AS_TEXT = rb"\A\s*FMT, ?128,"
+# Suffix of such files.
+_TEXT_SUFFIX = ".log"
+# Largest log; a day of a vehicle that logs everything takes less.
 MAX_BYTES = 2 * 2**30
 _HEAD = 512
 
 
 def is_imported_log(path: Path) -> bool:
-    """Whether a file is another program's log, by its suffix.
+    """Return True if a file is a log of another program, by its suffix.
 
     >>> is_imported_log(Path("00000042.BIN")), is_imported_log(Path("flight.mcap"))
     (True, False)
@@ -62,7 +64,7 @@ def is_imported_log(path: Path) -> bool:
 
 
 def open_log(path: Path) -> "RawLog":
-    """Read a log.  Raises LogError, in one line, for a file that is none or that holds no place and time.
+    """Read a log.  Raises LogError, in one line, for other files and for logs without places and times.
 
     >>> open_log(Path("nothing.BIN"))
     Traceback (most recent call last):
@@ -85,7 +87,7 @@ def open_log(path: Path) -> "RawLog":
             need_extra(known.extra, f"{path}: reading {known.suffixes[0]} needs")
         module, function = known.reader.split(".")
         read: Reader = getattr(import_module(f"logs.importers.{module}"), function)
-        # What is no number in a damaged log is left out later, and reported.
+        # Invalid numbers of a damaged log are left out later, and reported.
         with np.errstate(all="ignore"):
             return read(path)
     except OSError as error:
@@ -97,9 +99,9 @@ def open_log(path: Path) -> "RawLog":
 
 
 def log_format(path: Path, head: bytes) -> LogFormat:
-    """The format of a file, by its first bytes and its suffix; by its suffix alone where they fit none.
+    """Return the format of a file, by its first bytes and its suffix, or by its suffix alone.
 
-    Raises LogError where neither is known, and for a dataflash log as text.
+    Raises LogError if neither is known, and for a dataflash log as text.
 
     >>> log_format(Path("flight.igc"), b"<gpx>").name, log_format(Path("a.BIN"), bytes(9)).name
     ('.gpx', 'ArduPilot .BIN')

@@ -1,7 +1,7 @@
-"""How many fields the message formats of a PX4 log come to, counted before pyulog makes them.
+"""Number of fields in the message formats of a PX4 log, counted before pyulog makes them.
 
-A format may hold others, and arrays of them (PX4, "ULog File Format", Message Format): forty that hold the next one
-twice are a kilobyte and 2^40 fields.  pyulog makes every field of a topic when the log says that it holds the topic.
+A format may contain others, and arrays of them (PX4, "ULog File Format", Message Format): forty that contain the next
+one twice are a kilobyte and 2^40 fields.  pyulog makes every field of a topic when the log declares the topic.
 """
 
 import re
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from world.errors import LogError
 
-# Fields of all topics of a log at most: PX4's own have some 30,000.
+# Greatest number of fields of all topics of a log; PX4 itself has about 30,000.
 MAX_FIELDS = 300_000
 _FIELD = re.compile(r"(\w+)(?:\[(\d{1,9})\])? ")
 _PLAIN = frozenset(f"{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16, 32, 64)) | {
@@ -18,7 +18,7 @@ _PLAIN = frozenset(f"{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16
 
 
 class MessageFormats:
-    """The formats that a log has stated so far, and the fields of the topics that it has said to hold.
+    """Formats of a log up to the present record, and the number of fields of its topics.
 
     source: names the log in messages.
     """
@@ -30,7 +30,7 @@ class MessageFormats:
         self._total = 0
 
     def state(self, text: str) -> None:
-        """Take a format in: its name, a colon, and its fields.
+        """Add a format: its name, a colon, and its fields.
 
         >>> formats = MessageFormats("a.ulg")
         >>> formats.state("wind:uint64_t timestamp;float[3] wind;")
@@ -42,14 +42,14 @@ class MessageFormats:
         self._counts.clear()
 
     def hold(self, name: str) -> None:
-        """Note that the log holds a topic of this format.  Raises LogError for more fields than a log may have."""
+        """Add a topic of this format.  Raises LogError for more fields than a log may have."""
         self._total += self.fields(name)
         if self._total > MAX_FIELDS:
             words = f"the formats of its messages come to more than {MAX_FIELDS:,} fields"
             raise LogError(f"{self._source}: not a PX4 log that can be read: {words}", file=self._source)
 
     def fields(self, name: str) -> int:
-        """Fields of a format, those that it nests included; more than `MAX_FIELDS` where it holds itself."""
+        """Return the number of fields of a format, including nested ones; more than `MAX_FIELDS` if recursive."""
         return self._count(name, frozenset())
 
     def _count(self, name: str, within: frozenset[str]) -> int:
@@ -68,7 +68,7 @@ class MessageFormats:
 
 
 def _types(fields: str) -> Iterator[tuple[str, int]]:
-    """Type and number of each field; of an array its length."""
+    """Yield type and number of each field; for an array its length."""
     for field in fields.split(";"):
         if found := _FIELD.match(field):
             yield found[1], int(found[2] or 1)

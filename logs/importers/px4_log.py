@@ -1,7 +1,7 @@
-"""PX4's logs (`.ulg`): the topics that say where the vehicle was, what it felt, and what it was told.
+"""PX4's logs (`.ulg`): positions, measurements and commands of the vehicle.
 
-pyulog reads the container; what of it is damaged is counted here, for pyulog says only whether anything is.  Names of
-topics and fields are those of PX4's message documentation, of older releases those that stood there then.
+pyulog reads the container; its damage is counted here, because pyulog only reports whether there is any.  Names of
+topics and fields follow PX4's message documentation, in older releases as documented then.
 """
 
 import contextlib
@@ -31,17 +31,19 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 FORMAT = "PX4 log"
-# Bytes before the first record, and the letters of all records (PX4, "ULog File Format").
-_HEADER, _LETTERS = 16, b"BFIMPQARDLCSO"
+# Bytes before the first record.
+_HEADER = 16
+# Letters of all records (PX4, "ULog File Format").
+_LETTERS = b"BFIMPQARDLCSO"
 _TOPICS = [
     "vehicle_global_position", "vehicle_local_position", "vehicle_attitude", "airspeed_validated", "airspeed", "wind",
     "wind_estimate", "battery_status", "vehicle_status", "navigator_mission_item", "vehicle_gps_position", "sensor_gps",
     "vehicle_air_data", "actuator_controls_0", "vehicle_thrust_setpoint", "home_position", "mission_result",
 ]  # fmt: skip
-# vehicle_status.vehicle_type.
+# Vehicle by vehicle_status.vehicle_type.
 _TYPES: dict[int, VehicleKind] = {1: "copter", 2: "plane", 3: "rover", 4: "blimp"}
 _AMSL, _OVER_HOME = 0, 3
-# Degrees, and m, that no home has; each is checked again where the mission is placed.
+# Limits of degrees and m beyond which a home is invalid; each is checked again where the mission is placed.
 _PLACE = np.array([90.0, 180.0, 10_000.0])
 # Numbers of items are 16 bits.
 _MAX_ITEMS = 65_535
@@ -53,25 +55,25 @@ def read_px4(path: Path) -> RawLog:
 
 
 def open_topics(path: Path, names: list[str]) -> "Topics":
-    """The named topics of a log.  Raises LogError, in one line, for a file that pyulog cannot read."""
+    """Read the named topics of a log.  Raises LogError, in one line, for a file that pyulog cannot read."""
     try:
-        # It complains on the terminal.
+        # pyulog reports errors on the terminal.
         with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
             found = ULog(_Steps(file, str(path)), names, disable_str_exceptions=True)
     except (AddressSpaceError, LogError):
         raise
     except MemoryError:
         raise LogError(f"{path}: claims more than fits into memory", file=path) from None
-    except Exception as error:  # of whatever kind: the library raises struct's, its own and plain ones
+    except Exception as error:  # of any kind: the library raises errors of struct, its own and plain ones
         raise LogError(f"{path}: not a PX4 log that can be read: {_one_line(error)}", file=path) from error
     return Topics(found, str(path), _damage_of(path))
 
 
 class _Steps:
-    """A file in which a step back from a read that met the end is as long as what was read, and formats are counted.
+    """File in which a step back after a read at the end is as long as the read data; formats are counted.
 
-    pyulog steps back by what a record claims to be, and would read the end of a damaged file again and again; it reads
-    a record's three bytes of length and letter, and then its content.
+    pyulog steps back by the claimed length of a record, and would read the end of a damaged file again and again; it
+    reads a record's three bytes of length and letter, and then its content.
     """
 
     def __init__(self, file: BinaryIO, source: str) -> None:
@@ -102,7 +104,7 @@ class _Steps:
 
 
 def find_damage(data: Bytes, let_go: Callable[[], None] = lambda: None) -> Damage:
-    """What of a log (n,) of bytes cannot be read: its records follow each other, each with a length and a known letter.
+    """Find the damage of a log (n,) of bytes, whose records follow each other, with length and known letter.
 
     >>> find_damage(np.zeros(20, np.uint8)).places
     1
@@ -120,13 +122,21 @@ def _damage_of(path: Path) -> Damage:
     return find_damage(file.data, file.let_go)
 
 
-# Of a walk: the next byte, places where no record begins, their bytes, whether the last was one, whether it is cut.
-_AT, _PLACES, _LOST, _READING, _CUT = range(5)
+# Indices into the state of a walk: the next byte,
+_AT = 0
+# the number of places where no record begins,
+_PLACES = 1
+# the number of bytes there,
+_LOST = 2
+# 1 while records follow each other,
+_READING = 3
+# and 1 if the last record is cut.
+_CUT = 4
 
 
 @compiled
 def _walk(data: Bytes, until: int, state: Ints, letters: Bytes) -> None:  # pragma: no cover - compiled
-    """Go on to a byte from a walk's state."""
+    """Continue a walk from its state up to a byte."""
     known = np.zeros(256, np.bool_)
     for letter in letters:
         known[letter] = True
@@ -155,7 +165,7 @@ def _one_line(error: Exception) -> str:
 
 
 def _table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]]) -> LogSeries | None:
-    """The first choice of fields that one instance of a topic has."""
+    """Return the first choice of fields that one instance of a topic has."""
     for columns in choices:
         if data and all(column in data for column in columns):
             values = np.stack([np.asarray(data[column], dtype=np.float64) for column in columns], axis=1)
@@ -164,7 +174,7 @@ def _table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]])
 
 
 class Topics:
-    """The topics of one log: the first instance of each, but for batteries, which are added up."""
+    """Topics of one log: the first instance of each, but all instances of batteries, which are added up."""
 
     def __init__(self, log: ULog, source: str, damage: Damage) -> None:
         self._log, self._source, self._damage = log, source, damage
@@ -175,7 +185,7 @@ class Topics:
         self._data = {name: instances[0] for name, instances in self._instances.items()}
 
     def log(self) -> RawLog:
-        """All that a verdict needs.  Raises LogError for a log that does not say where it flew."""
+        """Return everything that a verdict needs.  Raises LogError for a log without positions."""
         series = {name: found for name, found in self._series() if found is not None and len(found.time)}
         if "position" not in series:
             raise LogError(f"{self._source}: no vehicle_global_position: nothing says where it flew", file=self._source)
@@ -197,11 +207,11 @@ class Topics:
 
     @property
     def source(self) -> str:
-        """The file."""
+        """Path of the file."""
         return self._source
 
     def table(self, topic: str, *choices: tuple[str, ...]) -> LogSeries | None:
-        """The first choice of fields that a topic has."""
+        """Return the first choice of fields that a topic has."""
         return _table(topic, self._data.get(topic, {}), choices)
 
     def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
@@ -236,7 +246,7 @@ class Topics:
         return LogSeries(found.source, found.time, found.values * np.array([1.0, 1.0, -1.0]))
 
     def attitude(self) -> LogSeries | None:
-        """Roll, pitch and yaw (n, 3), rad; None of a log without."""
+        """Return roll, pitch and yaw (n, 3), rad; None if not logged."""
         found = self.table("vehicle_attitude", ("q[0]", "q[1]", "q[2]", "q[3]"))
         if found is None:
             return self.table("vehicle_attitude", ("roll", "pitch", "yaw"))
@@ -256,10 +266,10 @@ class Topics:
         return None
 
     def battery(self) -> LogSeries | None:
-        """Voltage, V, the mean of all connected batteries, and their currents together, A; (n, 2).
+        """Return the mean voltage, V, of all connected batteries, and the sum of their currents, A; (n, 2).
 
-        None of a log without, and of one in which a connected battery's current was not measured.  What is measured of
-        another kind than the first battery (`source`), as by the motors' controllers, is the same current again.
+        None for a log without batteries, or if the current of a connected battery was not measured.  A measurement of
+        another kind than that for the first battery (`source`), such as by motor controllers, repeats the same current.
         """
         chosen = []
         for data in self._instances.get("battery_status", []):
@@ -306,11 +316,11 @@ class Topics:
                 last = state
 
     def vehicle(self) -> VehicleKind:
-        """What it is; a VTOL is a plane."""
+        """Return the kind of vehicle; a VTOL is a plane."""
         data = self._data.get("vehicle_status", {})
         if "vehicle_type" in data:
             kinds = np.asarray(data["vehicle_type"])
-            # A VTOL is a copter at its ends.
+            # A VTOL is a copter at the ends of a flight.
             if (kinds == 2).any():
                 return "plane"
             return _TYPES.get(int(kinds[0]), "unknown")
@@ -319,7 +329,7 @@ class Topics:
         return "unknown"
 
     def _missions(self) -> Iterable[LoggedMission]:
-        """The one mission, of items as they became the current one; which others it has mission_result says."""
+        """Yield the one mission, from items as they became current; mission_result identifies the others."""
         items = self._items()
         stamps = self._data.get("navigator_mission_item", {}).get("timestamp", [0.0])
         total = self._mission_length(float(stamps[-1]) if items else math.inf)
@@ -333,7 +343,7 @@ class Topics:
             yield made
 
     def _items(self) -> dict[int, MissionItem]:
-        """Items by their numbers, from 0; those that were never flown to are not in the log."""
+        """Return the items by number, from 0; items that were never current are not in the log."""
         data = self._data.get("navigator_mission_item", {})
         wanted = ("sequence_current", "nav_cmd", "latitude", "longitude", "altitude")
         items: dict[int, MissionItem] = {}
@@ -344,7 +354,7 @@ class Topics:
         radius = data.get("acceptance_radius", np.zeros(count))
         for k in range(count):
             number, command, lat, lon, up = (float(data[name][k]) for name in wanted)
-            # Before anything is made of them: garbage may be too large for any degrees.
+            # Check before conversion: garbage may be too large for any degrees.
             placed = abs(lat) <= 90.0 and abs(lon) <= 180.0 and math.isfinite(up)
             if not (placed and 0.0 <= number < _MAX_ITEMS and math.isfinite(command)):
                 continue
@@ -357,7 +367,7 @@ class Topics:
         return items
 
     def _mission_length(self, stamp: float) -> int:
-        """How many items the mission had at a time (us of the log's clock); 0 where the log does not say."""
+        """Return the number of items of the mission at a time (us of the log's clock); 0 if not logged."""
         data = self._data.get("mission_result", {})
         if "seq_total" not in data:
             return 0
@@ -366,7 +376,7 @@ class Topics:
         return int(total) if 0.0 <= total <= _MAX_ITEMS else 0
 
     def home(self) -> Home | None:
-        """Where it was set last; None where the log does not say."""
+        """Return the last home; None if not logged."""
         found = self.table("home_position", ("lat", "lon", "alt"))
         if found is None:
             return None
@@ -374,15 +384,15 @@ class Topics:
         return Home(on_grid(placed[-1, 0]), on_grid(placed[-1, 1]), float(placed[-1, 2])) if len(placed) else None
 
     def parameters(self) -> dict[str, float]:
-        """By name; those that changed in flight keep the last, and those that are no numbers are left out."""
+        """Return the parameters by name, with the last value of changed ones, without values that are no numbers."""
         known = dict(self._log.initial_parameters)
         known |= {name: value for _, name, value in self._log.changed_parameters}
-        # A damaged one may be a text.
+        # A damaged parameter may be a text.
         numbers = {str(name): float(value) for name, value in known.items() if isinstance(value, int | float)}
         return {name: value for name, value in numbers.items() if math.isfinite(value)}
 
     def program(self) -> str:
-        """Name and release of what flew."""
+        """Return name and release of the program."""
         info = self._log.msg_info_dict
         name, release = str(info.get("sys_name", "PX4")), info.get("ver_sw_release")
         if isinstance(release, int):

@@ -1,7 +1,8 @@
-"""What a log of PX4 (`.ulg`) holds of an aircraft's motion, as `logs.importers.motion_log` has it of ArduPilot's.
+"""Motion of an aircraft from a PX4 log (`.ulg`), as `motion_log` reads it from ArduPilot logs.
 
-All topics are of one clock.  What the surfaces do is `actuator_servos`, with the airframe that the control allocation
-was told (CA_*), or `actuator_controls_0` of releases before 1.14.  Names are of PX4's message and parameter references.
+All topics share one clock.  Surface deflections are taken from `actuator_servos`, with the airframe of the control
+allocation (CA_*), or from `actuator_controls_0` of releases before 1.14.  Names follow PX4's message and parameter
+references.
 """
 
 from collections.abc import Iterable, Mapping
@@ -23,8 +24,10 @@ _TOPICS = [
     "actuator_controls_0", "battery_status", "vehicle_status", "home_position", "flaps_setpoint", "spoilers_setpoint",
 ]  # fmt: skip
 NONE = Samples(np.zeros(0), np.zeros((0, 1)))
-# CA_AIRFRAME: a fixed wing, and one with lifting motors beside it, whose first rotors they are.
-_WING, _STANDARD_VTOL = 1, 2
+# CA_AIRFRAME of a fixed wing.
+_WING = 1
+# CA_AIRFRAME of a fixed wing with additional lifting motors, which are its first rotors.
+_STANDARD_VTOL = 2
 _AIRFRAMES = {
     0: "a multirotor", 3: "a tiltrotor", 4: "a tailsitter", 5: "a rover", 6: "a rover", 7: "a craft without wings",
     8: "a multirotor", 9: "a custom airframe",
@@ -34,16 +37,20 @@ _MODELLED = frozenset({1, 2, 3, 4, 5, 6, 15})
 _ELEVONS = frozenset({5, 6})
 _MIXED = {7: "a V-tail", 8: "a V-tail", 12: "a custom surface", 13: "an A-tail", 14: "an A-tail"}
 _FLAPS = {9: "flap", 10: "flap", 11: "airbrake", 17: "spoiler", 18: "spoiler"}
-# CA_SV_CSn_...: what else moves a surface, and the topic that says by how much.
+# CA_SV_CSn_...: other controls that move a surface, and the topic of their deflection.
 _ALSO_MOVE = {"FLAP": ("flaps", "flaps_setpoint"), "SPOIL": ("spoilers", "spoilers_setpoint")}
 _AXES = ("P", "R", "Y")
-# A flap moves that leaves its place by more, of its travel of 2.
-_MOVES = 0.05
-# vehicle_status: vehicle_type of a fixed wing, and arming_state of a vehicle that is armed.
-_FIXED_WING, _ARMED = 2, 2
-# The most that the topics hold.
-_SERVOS, _MOTORS = 8, 12
-# ArduPlane's parameters by PX4's, with what they are multiplied with.
+# Deflection of a flap beyond which it is moved, of its travel of 2.
+_FLAP_MOVE_TOLERANCE = 0.05
+# vehicle_status.vehicle_type of a fixed wing.
+_FIXED_WING = 2
+# vehicle_status.arming_state of an armed vehicle.
+_ARMED = 2
+# Greatest number of servos in the topics.
+_SERVOS = 8
+# Greatest number of motors in the topics.
+_MOTORS = 12
+# ArduPlane's parameters by PX4's names, with conversion factors.
 _PARAMETERS: Mapping[str, tuple[str, float]] = {
     "FW_AIRSPD_MIN": ("AIRSPEED_MIN", 1.0), "FW_AIRSPD_TRIM": ("AIRSPEED_CRUISE", 1.0),
     "FW_AIRSPD_MAX": ("AIRSPEED_MAX", 1.0), "FW_R_LIM": ("ROLL_LIMIT_DEG", 1.0),
@@ -52,9 +59,9 @@ _PARAMETERS: Mapping[str, tuple[str, float]] = {
 
 
 def read_px4_motion(path: Path, digest: str) -> MotionLog:
-    """Read a log's motion; digest: SHA-256 of its bytes.
+    """Read the motion of a log; digest: SHA-256 of its bytes.
 
-    Raises LogError, in one line, for a file that cannot be read, and for surfaces that no model of is estimated.
+    Raises LogError, in one line, for a file that cannot be read, and for surfaces that cannot be modelled.
     """
     topics = open_topics(path, _TOPICS)
     with np.errstate(all="ignore"):
@@ -114,7 +121,7 @@ def _inertial(topics: Topics) -> Samples:
 
 
 def _wind(topics: Topics) -> Samples:
-    """To where the air moves, north and east."""
+    """Return the wind vector, north and east, in the direction of the air's motion."""
     for topic in ("wind", "wind_estimate"):
         found = _samples(topics, topic, ("windspeed_north", "windspeed_east"))
         if len(found.time):
@@ -123,9 +130,9 @@ def _wind(topics: Topics) -> Samples:
 
 
 def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
-    """Calibrated airspeed where a sensor measured it, and true by calibrated."""
+    """Return measured calibrated airspeed, and the ratio of true to calibrated airspeed."""
     true = "true_airspeed_m_s"
-    # Calibrated since 1.12, equivalent until then: at these speeds the same.
+    # Calibrated since 1.12, equivalent until then: equal at these speeds.
     choices = [(speed, true) for speed in ("calibrated_airspeed_m_s", "equivalent_airspeed_m_s")]
     found = topics.table("airspeed_validated", *choices)
     if found is None:
@@ -146,7 +153,7 @@ def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
 
 
 def _hovering(topics: Topics) -> Iterable[tuple[float, float]]:
-    """Stretches (s) in which a VTOL was not a plane, or on its way to being one."""
+    """Yield the periods (s) in which a VTOL was not a plane, or in transition."""
     kinds = topics.table("vehicle_status", ("vehicle_type", "in_transition_mode"), ("vehicle_type",))
     if kinds is None:
         return
@@ -160,17 +167,17 @@ def _hovering(topics: Topics) -> Iterable[tuple[float, float]]:
 
 
 def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples, bool]:
-    """(n, 4) pitch up, roll and yaw right as shares of full travel, and throttle; and whether elevons do it.
+    """Return (n, 4) pitch, roll, yaw as fractions of travel, and throttle; and whether there are elevons.
 
-    A surface's positive is up, or right; its torque scales (CA_SV_CSn_TRQ_*) say which axes it moves, and an axis is
-    the mean of its surfaces by these.  Raises LogError for surfaces that no model of is estimated.
+    A surface's positive is up, or right; its torque scales (CA_SV_CSn_TRQ_*) give the axes that it moves, and an axis
+    is the mean of its surfaces weighted by them.  Raises LogError for surfaces that cannot be modelled.
     """
     servos, motors = _actuators(topics, "actuator_servos", _SERVOS), _actuators(topics, "actuator_motors", _MOTORS)
-    # What is not used has no number.
+    # An unused servo has NaN.
     known = np.isfinite(servos.values).any(axis=1) & _armed(topics, servos.time)
     servos = Samples(servos.time[known], servos.values[known])
     if len(servos.time) < 2 or len(motors.time) < 2:
-        # Roll, pitch, yaw and throttle as they were before the mixer.
+        # Roll, pitch, yaw and throttle before the mixer.
         old = _samples(topics, "actuator_controls_0", tuple(f"control[{k}]" for k in range(4)))
         return (Samples(old.time, old.values[:, [1, 0, 2, 3]]) if len(old.time) else NONE), False
     airframe = int(parameters.get("CA_AIRFRAME", _WING))
@@ -181,7 +188,7 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
     for k in range(int(np.clip(parameters.get("CA_SV_CS_COUNT", 0.0), 0.0, _SERVOS))):
         kind = int(parameters.get(f"CA_SV_CS{k}_TYPE", 0.0))
         used = servos.values[np.isfinite(servos.values[:, k]), k]
-        moves = len(used) > 0 and float(np.ptp(used)) > _MOVES
+        moves = len(used) > 0 and float(np.ptp(used)) > _FLAP_MOVE_TOLERANCE
         if kind in _MODELLED:
             _refuse_flaperon(topics, parameters, k)
             scales[:, k] = [parameters.get(f"CA_SV_CS{k}_TRQ_{axis}", 0.0) for axis in _AXES]
@@ -198,7 +205,7 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
             raise LogError(f"{topics.source}: no surface is the {axis}'s: {allowed}", file=topics.source)
     sums = np.abs(scales).sum(axis=1, keepdims=True)
     shares = np.nan_to_num(servos.values) @ (scales / np.where(sums > 0.0, sums, 1.0)).T
-    # A motor below 2 % of its thrust is stopped, and stopped is no number (PX4's control allocator).
+    # A motor below 2 % of its thrust is stopped, which is NaN (PX4's control allocator).
     pushing = np.nan_to_num(motors.values[:, _pushers(topics, airframe, parameters, motors)])
     throttle = np.clip(pushing.mean(axis=1), 0.0, 1.0) if pushing.size else np.zeros(len(motors.time))
     rows = np.clip(np.searchsorted(motors.time, servos.time, side="right") - 1, 0, len(motors.time) - 1)
@@ -206,10 +213,10 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
 
 
 def _pushers(topics: Topics, airframe: int, parameters: Mapping[str, float], motors: Samples) -> list[int]:
-    """Which motors push ahead.  Raises LogError for a VTOL none of whose rotors does."""
+    """Return the motors that push forward.  Raises LogError for a VTOL without one."""
     count = int(np.clip(parameters.get("CA_ROTOR_COUNT", 0.0), 0.0, _MOTORS))
     if airframe == _STANDARD_VTOL:
-        # Of a rotor that no parameter turns the axis is up.
+        # The axis of a rotor is up by default.
         axes = [[abs(parameters.get(f"CA_ROTOR{k}_A{axis}", up)) for axis, up in (("X", 0.0), ("Z", 1.0))]
                 for k in range(count)]  # fmt: skip
         ahead = [k for k, (x, z) in enumerate(axes) if x > z]
@@ -221,17 +228,17 @@ def _pushers(topics: Topics, airframe: int, parameters: Mapping[str, float], mot
 
 
 def _refuse_flaperon(topics: Topics, parameters: Mapping[str, float], surface: int) -> None:
-    """Refuse a surface that flaps or spoilers move as well, where they move.  Raises LogError."""
+    """Raise LogError for a surface that flaps or spoilers move as well, if they are moved."""
     for name, (title, topic) in _ALSO_MOVE.items():
         share = parameters.get(f"CA_SV_CS{surface}_{name}", 0.0)
-        told = _samples(topics, topic, ("normalized_setpoint",)).values
-        if len(told) and abs(share) * float(np.ptp(told)) > _MOVES:
+        setpoints = _samples(topics, topic, ("normalized_setpoint",)).values
+        if len(setpoints) and abs(share) * float(np.ptp(setpoints)) > _FLAP_MOVE_TOLERANCE:
             message = f"of a surface that {title} move in flight, and no model of it is estimated"
             raise _refusal(topics, f"CA_SV_CS{surface}_{name}", share, message)
 
 
 def _actuators(topics: Topics, topic: str, size: int) -> Samples:
-    """(n, size) of one topic, in the order of its times; what is not used, or stopped, has no number."""
+    """Return (n, size) of one topic, sorted by time; NaN for unused or stopped actuators."""
     found = topics.table(topic, tuple(f"control[{k}]" for k in range(size)))
     if found is None:
         return Samples(np.zeros(0), np.zeros((0, size)))
@@ -240,7 +247,7 @@ def _actuators(topics: Topics, topic: str, size: int) -> Samples:
 
 
 def _armed(topics: Topics, time: Floats) -> Flags:
-    """Whether the vehicle was armed, (n,); of a log that does not say it was."""
+    """Return whether the vehicle was armed, (n,); true if the log does not state it."""
     states = _samples(topics, "vehicle_status", ("arming_state",))
     if not len(states.time):
         return np.ones(len(time), np.bool_)

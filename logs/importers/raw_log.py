@@ -1,4 +1,4 @@
-"""What an imported log holds, in SI units, whatever program wrote it."""
+"""Content of an imported log in SI units, common to all programs."""
 
 import math
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from world.frames import GeoOrigin, to_geo
 
 Floats = NDArray[np.float64]
 
-# What kind of vehicle wrote it: "unknown" where the log does not say.
+# Kind of the vehicle; "unknown" if not logged.
 VehicleKind = Literal["plane", "copter", "rover", "boat", "submarine", "tracker", "blimp", "unknown"]
 
 # Columns of each series.
@@ -47,9 +47,9 @@ class LogSeries:
 
 @dataclass(frozen=True, slots=True)
 class HeightSource:
-    """One of several heights that a log holds.
+    """One of several altitudes in a log.
 
-    datum: of the heights.  series: one column, m.
+    datum: of the altitudes.  series: one column, m.
     """
 
     name: str
@@ -59,7 +59,7 @@ class HeightSource:
 
 @dataclass(frozen=True, slots=True)
 class ModeChange:
-    """From when (s) a flight mode held; automatic: the vehicle followed its mission."""
+    """Start of a flight mode, s; automatic: true if the vehicle followed its mission."""
 
     time: float
     name: str
@@ -68,11 +68,11 @@ class ModeChange:
 
 @dataclass(frozen=True, slots=True)
 class LoggedMission:
-    """A mission as the vehicle had it, from a time (s) on.
+    """Mission as the vehicle had it from a time (s) on.
 
-    origin: what of the log holds it, for people: "CMD", "MISSION_ITEM_INT", "declared task".
-    with_heights: whether its items state heights.
-    missing: items that the log does not hold; None where it holds them all.  The mission is then the longest run of
+    origin: messages that hold it, for people: "CMD", "MISSION_ITEM_INT", "declared task".
+    with_heights: true if its items state altitudes.
+    missing: items that the log does not hold; None for a complete mission.  The mission is then the longest run of
     items without a gap, and may have fewer than two.
     """
 
@@ -85,22 +85,22 @@ class LoggedMission:
 
 @dataclass(frozen=True, slots=True)
 class RawLog:
-    """A log as its reader gives it; nothing is put in order yet.
+    """Log as given by its reader; nothing is sorted or cleaned yet.
 
     format: for people: "ArduPilot dataflash log".
-    program: what flew, as the log names it; "" where it does not.
-    vehicle: what it is.
-    series: by the names of `COLUMNS` but "height"; a name that is not there the log does not hold.
-    heights: the heights beside that of the position, for comparison.
-    datum: of the position's height.
-    modes: in order of the file; none of a log without modes.
+    program: name of the program in the log, "" if not logged.
+    vehicle: kind of vehicle.
+    series: by the names of `COLUMNS` except "height"; a missing name is not in the log.
+    heights: altitudes other than the altitude of the position, for comparison.
+    datum: of the altitude of the position.
+    modes: in order of the file; empty if not logged.
     missions: in order of the file.
     parameters: by name, the last value of each.
-    events: time (s) and text of what the vehicle said.
+    events: time (s) and text of the vehicle's messages.
     clock: "boot" for seconds since the vehicle was switched on, "start" since the first row.
-    utc_start: s since 1970 at time 0 of the log's clock; NaN where it is not known.
-    clock_jumps: where the log's clock went back for good, s.
-    damage: what could not be read.
+    utc_start: s since 1970 at time 0 of the log's clock; NaN if not known.
+    clock_jumps: times at which the log's clock went back permanently, s.
+    damage: parts that could not be read.
     """
 
     source: str
@@ -121,16 +121,24 @@ class RawLog:
 
 
 # ----------------------------------------------------------------------
-# A log of a short flight that nobody flew, for examples and tests: along two legs at a right angle, in AUTO.
+# Synthetic log of a short flight, for examples and tests: along two legs at a right angle, in AUTO.
 
-# m/s, m.
-SPEED, LEG, UP = 25.0, 1000.0, 500.0
-# s, between rows; until the first waypoint is passed, and after the last.
-STEP, BEFORE, AFTER = 0.2, 10.0, 2.0
+# Airspeed of the example, m/s.
+SPEED = 25.0
+# Length of a leg, m.
+LEG = 1000.0
+# Altitude, m AMSL.
+UP = 500.0
+# Time between rows, s.
+STEP = 0.2
+# Time until the first waypoint is passed, s.
+BEFORE = 10.0
+# Time after the last waypoint, s.
+AFTER = 2.0
 
 
 def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = UP) -> RawLog:
-    """North for 1 km and east for as much from a place (degrees) at a height (m AMSL), the corner as sharp as none is.
+    """Make a log of a flight 1 km north and 1 km east of a place (degrees, m AMSL), with a sharp corner.
 
     >>> log = example_raw_log()
     >>> log.program, log.modes[0].name, len(log.missions[0].mission.items)

@@ -1,7 +1,7 @@
-"""Telemetry logs (`.tlog`) of ground stations: what an ArduPlane or PX4 sent, and the missions it was sent.
+"""Telemetry logs (`.tlog`) of ground stations: messages of ArduPlane or PX4, and sent missions.
 
-The packets are found and decoded first, then sorted by the system that sent them, then read as a `RawLog`.  The clock
-is the vehicle's, `time_boot_ms`; messages without it are placed by the time at which they were received.
+The packets are found and decoded first, then sorted by the sending system, then read as a `RawLog`.  The clock is the
+vehicle's, `time_boot_ms`; messages without it are placed by their time of reception.
 """
 
 import math
@@ -45,20 +45,29 @@ Floats = NDArray[np.float64]
 # MAVProxy).
 
 _STAMP = struct.Struct(">Q")
-_V1, _V2 = 0xFE, 0xFD
-# Bytes beside the payload, the checksum included; those of a signature.
-_V1_FRAME, _V2_FRAME, _SIGNATURE = 8, 12, 13
+# First byte of a MAVLink 1 packet.
+_V1 = 0xFE
+# First byte of a MAVLink 2 packet.
+_V2 = 0xFD
+# Bytes of a MAVLink 1 packet without its payload, including the checksum.
+_V1_FRAME = 8
+# Bytes of a MAVLink 2 packet without its payload, including the checksum.
+_V2_FRAME = 12
+# Bytes of the signature of a MAVLink 2 packet.
+_SIGNATURE = 13
 _SIGNED = 0x01
-# Times that a telemetry log may hold: from 2000 to 2100, us since 1970.
-_FIRST, _LAST = 946_684_800_000_000, 4_102_444_800_000_000
+# Earliest time that a telemetry log may hold, from 2000, us since 1970.
+_EARLIEST_US = 946_684_800_000_000
+# Latest time that a telemetry log may hold, to 2100, us since 1970.
+_LATEST_US = 4_102_444_800_000_000
 
 
 @dataclass
 class TelemetryReader:
-    """Decodes the wanted messages of a log and counts what could not be read.
+    """Decoder of the wanted messages of a log, with a count of the unreadable ones.
 
-    wanted: their numbers.
-    let_go: called now and then, to give back the memory of what was read.
+    wanted: message numbers.
+    let_go: called regularly, to release the memory of what was read.
     """
 
     data: memoryview
@@ -71,7 +80,7 @@ class TelemetryReader:
     _decoder: Any = field(default_factory=lambda: dialect.MAVLink(None))
 
     def messages(self) -> Iterator[tuple[float, Any]]:
-        """Time received (s since 1970) and message, in the order of the file."""
+        """Yield time of reception (s since 1970) and message, in the order of the file."""
         at, end, reading, piece = 0, len(self.data), True, PIECE
         while at + _STAMP.size + _V1_FRAME <= end:
             if at >= piece:
@@ -98,13 +107,13 @@ class TelemetryReader:
             at += length
 
     def damage(self) -> Damage:
-        """What could not be read."""
+        """Return the damage found so far."""
         return Damage(self.places, self.size, self.cut, self.unreadable)
 
     def _length(self, at: int) -> int:
-        """Bytes of the record at a place, its time included; 0 where none begins there."""
+        """Return the length of the record at a place, its time included, bytes; 0 if none begins there."""
         stamp = _STAMP.unpack_from(self.data, at)[0]
-        if not _FIRST <= stamp <= _LAST:
+        if not _EARLIEST_US <= stamp <= _LATEST_US:
             return 0
         packet = at + _STAMP.size
         magic, payload = self.data[packet], self.data[packet + 1]
@@ -124,12 +133,12 @@ class TelemetryReader:
     def _decode(self, packet: bytes) -> Any:
         try:
             return self._decoder.decode(bytearray(packet))
-        except Exception:  # of whatever kind: the library raises struct's, its own and plain ones
+        except Exception:  # of any kind: the library raises errors of struct, its own and plain ones
             return None
 
 
 # ----------------------------------------------------------------------
-# The messages of one system in a telemetry log: those of numbers as rows, so that a long log stays small.
+# Messages of one system in a telemetry log: frequent numeric messages are kept as rows, so that a long log stays small.
 
 
 # Fields that are kept of the messages that come many times a second.
@@ -143,14 +152,14 @@ NUMBERS = {
     "SYS_STATUS": ("current_battery", "voltage_battery"),
     "BATTERY_STATUS": ("current_battery", "energy_consumed"),
 }
-# Of each other kind this many are kept.
+# Greatest number of kept messages of each other kind.
 _MAX_MESSAGES = 200_000
 
 
 class BootClock(NamedTuple):
-    """The vehicle's clock.
+    """Clock of the vehicle.
 
-    offset: of time 0, s since 1970.  jumps: s, where the vehicle was switched on anew.  time: (n,) s, of each message.
+    offset: its time 0, s since 1970.  jumps: when the vehicle was switched on again, s.  time: (n,) s, of each message.
     """
 
     offset: float
@@ -159,7 +168,7 @@ class BootClock(NamedTuple):
 
 
 class SystemMessages:
-    """What one system sent."""
+    """Messages sent by one system."""
 
     def __init__(self) -> None:
         self._stamps, self._boots = array("d"), array("d")
@@ -167,11 +176,11 @@ class SystemMessages:
         self._named: dict[str, list[tuple[int, Any]]] = {}
 
     def __len__(self) -> int:
-        """How many messages."""
+        """Return the number of messages."""
         return len(self._stamps)
 
     def add(self, stamp: float, message: Any) -> None:
-        """Take a message, received at ``stamp`` (s since 1970)."""
+        """Add a message, received at ``stamp`` (s since 1970)."""
         name, number = message.get_type(), len(self._stamps)
         boot = getattr(message, "time_boot_ms", None)
         self._stamps.append(stamp)
@@ -187,18 +196,18 @@ class SystemMessages:
         rows.extend(float(getattr(message, field)) for field in fields)
 
     def table(self, name: str) -> Floats:
-        """Rows (n, 1 + fields) of a kind in `NUMBERS`: the message's number among all, and its fields."""
+        """Return rows (n, 1 + fields) of a kind in `NUMBERS`: number among all messages, and fields."""
         rows = self._rows.get(name)
         return np.array(rows if rows is not None else [], dtype=np.float64).reshape(-1, 1 + len(NUMBERS[name]))
 
     def named(self, name: str) -> list[tuple[int, Any]]:
-        """Number and message of every other kind."""
+        """Return number and message of each message of another kind."""
         return self._named.get(name, [])
 
     def boot_times(self) -> BootClock:
-        """The vehicle's clock, and each message's time on it.
+        """Return the clock of the vehicle, and the time of each message on it.
 
-        A message without a time of its own has that of the one before it, and as much more as it was received later.
+        A message without its own time gets the time of the message before it, plus the difference of their receptions.
         """
         stamps, time = np.array(self._stamps), np.array(self._boots)
         known = np.flatnonzero(np.isfinite(time))
@@ -215,19 +224,19 @@ class SystemMessages:
 
 
 FORMAT = "MAVLink telemetry log"
-_KEPT = ("HEARTBEAT", "PARAM_VALUE", "STATUSTEXT", "HOME_POSITION")
-_MISSION = ("MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_COUNT")
-_WANTED = frozenset((*_KEPT, *_MISSION, *NUMBERS))
-_NUMBERS = frozenset(number for number, kind in dialect.mavlink_map.items() if kind.msgname in _WANTED)
-# Items that are kept: far more than a station sends.
+_KEPT_MESSAGES = ("HEARTBEAT", "PARAM_VALUE", "STATUSTEXT", "HOME_POSITION")
+_MISSION_MESSAGES = ("MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_COUNT")
+_WANTED_MESSAGES = frozenset((*_KEPT_MESSAGES, *_MISSION_MESSAGES, *NUMBERS))
+_NUMBERS = frozenset(number for number, kind in dialect.mavlink_map.items() if kind.msgname in _WANTED_MESSAGES)
+# Greatest number of items that are kept: far more than a station sends.
 _MAX_ITEMS = 200_000
-# MAV_TYPE; what is not listed says nothing of what it is.
+# Vehicle kinds by MAV_TYPE; a type that is not listed is unknown.
 _TYPES: dict[int, VehicleKind] = {
     1: "plane", 16: "plane", 19: "plane", 20: "plane", 21: "plane", 22: "plane", 23: "plane", 24: "plane", 25: "plane",
     2: "copter", 3: "copter", 4: "copter", 13: "copter", 14: "copter", 15: "copter", 29: "copter", 35: "copter",
     5: "tracker", 7: "blimp", 10: "rover", 11: "boat", 12: "submarine",
 }  # fmt: skip
-# Ground stations, onboard computers, gimbals, receivers for other traffic.
+# MAV_TYPE of ground stations, onboard computers, gimbals, receivers for other traffic.
 _NO_VEHICLES = (6, 18, 26, 27)
 _NOT_AUTOPILOTS = (8, 18)
 _PX4 = 12
@@ -243,12 +252,12 @@ def read_telemetry(path: Path) -> RawLog:
     items: list[tuple[float, Any]] = []
     for stamp, message in reader.messages():
         systems.setdefault(message.get_srcSystem(), SystemMessages()).add(stamp, message)
-        if message.get_type() in _MISSION and len(items) < _MAX_ITEMS:
+        if message.get_type() in _MISSION_MESSAGES and len(items) < _MAX_ITEMS:
             items.append((stamp, message))
     vehicles = [found for found in systems.values() if any(_is_vehicle(one) for _, one in found.named("HEARTBEAT"))]
     if not vehicles:
         raise LogError(f"{path}: no HEARTBEAT of a vehicle: nothing says what flew", file=path)
-    # Of several the one that is heard most often.
+    # Of several vehicles take the one with the most messages.
     return _Messages(max(vehicles, key=len), items, str(path)).log(reader)
 
 
@@ -257,15 +266,15 @@ def _is_vehicle(message: Any) -> bool:
 
 
 class _Messages:
-    """The messages of one vehicle, by name, on its own clock."""
+    """Messages of one vehicle, by name, on its own clock."""
 
     def __init__(self, own: SystemMessages, items: list[tuple[float, Any]], source: str) -> None:
         self._source, self._found = source, own
         clock = own.boot_times()
         self._offset, self.jumps, self._times = clock.offset, clock.jumps, clock.time
-        # Missions go to the vehicle: they are the station's messages.
+        # Missions are sent to the vehicle: their messages come from the station.
         self._items = [(stamp - self._offset, message) for stamp, message in items]
-        self._own = {name: [(float(self._times[k]), one) for k, one in own.named(name)] for name in _KEPT}
+        self._own = {name: [(float(self._times[k]), one) for k, one in own.named(name)] for name in _KEPT_MESSAGES}
 
     def log(self, reader: TelemetryReader) -> RawLog:
         series = {name: found for name, found in self._series() if found is not None}
@@ -338,7 +347,7 @@ class _Messages:
     def _wind(self) -> LogSeries | None:
         own = self._table("WIND", ("direction", "speed"))
         if own is not None and np.any(own.values[:, 1]):
-            # It blows from there.
+            # The direction is where the wind comes from.
             course, speed = np.radians(own.values[:, 0]), own.values[:, 1]
             return LogSeries("WIND", own.time, np.stack([-speed * np.sin(course), -speed * np.cos(course)], axis=1))
         covered = self._table("WIND_COV", ("wind_y", "wind_x"))
@@ -376,7 +385,7 @@ class _Messages:
                 last = mode
 
     def _missions(self) -> Iterable[LoggedMission]:
-        """Items as they went up, or came down when a station asked for them."""
+        """Yield missions from items as uploaded, or as downloaded by a station."""
         rows: list[Item] = []
         total, begins = 0, False
         for time, message in self._items:
@@ -395,7 +404,7 @@ class _Messages:
                 yield replace(made, mission=self._with_home(made.mission))
 
     def _with_home(self, mission: Mission) -> Mission:
-        """With home as the vehicle has it: that of an uploaded mission is only where a station supposed it."""
+        """Replace home by the vehicle's home, as an uploaded mission has only the station's assumption."""
         heard = [one for _, one in self._own["HOME_POSITION"] if one.latitude or one.longitude]
         if not heard:
             return mission
@@ -432,7 +441,7 @@ def _item(message: Any, *, scaled: bool) -> MissionItem:
 
 
 def _px4_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMission | None:
-    """PX4 keeps no home among the items, and counts them from 0."""
+    """Make a mission of PX4 items, which are counted from 0 and contain no home."""
     mission = Mission(None, px4_items(logged.items), source=f"{source}: {origin}")
     end = max(logged.total, mission.items[-1].seq)
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)

@@ -28,19 +28,19 @@ from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, RawLo
 from world.errors import LogError
 
 # ----------------------------------------------------------------------
-# The text of a track file: of a size that can be read, and without the traps of XML.
+# Text of a track file: of a readable size, and without the traps of XML.
 
-# A track of a day at ten points a second takes less.
+# Largest track file; a track of a day at ten points a second takes less.
 MAX_BYTES = 256 * 2**20
 # A document type can hold entities that grow without bound, or that name other files.
 _DOCUMENT_TYPE = re.compile(r"<!(DOCTYPE|ENTITY)", re.IGNORECASE)
 
 
 def track_text(path: Path, *, xml: bool) -> str:
-    """The text of a file, bytes that are no UTF-8 replaced.
+    """Return the text of a file, with bytes that are not UTF-8 replaced.
 
-    Of a zipped file (`.kmz`) it is that of its first `.kml`.  Raises LogError for a file of more than `MAX_BYTES`, and
-    for XML with a document type.
+    Of a zipped file (`.kmz`) the first `.kml` is read.  Raises LogError for a file of more than `MAX_BYTES`, and for
+    XML with a document type.
     """
     size = path.stat().st_size
     if size > MAX_BYTES:
@@ -63,9 +63,9 @@ def _bytes_of(path: Path) -> bytes:
             if entry is None:
                 raise LogError(f"{path}: a zipped file without a .kml in it", file=path)
             with archive.open(entry) as file:
-                # What it claims to hold is not what it holds.
+                # The size that it claims may be wrong.
                 data = file.read(MAX_BYTES + 1)
-    # bzip2 says OSError for bytes that it cannot unpack.
+    # bzip2 raises OSError for bytes that it cannot unpack.
     except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, RuntimeError, EOFError, OSError) as error:
         why = " ".join(str(error).split())[:120]
         raise LogError(f"{path}: a zipped file that cannot be read: {why}", file=path) from error
@@ -76,8 +76,8 @@ def _bytes_of(path: Path) -> bytes:
 
 
 def _earliest(stamps: NDArray[np.float64]) -> float:
-    """The earliest time of a track (n,) s; one further from the middle one than a log can hold is damaged."""
-    # A time of the track itself: the mean of two may be near none.
+    """Return the earliest time of a track (n,) s, without damaged times far from the median."""
+    # Take a time of the track itself: the mean of two may be near neither.
     middle = np.sort(stamps)[stamps.size // 2]
     return float(stamps[np.abs(stamps - middle) < LATEST].min())
 
@@ -103,7 +103,7 @@ def read_gpx(path: Path) -> RawLog:
         raise LogError(
             f"{path}: {len(timed)} track points with a time of {len(points)}: at least 2 are expected", file=path
         )
-    # Times without a zone are UTC, as the format has all of them.
+    # Times without a zone are UTC, the zone of all times in the format.
     times = [point.time if point.time.tzinfo else point.time.replace(tzinfo=UTC) for point in timed if point.time]
     stamps = np.array([time.timestamp() for time in times])
     start = _earliest(stamps)
@@ -142,11 +142,12 @@ def _routes(found: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
 
 
 # ----------------------------------------------------------------------
+# ----------------------------------------------------------------------
 # IGC flight recorder files: B records are fixes, C records the declared task.
-#
-# The record layouts are those of the FAI's "Technical Specification for GNSS Flight Recorders", appendix A: `B` HHMMSS
+# The record layouts are specified in the FAI's "Technical Specification for GNSS Flight Recorders", appendix A: `B`
+# HHMMSS
 # DDMMmmmN DDDMMmmmE V PPPPP GGGGG with the pressure altitude (of 1013.25 hPa) and the GNSS altitude in metres; a `V` in
-# place of `A` says that there is no height by GNSS.
+# place of `A` states that there is no GNSS altitude.
 
 IGC = "IGC flight recorder file"
 _PLACE = r"(\d\d)([0-5]\d)(\d{3})([NS])(\d{3})([0-5]\d)(\d{3})([EW])"
@@ -154,9 +155,9 @@ _HEIGHT = r"(-\d{4}|\d{5})"
 _FIX = re.compile(rf"B([01]\d|2[0-3])([0-5]\d)([0-5]\d){_PLACE}([AV]){_HEIGHT}{_HEIGHT}")
 _TASK_POINT = re.compile(rf"C{_PLACE}")
 _DATE = re.compile(r"HFDTE(?:DATE:?\s*)?(\d{2})(\d{2})(\d{2})")
-_DAY = 86_400.0
-_HALF_DAY = 43_200.0
-# What HFALG says of the GNSS altitude.
+_DAY_S = 86_400.0
+_HALF_DAY_S = 43_200.0
+# Datum of the GNSS altitude by the text of HFALG.
 _DATUMS: dict[str, VerticalDatum] = {"ELL": "ellipsoid", "GEO": "amsl"}
 
 
@@ -167,7 +168,7 @@ def read_igc(path: Path) -> RawLog:
     if len(rows) < 2:
         raise LogError(f"{path}: {len(rows)} fixes (B records): at least 2 are expected", file=path)
     table = np.array(rows)
-    time = _over_midnight(table[:, 0])
+    time = _unwrap_midnight(table[:, 0])
     gnss, pressure = table[:, 4], table[:, 3]
     use_gnss = bool((np.isfinite(gnss) & (gnss != 0.0)).mean() > 0.5)
     up, source = (gnss, "B record, GNSS altitude") if use_gnss else (pressure, "B record, pressure altitude")
@@ -195,7 +196,7 @@ def _degrees(whole: str, minutes: str, thousandths: str, side: str) -> float:
 
 
 def _fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, float, float]], int]:
-    """Second of the day, latitude, longitude, pressure and GNSS altitude of each fix; how many could not be read."""
+    """Return second of the day, latitude, longitude, both altitudes of each fix; and unreadable fixes."""
     rows, unreadable = [], 0
     for line in lines:
         if not line.startswith("B"):
@@ -211,15 +212,15 @@ def _fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, float, flo
     return rows, unreadable
 
 
-def _over_midnight(time: np.ndarray) -> np.ndarray:
-    """Seconds that go on after midnight."""
+def _unwrap_midnight(time: np.ndarray) -> np.ndarray:
+    """Return seconds that increase over midnight."""
     steps = np.diff(time)
-    days = np.cumsum(np.where(steps < -_HALF_DAY, 1.0, np.where(steps > _HALF_DAY, -1.0, 0.0)))
-    return time + np.concatenate([[0.0], days]) * _DAY
+    days = np.cumsum(np.where(steps < -_HALF_DAY_S, 1.0, np.where(steps > _HALF_DAY_S, -1.0, 0.0)))
+    return time + np.concatenate([[0.0], days]) * _DAY_S
 
 
 def _midnight(lines: list[str]) -> float:
-    """The day's beginning, s since 1970; NaN where the file states none."""
+    """Return the beginning of the day, s since 1970; NaN if the file states none."""
     for line in lines:
         found = _DATE.match(line)
         if found:
@@ -233,7 +234,7 @@ def _datum(lines: list[str]) -> VerticalDatum:
     for line in lines:
         if line.startswith("HFALG") or line.startswith("HOALG"):
             return next((datum for word, datum in _DATUMS.items() if word in line[5:]), "unstated")
-    # The specification has the ellipsoid's where nothing is stated.
+    # The specification assumes the ellipsoid if nothing is stated.
     return "ellipsoid"
 
 
@@ -243,7 +244,7 @@ def _recorder(lines: list[str]) -> str:
 
 
 def _task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
-    """The declared task: take-off and landing places, which it begins and ends with, are left out where they are 0."""
+    """Return the declared task; take-off and landing places at its ends are left out if they are 0."""
     points = []
     for line in lines:
         found = _TASK_POINT.match(line)
@@ -251,7 +252,7 @@ def _task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
             lat, lon = _degrees(*found.groups()[:4]), _degrees(*found.groups()[4:])
             if (lat, lon) != (0.0, 0.0):
                 points.append((lat, lon))
-    # Take-off and landing are where the glider was, not what it was to fly.
+    # Take-off and landing are places of the glider on the ground, not part of the task.
     turn_points = points[1:-1] if len(points) > 3 else points
     items = tuple(
         MissionItem(number, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, on_grid(lat), on_grid(lon), 0.0)
@@ -311,14 +312,14 @@ def read_kml(path: Path) -> RawLog:
 
 
 def _name(element: ElementTree.Element) -> str:
-    """An element's name without its namespace: files have Google's, OGC's or none."""
+    """Return the name of an element without its namespace, which may be Google's, OGC's or none."""
     return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
 
 
 def _pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
-    """Times and places that belong together, and how many of either are alone.
+    """Return times and places that belong together, and the number of unpaired ones.
 
-    All times stand before all places, or each before its own.  Raises LogError where it cannot be told which is whose.
+    All times stand before all places, or each before its own.  Raises LogError if they cannot be paired.
     """
     marks = [(_name(child), child.text or "") for child in track if _name(child) in ("when", "coord")]
     whens = [text for name, text in marks if name == "when"]
@@ -337,7 +338,7 @@ def _pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]
 
 
 def _row(when: str, coord: str) -> tuple[float, float, float, float] | None:
-    """Time since 1970 (s), latitude, longitude, height; None for what is none."""
+    """Return time since 1970 (s), latitude, longitude and altitude; None for an invalid row."""
     parts = coord.replace(",", " ").split()
     try:
         time = datetime.fromisoformat(when.strip().replace("Z", "+00:00"))

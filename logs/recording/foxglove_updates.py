@@ -1,4 +1,4 @@
-"""What moves in 3-D viewers: the pose, the track so far, events, and point clouds for viewers without meshes."""
+"""Moving parts of 3-D views: pose, track, events, and point clouds for viewers without meshes."""
 
 import math
 from collections.abc import Iterator
@@ -35,26 +35,27 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 # ----------------------------------------------------------------------
-# The flown track as a line that keeps up: every 2 s all of it so far, in a bounded number of points.
-#
-# A viewer that seeks gets the newest message alone, so that each holds the whole track; for a file that stays small,
-# older parts lose the points that lie nearest to the straight way between their neighbours.
+# The flown track as a growing line: every 2 s the whole track, in a bounded number of points.
+# A viewer that seeks gets only the newest message, therefore each holds the whole track; to keep the file small, older
+# parts lose the points that are nearest to the straight line between their neighbours.
 
-# s between messages.
+# Time between messages, s.
 EVERY = 2
-# Points of one message: as soon as there are the first number, they are thinned to the second.
-MAX_POINTS, THINNED = 96, 64
+# Greatest number of points of one message.
+MAX_POINTS = 96
+# Number of points that are left when a message has reached the greatest number.
+THINNED = 64
 
 
 class TrackSoFar:
-    """Points of the track so far, the oldest first."""
+    """Points of the track up to the present, the oldest first."""
 
     def __init__(self) -> None:
         self._points = np.zeros((MAX_POINTS + 1, 3))
         self._count = 0
 
     def add(self, position: Floats) -> Floats:
-        """Take a position (3,), `EVERY` s after the one before, and give (n, 3) of the track, until the next call.
+        """Add a position (3,), `EVERY` s after the last, and return the track (n, 3), valid until the next call.
 
         >>> track = TrackSoFar()
         >>> for k in range(500):
@@ -71,7 +72,7 @@ class TrackSoFar:
 
 
 def thinned(points: Floats, wanted: int) -> Floats:
-    """Points (n, 3) without those that a line loses least by, its ends kept: ``wanted`` of them.
+    """Thin points (n, 3) to ``wanted`` points that keep the shape of the line and its ends.
 
     >>> corner = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 9.0, 0.0]])
     >>> thinned(corner, 3)[:, :2].tolist()
@@ -84,26 +85,26 @@ def thinned(points: Floats, wanted: int) -> Floats:
         off = ((before + share[:, None] * way - here) ** 2).sum(axis=1)
         going = np.zeros(len(points), dtype=bool)
         for k in np.argsort(off, kind="stable")[: len(points) - wanted].tolist():
-            # Of neighbours one at a time: the other's distance is then from another way.
+            # Drop only one of two neighbours: the distance of the other one changes.
             going[k + 1] = not (going[k] or going[k + 2])
         points = points[~going]
     return points
 
 
 # ----------------------------------------------------------------------
-# What happens in flight, noted when it happens: legs that begin, threats whose reach is entered and left.
+# Events in flight, recorded when they happen: starts of legs, entry into and exit from the reach of threats.
 
-# `name` of these in the log: what a timeline works out for itself is not read back.
+# `name` of these events in the log; events that a timeline computes itself are not read back.
 NAME = "flight"
-# Threats are looked at so often, ns.
-_LOOK = 200_000_000
+# Interval between checks of threats, ns.
+_CHECK_INTERVAL_NS = 200_000_000
 
 
 class FlightEvents:
-    """Makes a Log message of each, whatever blocks the rows come in."""
+    """Makes a Log message of each event, independent of the blocks of rows."""
 
     def __init__(self, setup: FlightSetup, channel: int) -> None:
-        """channel: number of the log's topic."""
+        """Prepare for a setup.  channel: number of the log's topic."""
         self._route, self._threats, self._channel = setup.route, setup.scenario.threats, channel
         self._leg, self._slot = -1, -1
         self._inside = {
@@ -112,13 +113,13 @@ class FlightEvents:
         }
 
     def take(self, log_times: Ints, position: Floats, leg: Floats) -> Iterator[MessageRecords]:
-        """Messages of rows; log_times: (n,) ns.  position: (n, 3).  leg: (n,) the active one."""
+        """Yield messages of rows; log_times: (n,) ns.  position: (n, 3).  leg: (n,) the active one."""
         if not len(log_times):
             return
         for k in np.flatnonzero(np.diff(leg, prepend=self._leg) != 0).tolist():
             yield self._message(int(log_times[k]), self._leg_text(int(leg[k])), "info")
         self._leg = int(leg[-1])
-        slots = log_times // _LOOK
+        slots = log_times // _CHECK_INTERVAL_NS
         looked = np.flatnonzero(np.diff(slots, prepend=self._slot) > 0)
         self._slot = int(slots[-1])
         if not len(self._threats.names) or not looked.size:
@@ -152,8 +153,7 @@ class FlightEvents:
 
 
 # ----------------------------------------------------------------------
-# Ground, plan, threats, track and aircraft as points: what a viewer shows that has no triangles and lines, as Rerun.
-#
+# Ground, plan, threats, track and aircraft as points, for viewers without triangles and lines, such as Rerun.
 # Rerun's reader of MCAP knows foxglove.PointCloud, FrameTransform and LocationFix, and no foxglove.SceneUpdate.
 
 Colour = tuple[int, int, int, int]
@@ -171,12 +171,18 @@ def _bytes(role: str) -> Colour:
 
 _PLAN, _TRACK, _AIRCRAFT = _bytes("planned"), _bytes("flown"), _bytes("highlight")
 _KILL, _DETECTION = _bytes("missile"), _bytes("radar")
-# m between points of a line, at most so many of them; points of a sphere; points along each side of a triangle.
-_STEP, _MAX_SAMPLES, _SPHERE, _SIDE = 30.0, 4000, 150, 7
+# Distance between points of a line, m.
+_POINT_SPACING_M = 30.0
+# Greatest number of points of a line.
+_MAX_SAMPLES = 4000
+# Points of a sphere.
+_SPHERE_POINTS = 150
+# Intervals along each side of a triangle.
+_SIDE_INTERVALS = 7
 
 
 def cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.uint8] | Colour) -> bytes:
-    """A PointCloud of points (n, 3) m in a frame, rounded to 1/16 m.
+    """Make a PointCloud of points (n, 3) m in a frame, rounded to 1/16 m.
 
     colours: (n, 4) red, green, blue, alpha, or one for all.
     """
@@ -204,49 +210,53 @@ def cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.uint8] |
 
 
 def ground_cloud(time_ns: int, scenario: Scenario) -> bytes:
-    """The corners of the ground's mesh."""
+    """Return the corners of the mesh of the ground as points."""
     points, colours = terrain_points(scenario)
     shades = np.hstack([np.round(colours * 255.0), np.full((len(points), 1), 255.0)]).astype(np.uint8)
     return cloud(time_ns, MAP, points, shades)
 
 
 def plan_cloud(time_ns: int, waypoints: Floats) -> bytes:
-    """The legs between waypoints (w, 3)."""
+    """Return the legs between waypoints (w, 3) as points."""
     return cloud(time_ns, MAP, along(waypoints), _PLAN)
 
 
 def track_cloud(time_ns: int, positions: Floats) -> bytes:
-    """The flown positions (n, 3)."""
+    """Return the flown positions (n, 3) as points."""
     return cloud(time_ns, MAP, positions, _TRACK)
 
 
 def aircraft_cloud(time_ns: int) -> bytes:
-    """The aircraft's model, in its own frame."""
+    """Return the model of the aircraft as points, in its own frame."""
     first, second, third = (corner[:, None, :] for corner in np.moveaxis(model_corners().astype(np.float64), 1, 0))
-    shares = [(i / _SIDE, j / _SIDE) for i in range(_SIDE + 1) for j in range(_SIDE + 1 - i)]
+    shares = [
+        (i / _SIDE_INTERVALS, j / _SIDE_INTERVALS)
+        for i in range(_SIDE_INTERVALS + 1)
+        for j in range(_SIDE_INTERVALS + 1 - i)
+    ]
     a, b = (np.array(column)[None, :, None] for column in zip(*shares, strict=True))
     points = (a * first + b * second + (1.0 - a - b) * third).reshape(-1, 3)
     return cloud(time_ns, AIRCRAFT, np.unique(np.round(points, 2), axis=0), _AIRCRAFT)
 
 
 def threats_cloud(time_ns: int, threats: Threats) -> bytes:
-    """The spheres that missiles and radars reach, evenly dotted."""
-    k = np.arange(_SPHERE) + 0.5
-    up, turn = 1.0 - 2.0 * k / _SPHERE, math.pi * (1.0 + math.sqrt(5.0)) * k
+    """Return the spheres of missiles and radars as evenly distributed points."""
+    k = np.arange(_SPHERE_POINTS) + 0.5
+    up, turn = 1.0 - 2.0 * k / _SPHERE_POINTS, math.pi * (1.0 + math.sqrt(5.0)) * k
     sphere = np.stack([np.sqrt(1.0 - up**2) * np.cos(turn), np.sqrt(1.0 - up**2) * np.sin(turn), up], axis=1)
     points, shades = [np.zeros((0, 3))], [np.zeros((0, 4), dtype=np.uint8)]
     for radii, colour in ((threats.kill_radius, _KILL), (threats.detection_radius, _DETECTION)):
         for centre, radius in zip(threats.position, radii, strict=True):
             if radius > 0.0:
                 points.append(centre + float(radius) * sphere)
-                shades.append(np.tile(np.array(colour, dtype=np.uint8), (_SPHERE, 1)))
+                shades.append(np.tile(np.array(colour, dtype=np.uint8), (_SPHERE_POINTS, 1)))
     return cloud(time_ns, MAP, np.concatenate(points), np.concatenate(shades))
 
 
 def along(waypoints: Floats) -> Floats:
-    """Points of the straight legs between waypoints (w, 3), the waypoints among them, evenly on each leg."""
+    """Return points at even distances on the straight legs between waypoints (w, 3), including the waypoints."""
     lengths = np.sqrt((np.diff(waypoints, axis=0) ** 2).sum(axis=1))
-    step = max(_STEP, float(lengths.sum()) / _MAX_SAMPLES)
+    step = max(_POINT_SPACING_M, float(lengths.sum()) / _MAX_SAMPLES)
     legs = [
         np.linspace(start, end, max(1, math.ceil(length / step)), endpoint=False)
         for start, end, length in zip(waypoints[:-1], waypoints[1:], lengths.tolist(), strict=True)
@@ -255,14 +265,15 @@ def along(waypoints: Floats) -> Floats:
 
 
 # ----------------------------------------------------------------------
-# The moving part of what viewers show: the pose five times a second, a fix a second, and the track so far.
+# The moving part of views: the pose five times a second, a fix each second, and the track.
 
 TF_TOPIC, FIX_TOPIC, TRACK_TOPIC, TRACK_POINTS = "/tf", "/fix", "/scene/track", "/points/track"
 
 _SLOT_NS = 200_000_000  # one transform in each, 5 Hz; one fix a second
 _XYZ, _XYZW, _GEO = "xyz", "xyzw", ("latitude", "longitude", "altitude")
-# The track's points: s between messages at least, and the ratio of their times, so that a long flight's stay few.
-_CLOUD_EVERY, _CLOUD_RATIO = 10.0, 1.05
+# The points of the track: least time between messages, s, and ratio of their times, which limits their number.
+_MIN_CLOUD_INTERVAL_S = 10.0
+_CLOUD_RATIO = 1.05
 # The messages behind their timestamps, in protobuf's encoding.
 _TRANSFORM_NAMES = FrameTransform(parent_frame_id=scene.MAP, child_frame_id=scene.AIRCRAFT).SerializeToString(
     deterministic=True
@@ -279,10 +290,10 @@ _FIX = np.dtype([("names", np.uint8, (len(_FIX_NAMES),)), *tagged_doubles(_GEO)]
 
 
 def transform_messages(channel: int, log_times: Ints, position: Floats, attitude: Floats) -> MessageRecords:
-    """Position and attitude of the aircraft: a FrameTransform for each of n rows.
+    """Encode position and attitude of the aircraft: a FrameTransform for each of n rows.
 
-    position, attitude: (n, 3).  Rounded to 2^-10 m and 2^-20 of the quaternion, which no viewer shows and which halves
-    their size in the log; the state's own message is exact.
+    position, attitude: (n, 3).  Rounded to 2^-10 m and 2^-20 of the quaternion, which is invisible and halves their
+    size in the log; the message of the state is exact.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         translation = np.round(position * 1024.0) / 1024.0
@@ -295,7 +306,7 @@ def transform_messages(channel: int, log_times: Ints, position: Floats, attitude
 
 
 def fix_messages(channel: int, log_times: Ints, origin: GeoOrigin, position: Floats) -> MessageRecords:
-    """Latitude, longitude and height above mean sea level: a LocationFix for each of n rows.
+    """Encode latitude, longitude and altitude AMSL: a LocationFix for each of n rows.
 
     position: (n, 3).
     """
@@ -308,10 +319,10 @@ def fix_messages(channel: int, log_times: Ints, origin: GeoOrigin, position: Flo
 
 
 class Poses:
-    """Chooses the rows that viewers get, second by second, and makes their messages."""
+    """Selection of the rows for viewers, second by second, and their messages."""
 
     def __init__(self, origin: GeoOrigin, channels: dict[str, int]) -> None:
-        """channels: the number of each topic."""
+        """Prepare for an origin.  channels: the number of each topic."""
         self._origin, self._channels = origin, channels
         self._slot = self._second = -1
         self._path: list[Floats] = []  # positions, one a second
@@ -320,7 +331,7 @@ class Poses:
         self._next_cloud = 0.0  # s
 
     def take(self, log_times: Ints, position: Floats, attitude: Floats) -> Iterator[MessageRecords]:
-        """Messages for the first good row in each slot, a fix a second, and the track so far every `EVERY` seconds.
+        """Yield messages of the first good row in each slot, a fix each second, and the track every `EVERY` s.
 
         log_times: (n,) ns, of whole seconds.  position, attitude: (n, 3).
         """
@@ -349,11 +360,11 @@ class Poses:
             yield single_record(self._channels[TRACK_TOPIC], log_time, scene.track_scene(log_time, line))
             time = (log_time - EPOCH_NS) / SECOND_NS
             if time >= self._next_cloud:
-                self._next_cloud = max(time + _CLOUD_EVERY, time * _CLOUD_RATIO)
+                self._next_cloud = max(time + _MIN_CLOUD_INTERVAL_S, time * _CLOUD_RATIO)
                 yield self._cloud(log_time, [*self._path[:-1], firsts[: k + 1]])
 
     def whole(self, log_time: int) -> Iterator[MessageRecords]:
-        """The track up to the newest row, a point a second, at ``log_time`` (ns): as a line and as points."""
+        """Yield the track up to the newest row, a point a second, at ``log_time`` (ns): as a line and as points."""
         parts = [*self._path, self._tail]
         path = scene.track_scene(log_time, np.concatenate([np.zeros((0, 3)), *parts]))
         yield single_record(self._channels[TRACK_TOPIC], log_time, path)
@@ -365,5 +376,5 @@ class Poses:
 
 
 def _changes(values: Ints, before: int) -> Ints:
-    """Where non-decreasing values differ from the one before, the first from ``before``."""
+    """Return the indices at which non-decreasing values change, starting from ``before``."""
     return np.flatnonzero(np.diff(values, prepend=before) > 0)

@@ -1,14 +1,14 @@
-"""The MCAP container, read front to back without trusting it.
+"""MCAP container, read front to back without trusting it.
 
-mcap 1.6's `StreamReader` would save 150 lines, but it reports a damaged attachment only at the file's end, its seeking
-reader not at all, and lz4 chunks decompress to whatever size they hold.  So the framing is read here; records are then
-parsed by mcap's classes, from bytes that are already bounded and CRC-checked.  Reading stops at the first damage: what
-is given is complete, in order and without a hole.
+mcap 1.6's `StreamReader` would save 150 lines, but it reports a damaged attachment only at the end of the file, its
+seeking reader not at all, and lz4 chunks decompress to any size.  Therefore the framing is read here; records are then
+parsed by mcap's classes, from bytes that are already bounded and CRC-checked.  Reading stops at the first damage: the
+returned data are complete, in order and without a hole.
 
 Any container that the format allows is read: with chunks or without, compressed by zstd, lz4 or not, with or without
 an index, statistics, a summary and CRCs, with records of other kinds, and with more bytes in a record than it needs.  A
 CRC of 0 means that its writer left it out (mcap.dev, "MCAP Format Specification").  Messages outside chunks, which have
-no CRC of their own, are believed only where the data section's end says that all of it is there.
+no CRC of their own, are accepted only if the end of the data section confirms that it is complete.
 """
 
 import struct
@@ -27,14 +27,14 @@ from mcap.records import Attachment, Chunk, DataEnd, Footer
 
 MAGIC = b"\x89MCAP0\r\n"
 RECORD_LIMIT = 64 * 2**20
-# Records outside chunks are given in pieces of at least so many bytes.
-_PIECE = 2**18
-# What may stand outside chunks and is given on.
-_LOOSE = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
-# All chunks together may grow to this many times the bytes read so far: honest logs stay under 20.
-_GROWTH = 256
+# Least size of the pieces in which records outside chunks are returned, bytes.
+_PIECE_BYTES = 2**18
+# Records that are returned if they are outside chunks.
+_OUTSIDE_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+# Greatest ratio of the size of all chunks to the bytes read; valid logs stay under 20.
+_MAX_GROWTH_RATIO = 256
 FRAME = struct.Struct("<BQ")
-# What mcap's record classes raise on bytes that do not hold what they should.
+# Errors of mcap's record classes for invalid bytes.
 PARSE_ERRORS = (McapError, struct.error, ValueError, OverflowError, MemoryError)
 
 
@@ -55,9 +55,9 @@ class Container:
 
 
 def read_chunks(file: BinaryIO, found: Container) -> Iterator[bytes]:
-    """Give the records inside each whole chunk, and those outside chunks, as bytes, and fill ``found`` on the way.
+    """Yield the records inside each whole chunk, and the others, as bytes, and fill ``found`` meanwhile.
 
-    file: stands behind the magic at the start.  Never raises for damage; `Container.problem` says what it was.
+    file: positioned behind the magic at the start.  Damage raises no error; `Container.problem` describes it.
     """
     try:
         yield from _read(file, found)
@@ -74,19 +74,21 @@ def _read(file: BinaryIO, found: Container) -> Iterator[bytes]:
         at = file.tell()
         head, content = _record(file, at)
         opcode = head[0]
-        if loose and (opcode not in _LOOSE or len(loose) >= _PIECE):
+        if loose and (opcode not in _OUTSIDE_CHUNKS or len(loose) >= _PIECE_BYTES):
             yield bytes(loose)
             loose.clear()
-        if opcode in _LOOSE:
+        if opcode in _OUTSIDE_CHUNKS:
             if not vouched:
-                _vouch(file, crc, at)
+                _check_data_section(file, crc, at)
                 vouched = True
             loose += head + content
         elif opcode == Opcode.CHUNK:
             data = _chunk(content, at)
             total += len(data)
-            if total > RECORD_LIMIT + _GROWTH * file.tell():
-                raise _Damage(f"chunks grow to {total:,} bytes at byte {at:,} of the file: more than {_GROWTH}-fold")
+            if total > RECORD_LIMIT + _MAX_GROWTH_RATIO * file.tell():
+                raise _Damage(
+                    f"chunks grow to {total:,} bytes at byte {at:,} of the file: more than {_MAX_GROWTH_RATIO}-fold"
+                )
             yield data
         elif opcode == Opcode.ATTACHMENT:
             _attachment(content, at, found)
@@ -104,8 +106,8 @@ def _read(file: BinaryIO, found: Container) -> Iterator[bytes]:
     _summary(file)
 
 
-def _vouch(file: BinaryIO, crc: int, at: int) -> None:
-    """See that the data section has its end and its CRC, from the record at byte ``at`` on, which is read again."""
+def _check_data_section(file: BinaryIO, crc: int, at: int) -> None:
+    """Check that the data section has its end and its CRC; the part from byte ``at`` on is read again."""
     back = file.tell()
     file.seek(at)
     try:
@@ -136,7 +138,7 @@ def _record(file: BinaryIO, at: int) -> tuple[bytes, bytes]:
 
 
 def records(data: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Give opcode, offset and content of each record in a chunk's bytes.  Raises ValueError where one does not fit."""
+    """Yield opcode, offset and content of each record in a chunk.  Raises ValueError if one does not fit."""
     at = 0
     while at < len(data):
         if at + FRAME.size > len(data):
@@ -150,7 +152,7 @@ def records(data: bytes) -> Iterator[tuple[int, int, bytes]]:
 
 
 def record_stream(content: bytes) -> ReadDataStream:
-    """Wrap one record's content as what mcap's record classes read from."""
+    """Wrap the content of one record in a stream for mcap's record classes."""
     return ReadDataStream(BytesIO(content))
 
 
@@ -178,7 +180,7 @@ def _chunk(content: bytes, at: int) -> bytes:
 
 
 def _decompressed(chunk: Chunk, size: int) -> bytes:
-    """A chunk's bytes, at most one more than ``size``: one call of decompress() would believe the size in the frame."""
+    """Return the bytes of a chunk, at most one more than ``size``: decompress() would trust the size in the frame."""
     if chunk.compression == "zstd":
         reader = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(chunk.data, read_across_frames=True)
         found: bytes = reader.read(size + 1)
@@ -194,7 +196,7 @@ def _attachment(content: bytes, at: int, found: Container) -> None:
         attachment = Attachment.read(record_stream(content))
     except PARSE_ERRORS as error:
         raise _Damage(f"the attachment at byte {at:,} cannot be read") from error
-    # Two times, three lengths, and what they are of; the CRC follows, and perhaps bytes that nobody needs.
+    # Two times, three lengths, and their contents; the CRC follows, and perhaps unused bytes.
     lengths = (len(attachment.name.encode()), len(attachment.media_type.encode()), len(attachment.data))
     end = 32 + sum(lengths)
     if int.from_bytes(content[end : end + 4], "little") not in (0, zlib.crc32(content[:end])):
@@ -216,7 +218,7 @@ def _data_end(content: bytes, at: int, crc: int) -> None:
 
 
 def _summary(file: BinaryIO) -> None:
-    """Check what follows the data, which is only an index: its CRC, and the magic at the end."""
+    """Check the rest of the file, which is only an index: its CRC, and the magic at the end."""
     crc = 0
     while True:
         at = file.tell()

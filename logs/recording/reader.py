@@ -1,6 +1,6 @@
-"""A flight log as the data that was recorded, checked and rebuilt from the log alone.
+"""Read a flight log, checked and rebuilt from the log alone.
 
-A recorded verdict is given as it stands in the log, for comparison; nothing here or after it believes one.
+A recorded verdict is returned as it is in the log, for comparison; no code relies on it.
 """
 
 import json
@@ -52,7 +52,7 @@ from world.errors import LogError
 from world.html_table import html_table
 
 # ----------------------------------------------------------------------
-# The messages of a log as they were written, for viewers that take them as they are.
+# Messages of a log as they were written, for viewers that accept them unchanged.
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,18 +158,18 @@ class LogEvent:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class FlightLog:
-    """A flight, as recorded.
+    """Flight, as recorded.
 
-    source: the file's name, for messages.
-    setup, track, events: what was flown, the rows, and the log's lines in order of time.
-    ended: how the flight ended; None where the recording did not get so far.
+    source: name of the file, for messages.
+    setup, track, events: the flown setup, the rows, and the events in order of time.
+    ended: how the flight ended; None if the recording stopped before.
     recorded_verdict: the verdict as it was written, None if there is none; never to be trusted.
     versions: of the packages that flew it.
     complete: nothing is missing or damaged.
-    problem: what is, in a line; empty for a complete log.
-    end_time: s, of the last row.
-    lost: what of the flight is lost, in a line; ``problem`` adds to it that a recovered log is one.
-    reference: what other flights had to say of it; None where none were flown.
+    problem: the fault in a line; empty for a complete log.
+    end_time: of the last row, s.
+    lost: the lost part of the flight, in a line; ``problem`` adds to it for a recovered log.
+    reference: results of reference flights; None if none were flown.
     """
 
     source: str
@@ -190,7 +190,7 @@ class FlightLog:
         return f"<FlightLog {name}: {self.setup.scenario.name}, {self.end_time:.1f} s, {state}>"
 
     def _repr_html_(self) -> str:
-        """How a notebook shows it."""
+        """Return the HTML for a notebook."""
         setup = self.setup
         rows = [
             ("scenario", setup.scenario.name),
@@ -249,7 +249,7 @@ class _MessageCollector:
             self._matcher = RowMatcher(channel.id)
 
     def _message(self, data: bytes, at: int, start: int, end: int) -> int:
-        """Take the message at ``at``, or all state rows that follow each other from there; return where to go on."""
+        """Take the message at ``at``, or all successive state rows from there; return the next position."""
         channel, _, log_time, _ = _MESSAGE.unpack_from(data, start)
         if channel == self._state_channel and self._matcher is not None:
             matched = self._matcher.match(data, at)
@@ -261,13 +261,13 @@ class _MessageCollector:
             message = Log.FromString(data[start + MESSAGE_HEADER : end])
             if message.name == NOTED_IN_FLIGHT:
                 return end
-            # The difference in whole ns first: a float holds no ns since 1970.
+            # Subtract whole ns first: a float cannot hold ns since 1970.
             time = (log_time - EPOCH_NS) / 1e9
             self.events.append(LogEvent(time, message.message, _LEVEL_NAMES.get(message.level, "info")))
         return end
 
     def rows(self) -> StateRecords:
-        """All state rows in the order of the file, (t,) of `RECORD`."""
+        """Return all state rows in the order of the file, (t,) of `RECORD`."""
         return join_records(self.parts, RECORD)
 
 
@@ -344,7 +344,7 @@ def _check_magic(magic: bytes, path: Path) -> None:
 
 
 def _good_rows(rows: StateRecords, waypoints: int) -> tuple[StateRecords, str]:
-    """Keep the rows before the first that cannot follow the one before it; and say what is wrong with that one."""
+    """Return the rows before the first that cannot follow the one before it, and the fault of that row."""
     state = rows["state"]
     time = state["time_s"]
     good = np.isfinite(time) & (time >= 0.0) & (time < LATEST)
@@ -363,7 +363,7 @@ def _good_rows(rows: StateRecords, waypoints: int) -> tuple[StateRecords, str]:
 
 
 def _result(attachments: dict[str, bytes], rows: int) -> tuple[str | None, str]:
-    """How the flight ended, and what is wrong with that."""
+    """Return how the flight ended, and any fault of that record."""
     if RESULT_FILE not in attachments:
         return None, "the recording stopped before the flight had ended"
     data = _object(attachments[RESULT_FILE])
@@ -376,7 +376,7 @@ def _result(attachments: dict[str, bytes], rows: int) -> tuple[str | None, str]:
 
 
 def _loss(recovery: bytes) -> str:
-    """What was lost before the log was recovered, by its recovery note."""
+    """Return the loss before the log was recovered, according to its recovery note."""
     lost = _object(recovery).get("lost")
     return lost if isinstance(lost, str) and lost else "what was lost is not known"
 

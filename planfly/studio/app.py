@@ -1,4 +1,4 @@
-"""The studio's addresses: the page's own files from a fixed table, and one websocket.  No path is made of a request."""
+"""Addresses of the studio: a fixed table of page files, and one websocket."""
 
 from importlib import resources
 
@@ -19,7 +19,7 @@ FILES = (
 
 
 def page_files() -> dict[str, tuple[bytes, str]]:
-    """Bytes and type of each file of the page, by its address.
+    """Return bytes and type of each file of the page, by address.
 
     >>> page_files()["/"][1]
     'text/html; charset=utf-8'
@@ -36,7 +36,7 @@ def _type(name: str) -> str:
 
 
 def make_app(server: Server, port: int) -> App:
-    """The whole application, behind its guard."""
+    """Make the whole application, with its guard."""
     files = page_files()
 
     def answer(request: Request) -> Response:

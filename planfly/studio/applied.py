@@ -1,7 +1,7 @@
-"""A suggestion of a failed finding as a change of the mission's items: what the button beside it does.
+"""Application of a suggestion of a failed finding to the items of the mission.
 
-A suggestion says what of the path is to differ; which items move for it is decided here: the fewest, by as little as
-the finding asks for.  What a suggestion asks of the aircraft, such as a larger battery, is no change of a mission.
+A suggestion states a change of the path; this module decides which items move for it: the fewest, by the least distance
+that the finding requires.  Suggestions about the aircraft, such as a larger battery, change no mission.
 """
 
 import math
@@ -23,7 +23,7 @@ from world.geometry import leg_courses, signed_turns
 
 Floats = NDArray[np.float64]
 
-_PATH = (
+_PATH_CHANGES = (
     "length",
     "rise",
     "airspeed",
@@ -38,17 +38,22 @@ _PATH = (
     "west",
 )
 _SIDES = {"north": (0.0, 1.0), "east": (1.0, 0.0), "south": (0.0, -1.0), "west": (-1.0, 0.0)}
-# Steps in which a turn is made gentler, as shares of the way to the straight line.
+# Steps in which a turn is made gentler, as fractions of the distance to the straight line.
 _TURN_STEPS = 40
-# Changes by a step, m, which are made again while the finding fails: so often, and by so much more than is asked then.
+# Changes by a step, m, which are repeated while the finding fails.
 _STEPS = frozenset(("height", "descent", "inset", "distance", *_SIDES))
-_MOST_STEPS, _FURTHER, _AND = 10, 1.5, 2.0
-# m beyond a sphere's edge at which a step aims, as the planner does: navigation may be off by a third of it.
-_ROOM = 15.0
+# Greatest number of repetitions of a step.
+_MAX_REPETITIONS = 10
+# Factor on the suggested distance in a repetition.
+_REPETITION_FACTOR = 1.5
+# Added to the suggested distance in a repetition, m.
+_REPETITION_ADDITION_M = 2.0
+# Distance beyond a sphere's edge at which a step aims, m, as in the planner: the navigation error may be a third of it.
+_SPHERE_MARGIN_M = 15.0
 
 
 def can_apply(suggestion: Suggestion) -> bool:
-    """Whether all of a suggestion is a change of the mission's items.
+    """Return True if all of a suggestion is a change of the items of a mission.
 
     >>> from logs.verdict.places import FLIGHT, Place
     >>> can_apply((Change("length", Place("leg", 1), 300.0, 400.0, "m"),))
@@ -56,42 +61,44 @@ def can_apply(suggestion: Suggestion) -> bool:
     >>> can_apply((Change("battery", FLIGHT, None, 1.2, "1"),))
     False
     """
-    return bool(suggestion) and all(change.what in _PATH for change in suggestion)
+    return bool(suggestion) and all(change.what in _PATH_CHANGES for change in suggestion)
 
 
 def apply_suggestion(desk: Desk, judged: Judged, item: Finding, which: int) -> Mission:
-    """The mission with a suggestion of a finding made, until that finding passes.
+    """Apply a suggestion of a finding to the mission until the finding passes.
 
-    A step that the path is to make is the least: where an item moves by so much, its path moves by less.  What is still
-    to do is done in further steps.  Raises MissionError where no item can be moved for it.
+    The suggested step is a minimum: if an item moves by it, the path moves by less.  The rest is done in further steps.
+    Raises MissionError if no item can be moved for it.
     """
     if not 0 <= which < len(item.suggestions) or not can_apply(item.suggestions[which]):
         raise MissionError(f"{judged.mission.source}: this suggestion is no change of its items", field="suggestion")
     suggestion = item.suggestions[which]
-    # One waypoint alone first: each that moves may fail elsewhere.
+    # Try to move a single waypoint first: each one that moves may fail elsewhere.
     counts = (1, None) if any(change.what == "distance" for change in suggestion) else (None,)
-    made = [_mended(desk, judged, item, suggestion, most) for most in counts]
+    made = [_apply_until_passed(desk, judged, item, suggestion, most) for most in counts]
     return min(made, key=lambda one: len(one.verdict.failed)).mission
 
 
-def _mended(desk: Desk, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None) -> Judged:
-    """The mission with a suggestion made as often as its finding needs it, and judged.  most: waypoints that move."""
+def _apply_until_passed(desk: Desk, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None) -> Judged:
+    """Repeat a suggestion until its finding passes, and judge.  most: number of waypoints to move."""
     kinds = [change.what for change in suggestion]
-    judged = desk.judge(_changed(desk, judged, item, suggestion, most))
-    for _ in range(_MOST_STEPS if set(kinds) <= _STEPS else 0):
+    judged = desk.judge(_apply_once(desk, judged, item, suggestion, most))
+    for _ in range(_MAX_REPETITIONS if set(kinds) <= _STEPS else 0):
         left = [one for one in judged.verdict.failed if (one.rule, one.place) == (item.rule, item.place)]
         alike = [(one, more) for one in left for more in one.suggestions if [change.what for change in more] == kinds]
         if not alike:
             break
         one, more = alike[0]
-        further = tuple(replace(change, wanted=_FURTHER * change.wanted + _AND) for change in more)
-        judged = desk.judge(_changed(desk, judged, one, further, most))
+        further = tuple(
+            replace(change, wanted=_REPETITION_FACTOR * change.wanted + _REPETITION_ADDITION_M) for change in more
+        )
+        judged = desk.judge(_apply_once(desk, judged, one, further, most))
     return judged
 
 
-def _changed(desk: Desk, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None) -> Mission:
-    """The mission with each change of a suggestion made once.  Raises MissionError where none moves an item."""
-    sheet = _Sheet(desk, judged, most)
+def _apply_once(desk: Desk, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None) -> Mission:
+    """Make each change of a suggestion once.  Raises MissionError if no item moves."""
+    sheet = _MovableMission(desk, judged, most)
     for change in suggestion:
         _CHANGES[change.what](sheet, change, item)
     if not sheet.changed:
@@ -101,25 +108,25 @@ def _changed(desk: Desk, judged: Judged, item: Finding, suggestion: Suggestion, 
     return sheet.mission
 
 
-class _Sheet:
-    """A mission whose items are moved one after the other."""
+class _MovableMission:
+    """Mission whose items are moved one after the other."""
 
     def __init__(self, desk: Desk, judged: Judged, most: int | None) -> None:
         self.desk, self.mission, self.route = desk, judged.mission, judged.setup.route
         self.requirements, self.most, self.changed = judged.requirements, most, False
 
     def index_of(self, waypoint: int) -> int | None:
-        """The item of a waypoint of the route, by its place in the mission's list; None where it is of none."""
+        """Return the index in the mission's list of the item of a waypoint; None if there is none."""
         seq = int(self.route.items[waypoint])
         own = [k for k in places(self.mission) if self.mission.items[k].seq == seq]
         return own[0] if own else None
 
     def points(self) -> Floats:
-        """Where the route's waypoints are, (w, 3) m, as they were before the change."""
+        """Return the waypoints of the route, (w, 3) m, before the change."""
         return np.asarray(self.route.waypoints)
 
     def shift(self, waypoints: Sequence[int], by: Floats) -> None:
-        """Move the items of waypoints, each once, by so many metres east, north and up; a landing stays."""
+        """Move the items of waypoints, each once, by metres east, north and up; landings stay."""
         for index in dict.fromkeys(self.index_of(one) for one in waypoints):
             if index is None or self.mission.items[index].command in LANDINGS:
                 continue
@@ -131,30 +138,30 @@ class _Sheet:
             self.mission, self.changed = self.desk.retuned(self.mission, index), True
 
     def ends_of(self, legs: Sequence[int]) -> list[int]:
-        """Waypoints at the ends of legs but the route's own ends, which stay where other waypoints can move."""
+        """Return the waypoints at the ends of legs; the ends of the route only if there are no others."""
         ends = sorted({end for leg in legs for end in (leg, leg + 1)})
         inner = [end for end in ends if 0 < end < self.route.legs]
         return inner or ends
 
 
-def _leg(change: Change, route: Route) -> int:
+def _leg_of_change(change: Change, route: Route) -> int:
     if change.place.kind != "leg" or change.place.index is None or change.place.index >= route.legs:
         raise MissionError("this suggestion names no leg of the route", field="suggestion")
     return change.place.index
 
 
-def _length(sheet: _Sheet, change: Change, _item: Finding) -> None:
-    """A longer leg: what follows it moves on along its course, so that no other leg changes."""
-    leg = _leg(change, sheet.route)
+def _lengthen_leg(sheet: _MovableMission, change: Change, _item: Finding) -> None:
+    """Lengthen a leg: the rest of the route moves along its course, so that no other leg changes."""
+    leg = _leg_of_change(change, sheet.route)
     course = float(leg_courses(sheet.points())[leg])
     grow = change.wanted - (change.current or 0.0)
     onward = range(leg + 1, len(sheet.points()))
     sheet.shift(list(onward), grow * np.array([math.sin(course), math.cos(course), 0.0]))
 
 
-def _rise(sheet: _Sheet, change: Change, _item: Finding) -> None:
-    """A leg that climbs or falls less: the end that is not the route's moves, both by half where neither is."""
-    leg, points = _leg(change, sheet.route), sheet.points()
+def _reduce_rise(sheet: _MovableMission, change: Change, _item: Finding) -> None:
+    """Reduce the climb or descent of a leg: an inner end moves, or both ends by half."""
+    leg, points = _leg_of_change(change, sheet.route), sheet.points()
     excess = float(points[leg + 1, 2] - points[leg, 2]) - change.wanted
     first, last = leg == 0, leg + 1 == sheet.route.legs
     share = 0.0 if last and not first else 1.0 if first and not last else 0.5
@@ -162,13 +169,13 @@ def _rise(sheet: _Sheet, change: Change, _item: Finding) -> None:
     sheet.shift([leg + 1], np.array([0.0, 0.0, -share * excess]))
 
 
-def _airspeed(sheet: _Sheet, change: Change, _item: Finding) -> None:
-    """Another speed on a leg, on both legs of a waypoint, or on the whole way."""
+def _set_airspeed(sheet: _MovableMission, change: Change, _item: Finding) -> None:
+    """Change the airspeed on a leg, on both legs of a waypoint, or on the whole route."""
     place, route = change.place, sheet.route
     wanted = change.wanted if change.most is None else 0.5 * (change.wanted + change.most)
     legs = range(route.legs)
     if place.kind == "leg":
-        legs = range(_leg(change, route), _leg(change, route) + 1)
+        legs = range(_leg_of_change(change, route), _leg_of_change(change, route) + 1)
     elif place.kind == "waypoint" and place.index is not None:
         legs = range(max(0, place.index - 1), min(route.legs, place.index + 1))
     for leg in reversed(legs):
@@ -178,8 +185,8 @@ def _airspeed(sheet: _Sheet, change: Change, _item: Finding) -> None:
             sheet.changed = True
 
 
-def _turn(sheet: _Sheet, change: Change, _item: Finding) -> None:
-    """A gentler turn: the waypoint moves towards the line between its neighbours."""
+def _make_turn_gentler(sheet: _MovableMission, change: Change, _item: Finding) -> None:
+    """Make a turn gentler: the waypoint moves towards the line between its neighbours."""
     points, i = sheet.points(), change.place.index
     if i is None or not 0 < i < sheet.route.legs:
         return
@@ -195,16 +202,18 @@ def _turn(sheet: _Sheet, change: Change, _item: Finding) -> None:
             return
 
 
-def _height(sheet: _Sheet, change: Change, item: Finding) -> None:
-    """A leg, or the path at a zone, higher or lower by a step."""
+def _change_altitude(sheet: _MovableMission, change: Change, item: Finding) -> None:
+    """Raise or lower a leg, or the path at a zone, by a step."""
     up = change.wanted if change.what == "height" else -change.wanted
-    legs = [_leg(change, sheet.route)] if change.place.kind == "leg" else violated_legs(sheet.requirements, item)
+    legs = (
+        [_leg_of_change(change, sheet.route)] if change.place.kind == "leg" else violated_legs(sheet.requirements, item)
+    )
     ends = sorted({end for leg in legs for end in (leg, leg + 1)})
     sheet.shift(ends, np.array([0.0, 0.0, up]))
 
 
-def _inset(sheet: _Sheet, change: Change, _item: Finding) -> None:
-    """Waypoints that are too near to the area's edges, its floor or its ceiling, moved inside."""
+def _move_inside_area(sheet: _MovableMission, change: Change, _item: Finding) -> None:
+    """Move waypoints inside that are too near to the edges, floor or ceiling of the area."""
     scenario, points = sheet.desk.scenario, sheet.points()
     (west, east), (south, north) = scenario.bounds.tolist()
     low = np.array([west, south, scenario.floor]) + change.wanted
@@ -215,32 +224,32 @@ def _inset(sheet: _Sheet, change: Change, _item: Finding) -> None:
         sheet.shift([k], inside[k] - points[k])
 
 
-def _distance(sheet: _Sheet, change: Change, item: Finding) -> None:
-    """The waypoints about a missile's sphere, moved away from it."""
+def _move_away_from_missile(sheet: _MovableMission, change: Change, item: Finding) -> None:
+    """Move the waypoints near the sphere of a missile away from it."""
     centre = sheet.desk.scenario.threats.position[change.place.index or 0]
     legs, points = violated_legs(sheet.requirements, item), sheet.points()
     away = points[:, :2] - centre[:2]
     length = np.hypot(away[:, 0], away[:, 1])
     for k in sorted(sheet.ends_of(legs), key=lambda end: float(length[end]))[: sheet.most]:
         if length[k] > 1.0:
-            sheet.shift([k], np.array([*((change.wanted + _ROOM) * away[k] / length[k]), 0.0]))
+            sheet.shift([k], np.array([*((change.wanted + _SPHERE_MARGIN_M) * away[k] / length[k]), 0.0]))
 
 
-def _aside(sheet: _Sheet, change: Change, item: Finding) -> None:
-    """The legs on which a zone is violated, moved to one side."""
+def _move_sideways(sheet: _MovableMission, change: Change, item: Finding) -> None:
+    """Move the legs on which a zone is violated to one side."""
     east, north = _SIDES[change.what]
     legs = violated_legs(sheet.requirements, item)
     sheet.shift(sheet.ends_of(legs), change.wanted * np.array([east, north, 0.0]))
 
 
-_CHANGES: dict[str, Callable[[_Sheet, Change, Finding], None]] = {
-    "length": _length,
-    "rise": _rise,
-    "airspeed": _airspeed,
-    "turn": _turn,
-    "height": _height,
-    "descent": _height,
-    "inset": _inset,
-    "distance": _distance,
-    **dict.fromkeys(_SIDES, _aside),
+_CHANGES: dict[str, Callable[[_MovableMission, Change, Finding], None]] = {
+    "length": _lengthen_leg,
+    "rise": _reduce_rise,
+    "airspeed": _set_airspeed,
+    "turn": _make_turn_gentler,
+    "height": _change_altitude,
+    "descent": _change_altitude,
+    "inset": _move_inside_area,
+    "distance": _move_away_from_missile,
+    **dict.fromkeys(_SIDES, _move_sideways),
 }

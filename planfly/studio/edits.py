@@ -1,7 +1,7 @@
-"""Changes of a mission's items, each a new mission: moved, raised, inserted, deleted, at another speed.
+"""Edits of a mission, each returning a new one: move, raise, insert, delete, change speed.
 
-An item keeps its frame and all that is not changed of it, so that a mission of which nothing was moved is the one that
-was opened.  Items are named by their place in the list; numbers and targets of jumps follow what is inserted.
+An item keeps its frame and everything that was not edited, so that an unedited mission equals the opened one.
+Items are identified by their index in the list; numbers and targets of jumps follow insertions.
 """
 
 import math
@@ -22,19 +22,19 @@ from flight.mission.items import (
 )
 from world.errors import MissionError
 
-# Items of a mission under edit at most: a drag is judged in time for the hand, and the page draws them all.
+# Greatest number of items under edit: a drag is judged fast enough for the hand, and the page draws all items.
 MAX_EDITED = 2_000
-# What belongs to the place that comes next rather than to the one before.
-_OPENING = (Command.DO_LAND_START, Command.DO_RETURN_PATH_START, Command.JUMP_TAG)
+# Commands that belong to the next place instead of the previous one.
+_COMMANDS_OF_NEXT_PLACE = (Command.DO_LAND_START, Command.DO_RETURN_PATH_START, Command.JUMP_TAG)
 
 
 def is_place(item: MissionItem) -> bool:
-    """Whether an item is a place on the map that can be moved."""
+    """Return True if an item is a place on the map that can be moved."""
     return item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position
 
 
 def places(mission: Mission) -> tuple[int, ...]:
-    """The items of a mission that can be moved, by their place in its list.
+    """Return the indices of the items that can be moved.
 
     >>> way = [MissionItem(k, c, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 178), (3, 16))]
     >>> places(Mission(None, tuple(way)))
@@ -44,7 +44,7 @@ def places(mission: Mission) -> tuple[int, ...]:
 
 
 def checked_place(mission: Mission, index: int) -> MissionItem:
-    """The item that is to be changed.  Raises MissionError for one that is not there or is no place."""
+    """Return the item to edit.  Raises MissionError if it does not exist or is no place."""
     if not 0 <= index < len(mission.items):
         raise MissionError.at(mission.source, "item", index, f"0..{len(mission.items) - 1} is expected")
     item = mission.items[index]
@@ -54,7 +54,7 @@ def checked_place(mission: Mission, index: int) -> MissionItem:
 
 
 def moved(mission: Mission, index: int, lat_deg: float, lon_deg: float) -> Mission:
-    """A mission with an item elsewhere, at its height in its frame.
+    """Move an item, at the same altitude in its frame.
 
     >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
     >>> moved(Mission(None, way), 1, 46.01, 8.00000004).items[1].lon_deg
@@ -65,7 +65,7 @@ def moved(mission: Mission, index: int, lat_deg: float, lon_deg: float) -> Missi
 
 
 def raised(mission: Mission, indices: Iterable[int], by: float) -> Mission:
-    """A mission with items higher by so many metres, each in its frame; one without a height stays without.
+    """Raise items by metres, each in its frame; an item without altitude is unchanged.
 
     >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
     >>> [item.alt for item in raised(Mission(None, way), [1], 12.5).items]
@@ -74,23 +74,23 @@ def raised(mission: Mission, indices: Iterable[int], by: float) -> Mission:
     for index in indices:
         item = checked_place(mission, index)
         if math.isfinite(item.alt):
-            mission = _with_item(mission, index, replace(item, alt=_milli(item.alt + by)))
+            mission = _with_item(mission, index, replace(item, alt=_round_to_milli(item.alt + by)))
     return mission
 
 
 def at_height(mission: Mission, index: int, amsl: float, now: float) -> Mission:
-    """A mission with an item at a height above mean sea level, which was ``now``, m.
+    """Set the altitude AMSL of an item from ``now`` to ``amsl``, m.
 
-    One without a height of its own gets one above mean sea level.
+    An item without altitude gets one in the AMSL frame.
     """
     item = checked_place(mission, index)
     if math.isfinite(item.alt):
         return raised(mission, (index,), amsl - now)
-    return _with_item(mission, index, replace(item, frame=int(Frame.GLOBAL), alt=_milli(amsl)))
+    return _with_item(mission, index, replace(item, frame=int(Frame.GLOBAL), alt=_round_to_milli(amsl)))
 
 
 def next_index(mission: Mission, after: int) -> int:
-    """Where a waypoint behind a place stands in the list: after what is done at that place, before what is flown next.
+    """Return the index for a waypoint inserted behind a place: after all actions at that place.
 
     >>> way = [MissionItem(k, c, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 206), (3, 16))]
     >>> next_index(Mission(None, tuple(way)), 0)
@@ -98,16 +98,17 @@ def next_index(mission: Mission, after: int) -> int:
     """
     index = after + 1
     for item in mission.items[index:]:
-        if is_navigation(item.command) or item.command in _OPENING:
+        if is_navigation(item.command) or item.command in _COMMANDS_OF_NEXT_PLACE:
             break
         index += 1
     return index
 
 
 def inserted(mission: Mission, after: int, lat_deg: float, lon_deg: float, height: float | None = None) -> Mission:
-    """A mission with a waypoint more behind a place, at `next_index`, in the frame of that place.
+    """Insert a waypoint behind a place, at `next_index`, in the frame of that place.
 
-    height: in that frame, m; None for that of the place.  Raises MissionError for more items than a mission may have.
+    height: in that frame, m; None for the height of the place.  Raises MissionError for more items than a mission may
+    have.
 
     >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
     >>> longer = inserted(Mission(None, way), 0, 46.01, 8.0)
@@ -126,15 +127,15 @@ def inserted(mission: Mission, after: int, lat_deg: float, lon_deg: float, heigh
         (0.0, radius, 0.0, 0.0),
         on_grid(lat_deg),
         on_grid(lon_deg),
-        before.alt if height is None else _milli(height),
+        before.alt if height is None else _round_to_milli(height),
     )
-    return _with_new(mission, index, new)
+    return _with_inserted_item(mission, index, new)
 
 
 def deleted(mission: Mission, index: int) -> Mission:
-    """A mission without a place; a jump to it goes to what follows.
+    """Delete a place; a jump to it goes to the next item.
 
-    Raises MissionError where fewer than two places would be left.
+    Raises MissionError if fewer than two places would be left.
     """
     checked_place(mission, index)
     if len(places(mission)) <= 2:
@@ -146,37 +147,37 @@ def deleted(mission: Mission, index: int) -> Mission:
 
 
 def at_speed(mission: Mission, index: int, airspeed: float, after: float) -> Mission:
-    """A mission whose leg to a place is flown at a speed, m/s, and what follows at that of before.
+    """Set the airspeed of the leg to a place, m/s; after the place the previous airspeed applies again.
 
-    A change of speed that stands before the place already is changed itself.
+    A change of speed directly before the place is edited instead of added.
     """
     checked_place(mission, index)
     own = index > 0 and mission.items[index - 1].command == Command.DO_CHANGE_SPEED
     if own:
         change = mission.items[index - 1]
-        now = replace(change, params=(change.params[0], _milli(airspeed), *change.params[2:]))
+        now = replace(change, params=(change.params[0], _round_to_milli(airspeed), *change.params[2:]))
         mission, at = _with_item(mission, index - 1, now), index
     else:
-        mission, at = _with_new(mission, index, _speed_item(mission.items[index].seq, airspeed)), index + 1
+        mission, at = _with_inserted_item(mission, index, _speed_item(mission.items[index].seq, airspeed)), index + 1
     followed = mission.items[at + 1 :]
     if not any(is_place(item) for item in followed) or followed[0].command == Command.DO_CHANGE_SPEED:
         return mission
-    return _with_new(mission, at + 1, _speed_item(mission.items[at].seq + 1, after))
+    return _with_inserted_item(mission, at + 1, _speed_item(mission.items[at].seq + 1, after))
 
 
 def _speed_item(seq: int, airspeed: float) -> MissionItem:
-    params = (0.0, _milli(airspeed), -1.0, 0.0)
+    params = (0.0, _round_to_milli(airspeed), -1.0, 0.0)
     return MissionItem(seq, int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), params, 0.0, 0.0, 0.0)
 
 
 def _with_item(mission: Mission, index: int, item: MissionItem) -> Mission:
-    """A mission with another item in place of one.  Raises MissionError for an item that no mission may have."""
+    """Replace an item.  Raises MissionError for an invalid item."""
     _check(mission, item)
     return replace(mission, items=(*mission.items[:index], item, *mission.items[index + 1 :]))
 
 
-def _with_new(mission: Mission, index: int, item: MissionItem) -> Mission:
-    """A mission with an item more, at a place in its list; what follows is counted on."""
+def _with_inserted_item(mission: Mission, index: int, item: MissionItem) -> Mission:
+    """Insert an item; the numbers of later items increase."""
     _check(mission, item)
     kept = [_renumbered(one, item.seq - 1, 1) for one in mission.items]
     return replace(mission, items=(*kept[:index], item, *kept[index:]))
@@ -189,7 +190,7 @@ def _check(mission: Mission, item: MissionItem) -> None:
 
 
 def _renumbered(item: MissionItem, beyond: int, by: int) -> MissionItem:
-    """An item whose number, and whose jump's target, are counted on where they lie beyond a number."""
+    """Shift the number of an item, and the target of its jump, if beyond a number."""
     params = item.params
     if item.command == Command.DO_JUMP and params[0] > beyond:
         params = (params[0] + by, *params[1:])
@@ -197,5 +198,5 @@ def _renumbered(item: MissionItem, beyond: int, by: int) -> MissionItem:
     return item if seq == item.seq and params is item.params else replace(item, seq=seq, params=params)
 
 
-def _milli(value: float) -> float:
+def _round_to_milli(value: float) -> float:
     return round(value * 1e3) / 1e3

@@ -1,4 +1,4 @@
-"""The folder of the file that the command named: what of it the page may open, and nothing outside."""
+"""Folder of the file that the command named: the files that the page may open, and nothing outside."""
 
 from pathlib import Path
 
@@ -7,13 +7,13 @@ from planfly.studio.settings import PARAMETER_FILES
 from planfly.studio.sheet import Json
 from world.errors import MissionError
 
-# Files that are listed.
-_MOST_FILES = 200
-_READ = (*DROPPED, *PARAMETER_FILES)
+# Greatest number of files that are listed.
+_MAX_FILES = 200
+_READABLE_SUFFIXES = (*DROPPED, *PARAMETER_FILES)
 
 
 def folder_json(folder: Path | None) -> Json:
-    """The folder with its missions, plans, logs and parameters, for a page to choose from; none that a link leads out.
+    """List the missions, plans, logs and parameters of a folder, without links that lead out of it.
 
     >>> folder_json(Path("no such folder"))["files"]
     []
@@ -22,17 +22,17 @@ def folder_json(folder: Path | None) -> Json:
         return {"folder": "", "files": []}
     try:
         inside = folder.resolve(strict=True)
-        found = sorted(one for one in inside.iterdir() if one.suffix.lower() in _READ and one.is_file())
+        found = sorted(one for one in inside.iterdir() if one.suffix.lower() in _READABLE_SUFFIXES and one.is_file())
     except OSError:
         return {"folder": "", "files": []}
     return {
         "folder": shown_path(inside),
-        "files": [one.name for one in found[:_MOST_FILES] if one.resolve().parent == inside],
+        "files": [one.name for one in found[:_MAX_FILES] if one.resolve().parent == inside],
     }
 
 
 def shown_path(path: Path) -> str:
-    """A path as people write it, whole, from their home if it is in there.
+    """Return a path as people write it, in full, with ~ for their home.
 
     >>> shown_path(Path.home() / "missions"), shown_path(Path("/srv"))
     ('~/missions', '/srv')
@@ -42,7 +42,7 @@ def shown_path(path: Path) -> str:
 
 
 def file_inside(folder: Path | None, name: str) -> Path:
-    """A file by its path in the folder.  Raises MissionError for one that is not in it, or not to be opened.
+    """Return a file by its path in the folder.  Raises MissionError if it is outside or not openable.
 
     >>> file_inside(Path("/tmp"), "../etc/passwd")
     Traceback (most recent call last):
@@ -60,6 +60,8 @@ def file_inside(folder: Path | None, name: str) -> Path:
         there = False
     if not there:
         raise MissionError.at("open", "name", name[:60], f"a file in {folder} is expected", shown=repr(name[:60]))
-    if path.suffix.lower() not in _READ:
-        raise MissionError.at("open", "suffix", path.suffix, f"allowed {', '.join(_READ)}", shown=repr(path.suffix))
+    if path.suffix.lower() not in _READABLE_SUFFIXES:
+        raise MissionError.at(
+            "open", "suffix", path.suffix, f"allowed {', '.join(_READABLE_SUFFIXES)}", shown=repr(path.suffix)
+        )
     return path

@@ -1,7 +1,7 @@
-"""The ground of a map as a picture: shaded heights and contours as WebP, for a light page and for a dark one.
+"""Picture of the ground of a map: shaded heights and contours as WebP, for a light or a dark page.
 
-Contours are drawn by how far a pixel's height is from the nearest level, over how fast it changes there: lines of even
-width without a library that traces them.
+A contour is drawn from the difference between a pixel's height and the nearest level, divided by the slope: lines of
+even width without a library that traces them.
 """
 
 import io
@@ -19,18 +19,24 @@ from world.terrain import Terrain
 Floats = NDArray[np.float64]
 Range = tuple[float, float]
 
-# Pixels of the longer side; contours at most, and every so many a bold one; strength of a line.
-_PIXELS, _CONTOURS, _BOLD, _STRENGTH = 1_400, 16, 5, 0.38
-# Heights of the grid that the page reads below the pointer, of the longer side.
-_GRID = 220
-_QUALITY = 82
+# Pixels of the longer side.
+_PICTURE_PIXELS = 1_400
+# Greatest number of contours.
+_MAX_CONTOURS = 16
+# Every n-th contour is bold.
+_BOLD_STRIDE = 5
+# Opacity of a contour.
+_CONTOUR_OPACITY = 0.38
+# Heights along the longer side of the grid that the page reads below the pointer.
+_GRID_SIZE = 220
+_WEBP_QUALITY = 82
 
 
 @dataclass(frozen=True, slots=True)
 class GroundGrid:
-    """Heights for the page: rows from south to north, m; NaN where they are not known.
+    """Heights for the page: rows from south to north, m; NaN if not known.
 
-    east, north: of its corners, m.
+    east, north: ranges of its corners, m.
     """
 
     east: Range
@@ -39,14 +45,14 @@ class GroundGrid:
 
 
 def ground_grid(terrain: Terrain, east: Range, north: Range) -> GroundGrid:
-    """Heights below a map, coarse."""
-    heights = _sampled(terrain, east, north, _GRID)
+    """Return a coarse grid of heights below a map."""
+    heights = _sample_heights(terrain, east, north, _GRID_SIZE)
     return GroundGrid(east, north, heights.astype(np.float32))
 
 
 def ground_picture(terrain: Terrain, east: Range, north: Range, *, dark: bool) -> bytes:
-    """The ground below a map as WebP, north up."""
-    heights = _sampled(terrain, east, north, _PIXELS)
+    """Draw the ground below a map as WebP, north up."""
+    heights = _sample_heights(terrain, east, north, _PICTURE_PIXELS)
     known = np.isfinite(heights)
     unknown = np.array(theme.rgba("unknown", dark=dark)[:3])
     if not known.any():
@@ -54,36 +60,36 @@ def ground_picture(terrain: Terrain, east: Range, north: Range, *, dark: bool) -
         return _webp(picture)
     low, high = float(heights[known].min()), float(heights[known].max())
     pitch = (north[1] - north[0]) / (heights.shape[0] - 1)
-    picture = _tinted(heights, low, max(high, low + 1.0), dark=dark)
+    picture = _tint_by_height(heights, low, max(high, low + 1.0), dark=dark)
     if high - low >= 1.0:
         picture *= relief(heights, pitch, high - low)[..., None]
-        picture = _contoured(picture, heights, nice_step(high - low, _CONTOURS), dark=dark)
+        picture = _draw_contours(picture, heights, nice_step(high - low, _MAX_CONTOURS), dark=dark)
     picture[~known] = unknown
     return _webp(picture)
 
 
-def _sampled(terrain: Terrain, east: Range, north: Range, pixels: int) -> Floats:
+def _sample_heights(terrain: Terrain, east: Range, north: Range, pixels: int) -> Floats:
     width, height = east[1] - east[0], north[1] - north[0]
     longer = max(width, height)
     columns, rows = (max(2, round(pixels * side / longer)) for side in (width, height))
     return np.asarray(terrain.height(np.linspace(*east, columns)[None, :], np.linspace(*north, rows)[:, None]))
 
 
-def _tinted(heights: Floats, low: float, high: float, *, dark: bool) -> Floats:
-    """Colours by height, (rows, columns, 3), 0 to 1."""
+def _tint_by_height(heights: Floats, low: float, high: float, *, dark: bool) -> Floats:
+    """Return colors by height, (rows, columns, 3), 0 to 1."""
     ramp = np.array([theme.rgb(text) for text in (theme.GROUND_DARK if dark else theme.GROUND)])
     share = np.nan_to_num((heights - low) / (high - low)) * (len(ramp) - 1)
     return np.stack([np.interp(share, np.arange(len(ramp)), ramp[:, k]) for k in range(3)], axis=-1)
 
 
-def _contoured(picture: Floats, heights: Floats, step: float, *, dark: bool) -> Floats:
-    """A picture with contours over it, bold at every fifth level."""
+def _draw_contours(picture: Floats, heights: Floats, step: float, *, dark: bool) -> Floats:
+    """Draw contours over a picture, bold at every fifth level."""
     filled = np.nan_to_num(heights, nan=float(np.nanmean(heights)))
     slope = np.hypot(*np.gradient(filled))
     ink = np.array(theme.rgba("contour", dark=dark)[:3])
-    for spacing, half_width, strength in ((step, 0.5, _STRENGTH), (step * _BOLD, 0.8, _STRENGTH)):
+    for spacing, half_width, strength in ((step, 0.5, _CONTOUR_OPACITY), (step * _BOLD_STRIDE, 0.8, _CONTOUR_OPACITY)):
         away = np.abs(filled / spacing - np.round(filled / spacing)) * spacing / np.maximum(slope, 1e-6)
-        # Level ground is no line, however near to a level it lies.
+        # Draw no contour on level ground, however near to a level it lies.
         covered = np.clip(half_width + 0.5 - away, 0.0, 1.0) * np.clip(slope / (0.02 * step), 0.0, 1.0)
         share = (strength * covered)[..., None]
         picture = picture * (1.0 - share) + ink * share
@@ -93,5 +99,5 @@ def _contoured(picture: Floats, heights: Floats, step: float, *, dark: bool) -> 
 def _webp(picture: Floats) -> bytes:
     pixels = np.round(np.clip(picture[::-1], 0.0, 1.0) * 255.0).astype(np.uint8)
     out = io.BytesIO()
-    Image.fromarray(pixels).save(out, "WEBP", quality=_QUALITY, method=2)
+    Image.fromarray(pixels).save(out, "WEBP", quality=_WEBP_QUALITY, method=2)
     return out.getvalue()

@@ -1,4 +1,4 @@
-"""What the studio's two processes are asked, and what the pages are shown of it: flights, plans, returns, campaigns."""
+"""Requests to the studio's two processes, and their results: flights, plans, returns, campaigns."""
 
 import pickle
 import time
@@ -18,15 +18,17 @@ from planner.search.algorithms import ALGORITHMS
 from planner.search.plan_front import FrontPlan
 from world.errors import MissionError, PlanflyError
 
-# s between two reports of how far a work is.
-_REPORTING = 0.12
-# The two processes.
-PILOT, LONG = "flight", "long"
+# Interval between two progress reports of a task, s.
+_REPORT_INTERVAL_S = 0.12
+# Name of the process that flies.
+PILOT = "flight"
+# Name of the process for long tasks.
+LONG = "long"
 
 
 @dataclass
-class _Asked:
-    """A work under way. rev: of the sheet that it is of."""
+class _ActiveWork:
+    """Work under way. rev: revision of its sheet."""
 
     number: int
     name: str
@@ -36,15 +38,15 @@ class _Asked:
 
 @dataclass
 class Jobs:
-    """Both processes, what each is at, and the newest flight.
+    """Both processes, their tasks under way, and the newest flight.
 
-    on_answer: called with the process's name from a thread of its own.  pack: as `Pilot` has it.
+    on_answer: called with the name of the process from its own thread.  pack: as for `Pilot`.
     """
 
     on_answer: Callable[[str, Answer], None]
     pack: Callable[[Work | None], bytes] = pickle.dumps
     _pilots: dict[str, Pilot] = field(default_factory=dict)
-    _asked: dict[str, _Asked] = field(default_factory=dict)
+    _asked: dict[str, _ActiveWork] = field(default_factory=dict)
     _number: int = 0
     _flown: Json | None = None
     _figures: Figures | None = None
@@ -52,14 +54,14 @@ class Jobs:
     _at_once: bool = False
 
     def start(self, session: Session) -> None:
-        """Fly what was opened, or plan it where it is a scenario without a path."""
+        """Fly the opened mission, or plan it if it is a scenario without a path."""
         if session.document.to_plan and not session.is_changed:
             self._at_once = True
-            self._ask(
+            self._send_work(
                 LONG,
                 "plan",
                 "planfly.studio.works.plan",
-                self._plan_asked(messages.Plan(kind="plan"), session),
+                self._plan_request(messages.Plan(kind="plan"), session),
                 session.rev,
             )
             self._pilot(PILOT).start()
@@ -72,7 +74,7 @@ class Jobs:
             pilot.close()
 
     def choices(self) -> Json:
-        """What a page offers to choose from."""
+        """Return the choices that a page offers."""
         return {
             "aircraft": aircraft_names(),
             "autopilots": list(CHOICES["autopilot_law"]),
@@ -81,45 +83,45 @@ class Jobs:
         }
 
     def shown(self) -> list[Json]:
-        """What a new page is shown of the works."""
+        """Return the messages about the tasks for a new page."""
         under_way = [{"kind": "working", "job": one.name, "rev": one.rev} for one in self._asked.values()]
         return [*([self._flown] if self._flown is not None else []), *self._others, *under_way]
 
     def forget(self) -> None:
-        """Another mission was opened."""
+        """Drop all results, because another mission was opened."""
         self.stop()
         self._flown = self._figures = None
         self._others = []
 
     # ------------------------------------------------------------------
-    # Asked.
+    # Requests.
 
     def fly(self, session: Session) -> None:
-        """Fly the mission as it is; a flight under way is cancelled."""
+        """Fly the present mission; a flight under way is cancelled."""
         if session.document.to_plan and not session.is_changed:
             return
-        self._ask(PILOT, "fly", "planfly.studio.works.fly", (session.desk, session.mission), session.rev)
+        self._send_work(PILOT, "fly", "planfly.studio.works.fly", (session.desk, session.mission), session.rev)
 
     def plan(self, message: messages.Plan, session: Session) -> None:
-        """Plan a path, or several.  Raises PlanflyError for places between which nothing is planned."""
-        asked = self._plan_asked(message, session)
+        """Plan one or several paths.  Raises PlanflyError for places between which nothing is planned."""
+        asked = self._plan_request(message, session)
         self._at_once = False
-        self._ask(LONG, "plan", "planfly.studio.works.plan", asked, session.rev)
+        self._send_work(LONG, "plan", "planfly.studio.works.plan", asked, session.rev)
 
     def ask(self, kind: str, session: Session) -> None:
-        """Fly, or begin a long work."""
+        """Fly, or begin a long task."""
         if kind == "fly":
             self.fly(session)
             return
-        self._ask(LONG, kind, f"planfly.studio.long_works.{kind}", (session.desk, session.mission), session.rev)
+        self._send_work(LONG, kind, f"planfly.studio.long_works.{kind}", (session.desk, session.mission), session.rev)
 
     def stop(self) -> None:
-        """Cancel all that is under way."""
+        """Cancel all tasks under way."""
         for name, pilot in self._pilots.items():
             if name in self._asked:
                 pilot.cancel()
 
-    def _plan_asked(self, message: messages.Plan, session: Session) -> PlanAsked:
+    def _plan_request(self, message: messages.Plan, session: Session) -> PlanAsked:
         scenario, frame = session.desk.scenario, session.desk.airframe
         if message.algorithm is not None and message.algorithm not in ALGORITHMS:
             raise PlanflyError.of_argument("algorithm", message.algorithm, f"allowed {', '.join(ALGORITHMS)}")
@@ -139,9 +141,9 @@ class Jobs:
         session.plans = ([], (message.first, message.last))
         return replace(asked, ends=(ends[0], ends[1]))
 
-    def _ask(self, pilot: str, name: str, function: str, payload: Any, rev: int) -> None:
+    def _send_work(self, pilot: str, name: str, function: str, payload: Any, rev: int) -> None:
         self._number += 1
-        self._asked[pilot] = _Asked(self._number, name, rev)
+        self._asked[pilot] = _ActiveWork(self._number, name, rev)
         self._pilot(pilot).ask(Work(self._number, function, payload))
 
     def _pilot(self, name: str) -> Pilot:
@@ -152,16 +154,16 @@ class Jobs:
         return self._pilots[name]
 
     # ------------------------------------------------------------------
-    # Answered.
+    # Answers.
 
     def answered(self, pilot: str, answer: Answer, session: Session) -> list[Json]:
-        """What the pages are shown of an answer; nothing of one to an older question."""
+        """Return the messages to the pages for an answer; nothing if a newer task was requested."""
         asked = self._asked.get(pilot)
         if asked is None or asked.number != answer.number:
             return []
         if answer.kind == "progress":
             now = time.monotonic()
-            if now - asked.reported < _REPORTING:
+            if now - asked.reported < _REPORT_INTERVAL_S:
                 return []
             asked.reported = now
             done, total, remark = answer.value
@@ -176,9 +178,9 @@ class Jobs:
             self._at_once = False
             edited = "the mission was changed while its path was searched, and is left as it is: plan again for a path"
             return [{"kind": "stopped", "job": "plan"}, {"kind": "fault", "text": edited}]
-        return [self._done(asked, answer.value, session)]
+        return [self._result_message(asked, answer.value, session)]
 
-    def _done(self, asked: _Asked, value: Any, session: Session) -> Json:
+    def _result_message(self, asked: _ActiveWork, value: Any, session: Session) -> Json:
         if asked.name == "fly":
             before, self._figures = self._figures, value.pop("figures")
             self._flown = {"kind": "flown", "rev": asked.rev, **value, "changes": changes(before, self._figures)}
@@ -191,7 +193,7 @@ class Jobs:
         return found
 
     def chosen_at_once(self, session: Session) -> bool:
-        """Whether the path that the studio planned by itself when it began has come, once."""
+        """Return True once, when the initial path that the studio planned by itself has arrived."""
         come = self._at_once and bool(session.plans[0])
         if come:
             self._at_once = False
@@ -199,7 +201,7 @@ class Jobs:
 
 
 def ways_json(ways: Sequence[FrontPlan]) -> list[Json]:
-    """Planned paths to choose from, with what each is the best in."""
+    """Describe planned paths to choose from, with the quantities in which each is the best."""
     figures = {
         "shortest": [one.length for one in ways],
         "least seen by radars": [one.exposure for one in ways],
@@ -207,16 +209,16 @@ def ways_json(ways: Sequence[FrontPlan]) -> list[Json]:
         "quickest": [one.time for one in ways],
         "least energy": [one.energy for one in ways],
     }
-    # What all have, or is not known, is nothing to choose by.
-    telling = {name: values for name, values in figures.items() if max(values) > min(values)}
+    # Quantities that are equal for all, or not known, do not help to choose.
+    differing = {name: values for name, values in figures.items() if max(values) > min(values)}
     return [
-        _way(one) | {"best": [name for name, values in telling.items() if values[k] == min(values)]}
+        _path_json(one) | {"best": [name for name, values in differing.items() if values[k] == min(values)]}
         for k, one in enumerate(ways)
     ]
 
 
-def _way(one: FrontPlan) -> Json:
-    """A planned path: its length, m, exposure to radars, s, least height above ground, m, time, s, and energy, Wh."""
+def _path_json(one: FrontPlan) -> Json:
+    """Return length (m), radar exposure (s), least height (m), time (s) and energy (Wh) of a path."""
     plan, (length, exposure, clearance, seconds, energy) = (
         one.plan,
         rounded([one.length, one.exposure, one.clearance, one.time, one.energy / 3600.0]),

@@ -1,4 +1,4 @@
-"""Longer works of the studio's second process: returns from everywhere, and many flights in this weather."""
+"""Longer tasks of the studio's second process: returns along the route, and campaigns of flights."""
 
 from collections import Counter
 from pathlib import Path
@@ -17,14 +17,16 @@ from planfly.studio.pilot import Advance
 from world.errors import MissionError
 from world.extras import need_extra
 
-# Returns that are judged along the way, and ranges of it that are named.
-_RETURNS, _RANGES = 240, 6
+# Greatest number of returns that are judged along the route.
+_MAX_RETURNS = 240
+# Greatest number of ranges of the route that are named.
+_MAX_RANGES = 6
 # Flights of a campaign.
 FLIGHTS = 24
 
 
 def returns(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
-    """The mission flown, and a return to launch from everywhere on its way."""
+    """Fly the mission, and judge a return to launch from every part of it."""
     desk, mission = payload
     setup = desk.setup(mission)
     if mission.home is None or desk.scenario.terrain is None:
@@ -34,13 +36,13 @@ def returns(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
     flown = fly_and_judge(
         setup, desk.airframe, None, lambda done, total, remark: advance(0.5 * done, total, remark), reference="never"
     )
-    every = max(1.0, (float(flown.track.time[-1]) if len(flown.track) else 0.0) / _RETURNS)
+    every = max(1.0, (float(flown.track.time[-1]) if len(flown.track) else 0.0) / _MAX_RETURNS)
     starts = return_starts(setup, flown.track, every)
     remark = f"flying {len(starts)} returns"
     found = judge_returns(
         world, starts, every, advance=lambda done, total: advance(0.5 + 0.5 * done / max(1.0, total), 1.0, remark)
     )
-    lines = [range_text(one, found, desk.scenario) for one in found.ranges[:_RANGES]]
+    lines = [range_text(one, found, desk.scenario) for one in found.ranges[:_MAX_RANGES]]
     return {
         "state": "ok" if found.safe else "open" if found.undecided else "fail",
         "headline": headline(found),
@@ -49,7 +51,7 @@ def returns(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
 
 
 def campaign(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
-    """The mission flown `FLIGHTS` times, each in its own wind, aircraft, terrain and start."""
+    """Fly the mission `FLIGHTS` times, each in its own wind, aircraft, terrain and start."""
     need_extra("campaigns")
     from planfly.campaigns.statistics.decision import wilson
 

@@ -1,17 +1,18 @@
-"""The messages of the page to the server: strict and bounded.  A path is in one alone, to open a file of the folder.
+"""Messages from the page to the server, strict and bounded; only `Open` has a path, in the folder.
 
-Each is one JSON object whose ``kind`` says what it is.  A value that it may not have is answered with a fault; what
-is no message closes the connection.
+Each is one JSON object whose ``kind`` names its type.  An invalid value is answered with a fault; anything else closes
+the connection.
 """
 
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-# A dropped file comes as text in a message; all others are small.
+# Largest message, characters.
 MAX_MESSAGE = 256 * 1024
+# Largest message with a dropped file, which is sent as text.
 MAX_DROPPED_MESSAGE = 24 * 2**20
-# The first message, from whoever it is.
+# Largest first message, whose sender is not known yet.
 MAX_FIRST = 1024
 
 
@@ -24,7 +25,7 @@ _Up = Annotated[float, Field(ge=-500.0, le=9_000.0)]
 _Index = Annotated[int, Field(ge=0, le=20_000)]
 _Rev = Annotated[int, Field(ge=0, le=2**53)]
 _Name = Annotated[str, Field(min_length=1, max_length=200)]
-# Entries of a scenario's [limits].
+# Keys of the [limits] table of a scenario.
 LimitName = Literal[
     "min_clearance_m", "max_height_m", "corridor_m", "max_turn_deg", "max_climb_deg", "max_dive_deg", "surveys"
 ]  # fmt: skip
@@ -32,7 +33,7 @@ LIMITS: tuple[str, ...] = get_args(LimitName)
 
 
 class Hello(_Message):
-    """The first: the token of the address, and which look the page has."""
+    """First message: the token of the address, and whether the page is dark."""
 
     kind: Literal["hello"]
     token: Annotated[str, Field(min_length=1, max_length=100)]
@@ -40,16 +41,16 @@ class Hello(_Message):
 
 
 class Look(_Message):
-    """The page's look has changed: it wants the other picture of the ground."""
+    """Change between light and dark page, which needs another picture of the ground."""
 
     kind: Literal["look"]
     dark: bool
 
 
 class Drag(_Message):
-    """An item is being dragged; nothing is changed yet.
+    """Drag of an item, which changes nothing yet.
 
-    rev: of the sheet that is dragged.  n: grows with each.  k: the item.  whole: whether all is to be judged.
+    rev: revision of the dragged sheet.  n: increasing number.  k: the item.  whole: true to judge the whole mission.
     """
 
     kind: Literal["drag"]
@@ -63,7 +64,7 @@ class Drag(_Message):
 
 
 class Move(_Message):
-    """An item is put somewhere: across the map, or to a height above mean sea level, or both."""
+    """Move of an item: across the map, or to an altitude AMSL, or both."""
 
     kind: Literal["move"]
     rev: _Rev
@@ -74,7 +75,7 @@ class Move(_Message):
 
 
 class Insert(_Message):
-    """A waypoint more behind an item, at the height halfway to the next."""
+    """Insertion of a waypoint behind an item, half way to the altitude of the next."""
 
     kind: Literal["insert"]
     rev: _Rev
@@ -84,7 +85,7 @@ class Insert(_Message):
 
 
 class Delete(_Message):
-    """Items less."""
+    """Deletion of items."""
 
     kind: Literal["delete"]
     rev: _Rev
@@ -92,7 +93,7 @@ class Delete(_Message):
 
 
 class Raise(_Message):
-    """Items higher or lower by so many metres; without a list all of them."""
+    """Change of altitude of items by metres; without a list of all items."""
 
     kind: Literal["raise"]
     rev: _Rev
@@ -101,13 +102,13 @@ class Raise(_Message):
 
 
 class Step(_Message):
-    """One edit back, or forward again, or back to the file as it was opened."""
+    """Undo, redo, or revert to the file as it was opened."""
 
     kind: Literal["undo", "redo", "revert"]
 
 
 class Apply(_Message):
-    """A suggestion of a finding, made."""
+    """Application of a suggestion of a finding."""
 
     kind: Literal["apply"]
     rev: _Rev
@@ -116,11 +117,11 @@ class Apply(_Message):
 
 
 class Settings(_Message):
-    """How it is flown; what is not stated stays.  Its values are checked as those of a scenario are.
+    """Change of settings; anything not stated stays.  Values are checked like the values of a scenario.
 
-    limits: entries of [limits]; null takes one away.  ceiling: m above mean sea level.
-    parameter: one of the autopilot's, as NAME=VALUE.  without: names that are no longer set.
-    parameter_file: name of a file of parameters, whose text is parameter_text.
+    limits: entries of [limits]; null removes one.  ceiling: m AMSL.
+    parameter: one autopilot parameter, as NAME=VALUE.  without: names that are no longer set.
+    parameter_file: name of a parameter file, whose text is parameter_text.
     """
 
     kind: Literal["settings"]
@@ -139,9 +140,9 @@ class Settings(_Message):
 
 
 class Plan(_Message):
-    """A path from here: between the scenario's ends, or two items.
+    """Request for a path: between the ends of the scenario, or between two items.
 
-    ways: how many to choose from, found in one search by the default algorithm.
+    ways: number of paths to choose from, found in one search by the default algorithm.
     """
 
     kind: Literal["plan"]
@@ -153,9 +154,9 @@ class Plan(_Message):
 
 
 class Choose(_Message):
-    """One of the paths that were planned.
+    """Choice of one of the planned paths.
 
-    rev: of the sheet that they were planned for.
+    rev: revision of the sheet that they were planned for.
     """
 
     kind: Literal["choose"]
@@ -164,13 +165,13 @@ class Choose(_Message):
 
 
 class Ask(_Message):
-    """Fly it, or have a long work done; or stop what is under way."""
+    """Request to fly, to do a long task, or to stop the work under way."""
 
     kind: Literal["fly", "returns", "campaign", "stop"]
 
 
 class Save(_Message):
-    """The mission as a file: to the page, or over the file that the command named."""
+    """Request to save the mission: to the page, or over the file that the command named."""
 
     kind: Literal["save"]
     form: Literal["waypoints", "plan", "plan.json", "kml", "parm"]
@@ -178,7 +179,7 @@ class Save(_Message):
 
 
 class Open(_Message):
-    """A file that was dropped on the page, its bytes in base 64; or one in the server's folder, by its path."""
+    """Request to open a file: dropped on the page, bytes in base 64; or in the server's folder, by path."""
 
     kind: Literal["open"]
     name: Annotated[str, Field(min_length=1, max_length=1_000)]
@@ -192,7 +193,7 @@ _ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discrimina
 
 
 def read_message(text: str | bytes) -> Message:
-    """A message.  Raises pydantic's ValidationError, a ValueError, for anything else.
+    """Parse a message.  Raises pydantic's ValidationError, a ValueError, for anything else.
 
     >>> read_message('{"kind": "undo"}').kind
     'undo'
@@ -208,7 +209,7 @@ def read_message(text: str | bytes) -> Message:
 
 
 def fault_of(error: ValidationError) -> str:
-    """What is wrong with a message of a known kind, in a line; "" for what is no message at all.
+    """Describe the error in a message of a known kind in a line; "" for anything that is no message.
 
     >>> try:
     ...     read_message('{"kind": "raise", "rev": 1, "by": 1e9}')
@@ -221,5 +222,5 @@ def fault_of(error: ValidationError) -> str:
 
 
 def message_schema() -> dict[str, Any]:
-    """The messages as a JSON schema, for tests that make up their own."""
+    """Return the messages as a JSON schema, for tests that generate messages."""
     return _ADAPTER.json_schema()

@@ -1,4 +1,4 @@
-"""Open the studio: the page's server on this machine, until it is asked to stop."""
+"""Open the studio: serve its page on this machine until asked to stop."""
 
 import asyncio
 import contextlib
@@ -28,12 +28,14 @@ if TYPE_CHECKING:
     from planfly.studio.server import Server
 
 HOST = "127.0.0.1"
-# Taken where it is free and none is named, so that a page finds its studio again; else any.
+# Used if it is free and no port is given, so that a page finds its studio again; otherwise any port.
 USUAL_PORT = 8790
-# s between looks at whether to stop, and until what is under way is given up.
-_POLL, _CLOSING = 0.1, 2
-# Connections at a time, of which pages have a few each.
-_CONNECTIONS = 32
+# Interval between two checks whether to stop, s.
+_POLL_INTERVAL_S = 0.1
+# Time after which open requests are given up at the end, s.
+_GRACE_S = 2
+# Greatest number of connections; a page has a few.
+_MAX_SOCKETS = 32
 
 
 def _never() -> bool:
@@ -64,16 +66,16 @@ def open_studio(
     stop: Callable[[], bool] = _never,
     on_message: Callable[[str], None] = print,
 ) -> None:
-    """Serve a page of this machine on which a mission is dragged, judged and flown; needs ``planfly[studio]``.
+    """Serve a page on which a mission is dragged, judged and flown; needs ``planfly[studio]``.
 
-    what: a scenario, by name or file, whose path is planned; or a plan, a mission or a log, as of `planfly.judge`.
-    scenario, terrain, fence: the world of a mission, as of `planfly.fly`.  seed: of planner and turbulence.
-    wind to nav: how it is flown, as of `planfly.plan`; the page changes most of it.
-    port: where it listens; None for 8790, or any free one where that is taken.
-    browser: whether the page is opened.  keep: the folder in which what was done is kept for the next start.
-    stop: asked all the time.  on_message: called with the page's address, which holds the key to it.
+    what: a scenario, by name or file, whose path is planned; or a plan, a mission or a log, as for `planfly.judge`.
+    scenario, terrain, fence: the world of a mission, as for `planfly.fly`.  seed: of planner and turbulence.
+    wind to nav: settings of the flight, as for `planfly.plan`; the page changes most of them.
+    port: port to listen on; None for 8790, or any free one if that is taken.
+    browser: true to open the page.  keep: folder in which edits are saved for the next start.
+    stop: called continually; true ends the studio.  on_message: called with the page's address, which holds its token.
 
-    A script that calls it does so under ``if __name__ == "__main__":``, for the processes that fly import it.
+    A script must call it under ``if __name__ == "__main__":``, because the processes that fly import the script.
     Raises a `planfly.PlanflyError` for bad input.
     """
     check_arguments(seed=seed, port=port)
@@ -91,7 +93,7 @@ def open_studio(
         if restored:
             back = "; undo takes it back" if session.undo_text else ""
             on_message(f"what was done before is there again (kept in {kept}){back}")
-        # Imported here: only who serves needs the extra.
+        # Imported here: only serving needs the extra.
         from planfly.studio.server import Server
 
         token = secrets.token_urlsafe(24)
@@ -104,7 +106,7 @@ def open_studio(
 
 
 def _stem(target: str) -> str:
-    """A file's name of what is opened; two of one name in different folders have different ones.
+    """Return a file name for an opened target; equal names in different folders give different names.
 
     >>> _stem("jacksboro")
     'jacksboro'
@@ -116,7 +118,7 @@ def _stem(target: str) -> str:
 
 
 def _listen(port: int | None) -> socket.socket:
-    """The socket that pages come to.  Raises PlanflyError for a port that is taken."""
+    """Open the socket that pages connect to.  Raises PlanflyError for a port that is taken."""
     for one in (USUAL_PORT, 0) if port is None else (port,):
         try:
             return socket.create_server((HOST, one))
@@ -127,7 +129,7 @@ def _listen(port: int | None) -> socket.socket:
 
 @contextlib.contextmanager
 def _opened_page(address: str) -> Iterator[None]:
-    """Have the browser open an address, which no list of processes shows."""
+    """Open an address in the browser without showing it in a list of processes."""
     with temporary_folder("planfly-studio-") as folder:
         file = folder / "studio.html"
         file.touch(0o600)
@@ -143,7 +145,7 @@ def _opened_page(address: str) -> Iterator[None]:
 
 
 async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], bool]) -> None:
-    """Serve until it is to stop."""
+    """Serve until asked to stop."""
     import uvicorn
 
     from planfly.studio.app import make_app
@@ -151,7 +153,7 @@ async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], b
     from planfly.studio.messages import MAX_DROPPED_MESSAGE, MAX_MESSAGE
 
     class Quiet(uvicorn.Server):
-        """Signals are the caller's."""
+        """Server that leaves signals to the caller."""
 
         @contextlib.contextmanager
         def capture_signals(self) -> Iterator[None]:
@@ -161,15 +163,15 @@ async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], b
     config = uvicorn.Config(
         app,
         log_level="critical", access_log=False, server_header=False, date_header=False, lifespan="off",
-        ws="websockets-sansio", ws_max_size=MAX_DROPPED_MESSAGE + MAX_MESSAGE, timeout_graceful_shutdown=_CLOSING,
-        limit_concurrency=_CONNECTIONS, h11_max_incomplete_event_size=16_384, http=ShortLived,
+        ws="websockets-sansio", ws_max_size=MAX_DROPPED_MESSAGE + MAX_MESSAGE, timeout_graceful_shutdown=_GRACE_S,
+        limit_concurrency=_MAX_SOCKETS, h11_max_incomplete_event_size=16_384, http=ShortLived,
     )  # fmt: skip
     web = Quiet(config)
     serving = asyncio.create_task(web.serve(sockets=[listener]))
     running = asyncio.create_task(server.run())
     try:
         while not stop() and not serving.done() and not running.done():
-            await asyncio.sleep(_POLL)
+            await asyncio.sleep(_POLL_INTERVAL_S)
     finally:
         web.should_exit = True
         running.cancel()

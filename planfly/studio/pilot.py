@@ -1,7 +1,7 @@
-"""A process of its own that works for the studio: what is asked last is done, what it takes the place of is cancelled.
+"""Worker process of the studio: it does the newest task, which cancels the previous one.
 
-A work is a function with an argument that can be pickled; it is asked every so often whether it may go
-on.  The process is spawned, never forked, because the server has threads.  One that dies is started again.
+A task is a function with an argument that can be pickled; it reports progress regularly, and is cancelled at a report.
+The process is spawned, never forked, because the server has threads.  A process that dies is started again.
 """
 
 import multiprocessing
@@ -16,18 +16,18 @@ from typing import Any
 
 from world.errors import PlanflyError
 
-# s in which a work ends that is cancelled, or its process is ended: kernels may have to be compiled meanwhile.
+# Time for a cancelled task or its process to end, s: kernels may have to be compiled meanwhile.
 PATIENCE = 60.0
-# Takes done, total and a remark.
+# Callback with done, total and a remark.
 Advance = Callable[[float, float, str], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What is to be done.
+    """Work to be done.
 
-    number: it only grows, and the answers carry it.
-    function: its dotted name; it takes a payload and what takes its progress, and raises `Cancelled`.
+    number: increasing number, which the answers carry.
+    function: its dotted name; it takes a payload and a progress callback, and raises `Cancelled`.
     """
 
     number: int
@@ -37,9 +37,9 @@ class Work:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What comes back of a work.
+    """Answer to a task.
 
-    kind: "progress" with (done, total, remark), "done" with what the function returned, "cancelled" with nothing,
+    kind: "progress" with (done, total, remark), "done" with the result of the function, "cancelled" with nothing,
     "fault" with a line for people.
     """
 
@@ -48,23 +48,23 @@ class Answer:
     value: Any = None
 
 
-# Faults of planfly's own: the studio says them in a line and goes on with the mission as it was.
+# Internal errors of planfly: the studio reports them in a line and keeps the mission as it was.
 INTERNAL = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError, RuntimeError, OSError)
 
 
 def internal_text(error: Exception) -> str:
-    """A fault of planfly's own in a line."""
+    """Describe an internal error of planfly in a line."""
     return f"this did not work, by a fault of planfly's own: {type(error).__name__}: {error}"
 
 
 class Cancelled(Exception):
-    """Raised within a work that something newer has taken the place of."""
+    """Raised within a task that is replaced by newer work."""
 
 
 class Pilot:
-    """The process, as the server sees it.  Its methods are called from any thread, and none of them waits for it.
+    """Worker process, as seen by the server.  Its methods may be called from any thread, and never block.
 
-    What it is asked is sent from a thread, the newest alone: a process that reads nothing holds up nobody.
+    Tasks are sent from a thread, only the newest one: a process that does not read blocks no caller.
     """
 
     def __init__(
@@ -74,46 +74,47 @@ class Pilot:
         patience: float = PATIENCE,
         pack: Callable[[Work | None], bytes] = pickle.dumps,
     ) -> None:
-        """Nothing is started before `ask`.
+        """Prepare a worker; nothing is started before `ask`.
 
-        on_answer: called from a thread of its own.  patience: s in which a work ends that is cancelled.  pack: pickles
-        a work, called from the sending thread; what another thread may change meanwhile has to be pickled by that one.
+        on_answer: called from its own thread.  patience: time for a cancelled task to end, s.  pack: pickles a task,
+        called from the sending thread; objects that another thread may change meanwhile have to be pickled in that
+        thread.
         """
         self._name, self._on_answer, self._patience, self._pack = name, on_answer, patience, pack
         self._changed = threading.Condition(threading.RLock())
         self._process: multiprocessing.process.BaseProcess | None = None
         self._pipe: Connection | None = None
-        # What is wanted, and whether that was sent; numbers of works that were sent and are not answered.
-        self._asked: Work | None = None
+        # The newest task, and whether it was sent; numbers of tasks that were sent and not answered.
+        self._wanted: Work | None = None
         self._sent, self._closed = True, False
-        self._open: list[int] = []
+        self._unanswered: list[int] = []
         self._sender: threading.Thread | None = None
         self._watch: threading.Timer | None = None
 
     @property
     def pid(self) -> int | None:
-        """The process's number, None where there is none."""
+        """Process ID, or None without a process."""
         return None if self._process is None else self._process.pid
 
     def start(self) -> None:
-        """Have the process there before it is needed."""
+        """Start the process before it is needed."""
         with self._changed:
-            self._ready()
+            self._ensure_process()
 
     def ask(self, work: Work) -> None:
-        """Do a work; whatever is under way is cancelled."""
-        self._want(work)
+        """Do a task; any task under way is cancelled."""
+        self._set_wanted(work)
 
     def cancel(self) -> None:
-        """End what is under way."""
-        self._want(None)
+        """Cancel the work under way."""
+        self._set_wanted(None)
 
-    def _want(self, work: Work | None) -> None:
+    def _set_wanted(self, work: Work | None) -> None:
         with self._changed:
-            dropped = self._asked if not self._sent else None
-            self._asked, self._sent = work, False
-            if self._open and self._watch is None:
-                self._watch = threading.Timer(self._patience, self._end, (self._pipe, self._open[0]))
+            dropped = self._wanted if not self._sent else None
+            self._wanted, self._sent = work, False
+            if self._unanswered and self._watch is None:
+                self._watch = threading.Timer(self._patience, self._kill_if_stuck, (self._pipe, self._unanswered[0]))
                 self._watch.daemon = True
                 self._watch.start()
             if self._sender is None:
@@ -127,7 +128,7 @@ class Pilot:
         """End the process."""
         with self._changed:
             self._closed = True
-            self._unwatch()
+            self._cancel_watch()
             process, pipe = self._process, self._pipe
             self._process = self._pipe = None
             self._changed.notify_all()
@@ -138,15 +139,15 @@ class Pilot:
             pipe.close()
 
     def _send(self) -> None:
-        """Send what is wanted, until it is closed."""
+        """Send the newest task until the worker is closed."""
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._closed or not self._sent)
                 if self._closed:
                     return
-                work, self._sent = self._asked, True
-                pipe = self._pipe if work is None else self._ready()
-                self._open += [] if work is None else [work.number]
+                work, self._sent = self._wanted, True
+                pipe = self._pipe if work is None else self._ensure_process()
+                self._unanswered += [] if work is None else [work.number]
             if pipe is None:
                 continue
             try:
@@ -156,55 +157,55 @@ class Pilot:
                     if self._closed:
                         return
                     if work is not None:
-                        self._open = [one for one in self._open if one != work.number]
-                        self._asked = None if self._asked is work else self._asked
+                        self._unanswered = [one for one in self._unanswered if one != work.number]
+                        self._wanted = None if self._wanted is work else self._wanted
                 if work is not None:
                     self._on_answer(Answer(work.number, "fault", internal_text(error)))
                 continue
             try:
                 pipe.send_bytes(data)
             except (OSError, TypeError, ValueError):
-                # The process has ended: another one does it.
+                # The process has ended: a new one does the task.
                 with self._changed:
                     if self._pipe is pipe:
                         self._pipe = self._process = None
-                    if work is not None and self._asked is work:
+                    if work is not None and self._wanted is work:
                         self._sent = False
-                        self._open = [one for one in self._open if one != work.number]
+                        self._unanswered = [one for one in self._unanswered if one != work.number]
 
-    def _end(self, pipe: Connection, number: int) -> None:
-        """End a process that is still at a work that was cancelled; what is wanted now is done by another one."""
+    def _kill_if_stuck(self, pipe: Connection, number: int) -> None:
+        """Kill a process that still does a cancelled task; a new process does the newest task."""
         with self._changed:
             self._watch = None
-            if self._closed or self._pipe is not pipe or number not in self._open:
+            if self._closed or self._pipe is not pipe or number not in self._unanswered:
                 return
             process, self._process, self._pipe = self._process, None, None
-            left = self._left()
-            self._sent = self._asked is None
+            left = self._drop_unwanted()
+            self._sent = self._wanted is None
             self._changed.notify_all()
         if process is not None:
             process.kill()
         for one in left:
             self._on_answer(Answer(one, "cancelled"))
 
-    def _left(self) -> list[int]:
-        """Works that a process was at which is gone, and nobody wants any more."""
-        left = [one for one in self._open if self._asked is None or one != self._asked.number]
-        self._open = []
+    def _drop_unwanted(self) -> list[int]:
+        """Return the tasks that a lost process had and that are not wanted any more."""
+        left = [one for one in self._unanswered if self._wanted is None or one != self._wanted.number]
+        self._unanswered = []
         return left
 
-    def _unwatch(self) -> None:
+    def _cancel_watch(self) -> None:
         if self._watch is not None:
             self._watch.cancel()
         self._watch = None
 
-    def _ready(self) -> Connection:
-        """The pipe to a running process."""
+    def _ensure_process(self) -> Connection:
+        """Return the pipe to a running process, started if necessary."""
         if self._pipe is not None and self._process is not None and self._process.is_alive():
             return self._pipe
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        # Not a daemon's: a campaign starts processes of its own.
+        # Not a daemon: a campaign starts child processes.
         process = context.Process(target=work_on, args=(theirs,), name=self._name)
         process.start()
         theirs.close()
@@ -213,38 +214,38 @@ class Pilot:
         return ours
 
     def _listen(self, pipe: Connection) -> None:
-        """Hand on what comes; a process that is gone before it has answered is a fault of its work."""
+        """Forward answers; a process that ends before its answer is reported as a fault of its task."""
         while True:
             try:
                 answer = pipe.recv()
             except (EOFError, OSError, TypeError):
-                # A pipe that is closed while it is waited on loses its handle: a TypeError.
+                # A pipe that is closed during a wait loses its handle, which raises TypeError.
                 break
             if answer.kind != "progress":
-                self._note(pipe, answer)
+                self._record_answer(pipe, answer)
             self._on_answer(answer)
         fault = "the process that worked on this has ended: ask again"
         with self._changed:
             if self._closed or self._pipe is not pipe:
                 return
             self._pipe = self._process = None
-            left = [Answer(one, "cancelled") for one in self._left()]
-            if self._asked is not None and self._sent:
-                left.append(Answer(self._asked.number, "fault", fault))
-                self._asked = None
+            left = [Answer(one, "cancelled") for one in self._drop_unwanted()]
+            if self._wanted is not None and self._sent:
+                left.append(Answer(self._wanted.number, "fault", fault))
+                self._wanted = None
         for answer in left:
             self._on_answer(answer)
 
-    def _note(self, pipe: Connection, answer: Answer) -> None:
-        """A work has ended."""
+    def _record_answer(self, pipe: Connection, answer: Answer) -> None:
+        """Record that a task has ended."""
         with self._changed:
-            if self._asked is not None and answer.number == self._asked.number:
-                self._asked = None
-            if self._pipe is pipe and answer.number in self._open:
-                first = self._open[0]
-                self._open.remove(answer.number)
+            if self._wanted is not None and answer.number == self._wanted.number:
+                self._wanted = None
+            if self._pipe is pipe and answer.number in self._unanswered:
+                first = self._unanswered[0]
+                self._unanswered.remove(answer.number)
                 if answer.number == first:
-                    self._unwatch()
+                    self._cancel_watch()
 
 
 # ----------------------------------------------------------------------
@@ -252,10 +253,10 @@ class Pilot:
 
 
 def work_on(pipe: Connection) -> None:
-    """Do what comes, the newest alone, until the pipe closes."""
+    """Do tasks, always the newest, until the pipe closes."""
     import signal
 
-    # An interrupt at the terminal is the server's to handle.
+    # An interrupt at the terminal is handled by the server.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     waiting: Work | None = None
     while True:
@@ -267,7 +268,7 @@ def work_on(pipe: Connection) -> None:
 
 
 def _newest(pipe: Connection, work: Work | None) -> Work | None:
-    """The newest of a work and of those that have come after it; the others are answered as cancelled."""
+    """Return the newest task that has arrived; the others are answered as cancelled."""
     while pipe.poll():
         newer = pipe.recv()
         if work is not None:
@@ -277,7 +278,7 @@ def _newest(pipe: Connection, work: Work | None) -> Work | None:
 
 
 def _do(pipe: Connection, work: Work) -> Work | None:
-    """Do one work and answer; returns the one that has taken its place, None where none has."""
+    """Do one task and answer; return the task that has replaced it, or None."""
     newer: list[Work | None] = []
 
     def advance(done: float, total: float, remark: str) -> None:

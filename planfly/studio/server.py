@@ -1,7 +1,6 @@
-"""The studio's server: pages on websockets, one session, a thread that judges, and two processes that work.
+"""Server of the studio: pages on websockets, a session, a judging thread, and two worker processes.
 
-What a page drags is judged newest first, one at a time.  What it changes is changed in order, and every page is sent
-what comes of it.
+Drags are judged one at a time, the newest first.  Edits are applied in order, and every page is sent the result.
 """
 
 import asyncio
@@ -39,46 +38,57 @@ from world.files import read_small_file, utf8_text
 
 Given = TypeVar("Given")
 
-# Pages at a time; s until a page has said its token, and between what is kept; frames that wait for a slow page.
-MAX_PAGES, PATIENCE, KEEPING = 4, 5.0, 3.0
-# Sockets at a time that have not given a token yet.
+# Greatest number of pages.
+MAX_PAGES = 4
+# Timeout of a page for its token, s.
+PATIENCE = 5.0
+# Interval between two autosaves, s.
+KEEPING = 3.0
+# Greatest number of sockets that have not given a token yet.
 MAX_UNWELCOMED = 16
-_WAITING = 64
-# s for an answer to leave before the next place is judged.
-_BREATH = 0.001
-# Between two looks whether another page has gone, s.
-_AGAIN = 0.05
-# Codes with which a websocket is closed.
-NO_TOKEN, TOO_MANY, TOO_SLOW, NOT_UNDERSTOOD = 4403, 4429, 1013, 1007
+# Greatest number of frames that wait for a slow page.
+_MAX_WAITING_FRAMES = 64
+# Pause for an answer to leave before the next place is judged, s.
+_SEND_PAUSE_S = 0.001
+# Interval between two checks whether another page has gone, s.
+_PLACE_CHECK_INTERVAL_S = 0.05
+# Code that closes a websocket without a token.
+NO_TOKEN = 4403
+# Code that closes a websocket if there are too many pages.
+TOO_MANY = 4429
+# Code that closes the websocket of a page that is too slow.
+TOO_SLOW = 1013
+# Code that closes a websocket after a message that is not understood.
+NOT_UNDERSTOOD = 1007
 
 
 @dataclass(eq=False)
 class Page:
-    """A page that has given its token."""
+    """Page that has given its token."""
 
     socket: WebSocket
     dark: bool
-    frames: asyncio.Queue[str | bytes] = field(default_factory=lambda: asyncio.Queue(_WAITING))
+    frames: asyncio.Queue[str | bytes] = field(default_factory=lambda: asyncio.Queue(_MAX_WAITING_FRAMES))
     drag: messages.Drag | None = None
     dragged: asyncio.Event = field(default_factory=asyncio.Event)
     seen: tuple[int, bool] = (0, False)
     full: asyncio.Event = field(default_factory=asyncio.Event)
 
     def send(self, message: Json | bytes) -> None:
-        """Send it when the page can take it; one that takes nothing more is closed."""
+        """Queue a message for the page; a page whose queue is full is closed."""
         frame = message if isinstance(message, bytes) else json.dumps(message, separators=(",", ":"), allow_nan=False)
         try:
             self.frames.put_nowait(frame)
         except asyncio.QueueFull:
-            # A page that has missed a frame shows what is not so: it begins anew.
+            # A page that has missed a frame shows a wrong state: it has to reconnect.
             self.full.set()
 
 
 class Server:
-    """All of it but the sockets that listen."""
+    """The server, without the listening sockets."""
 
     def __init__(self, session: Session, token: str, kept: Path | None, folder: Path | None) -> None:
-        """kept: where what was done is written.  folder: whose files may be opened by the page, None for none."""
+        """Prepare the server.  kept: autosave file.  folder: files that the page may open, or None."""
         self.session, self._token, self._kept = session, token, kept
         self._folder = folder
         self._pages: set[Page] = set()
@@ -88,15 +98,15 @@ class Server:
         self._grounds: dict[tuple[int, bool], tuple[bytes, ...]] = {}
         self.jobs = Jobs(self._answered_elsewhere, self._packed)
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._taking: asyncio.Future[None] | None = None
-        self._unkept, self._unwelcomed = "", 0
+        self._take_task: asyncio.Future[None] | None = None
+        self._autosave_error, self._pending_sockets = "", 0
         self.welcomed = threading.Event()
 
     # ------------------------------------------------------------------
     # Begin and end.
 
     async def run(self) -> None:
-        """Keep what is done until the server ends."""
+        """Autosave until the server ends."""
         self._loop = asyncio.get_running_loop()
         self.jobs.start(self.session)
         while True:
@@ -105,44 +115,44 @@ class Server:
 
     async def _keep(self) -> None:
         if self._kept is not None and (self.session.has_news or self.session.kept_rev):
-            # On a full disk the studio goes on, and what is done is not kept: the pages say so once.
+            # On a full disk the studio goes on without autosave, and reports that once.
             try:
-                await self._judged(lambda: self.session.keep(self._kept or Path()))
+                await self._run_judging(lambda: self.session.keep(self._kept or Path()))
             except (OSError, PlanflyError) as error:
-                if not self._unkept:
+                if not self._autosave_error:
                     self._broadcast({"kind": "fault", "job": "keep", "text": f"what is done here is not kept: {error}"})
-                self._unkept = str(error)
+                self._autosave_error = str(error)
             else:
-                self._unkept = ""
+                self._autosave_error = ""
 
     async def close(self) -> None:
-        """End the processes and keep what was done."""
+        """End the processes and autosave."""
         await self._keep()
         self.jobs.close()
         self._judging.shutdown(wait=False, cancel_futures=True)
         self._drawing.shutdown(wait=False, cancel_futures=True)
 
-    async def _judged(self, work: Callable[[], Given]) -> Given:
+    async def _run_judging(self, work: Callable[[], Given]) -> Given:
         return await asyncio.get_running_loop().run_in_executor(self._judging, work)
 
     def _packed(self, work: Work | None) -> bytes:
-        """A work pickled where missions are judged, which fill their caches meanwhile."""
+        """Pickle a task in the judging thread: judging fills caches of the objects meanwhile."""
         return self._judging.submit(pickle.dumps, work).result()
 
     # ------------------------------------------------------------------
     # One page.
 
     async def serve(self, socket: WebSocket) -> None:
-        """Speak with a page until it goes."""
-        if self._unwelcomed >= MAX_UNWELCOMED:
+        """Serve a page until it goes."""
+        if self._pending_sockets >= MAX_UNWELCOMED:
             await socket.close(TOO_MANY)
             return
-        self._unwelcomed += 1
+        self._pending_sockets += 1
         try:
             await socket.accept()
             page = await self._welcome(socket)
         finally:
-            self._unwelcomed -= 1
+            self._pending_sockets -= 1
         if page is None:
             return
         self._pages.add(page)
@@ -174,10 +184,10 @@ class Server:
 
     async def _has_place(self) -> None:
         while len(self._pages) >= MAX_PAGES:
-            await asyncio.sleep(_AGAIN)
+            await asyncio.sleep(_PLACE_CHECK_INTERVAL_S)
 
     async def _welcome(self, socket: WebSocket) -> Page | None:
-        """The page, if its first message has the token."""
+        """Return the page, if its first message has the token."""
         code = NO_TOKEN
         with contextlib.suppress(ValueError, asyncio.TimeoutError, WebSocketDisconnect):
             text = await asyncio.wait_for(_text(socket), PATIENCE)
@@ -189,7 +199,7 @@ class Server:
             )
             if given and isinstance(first, messages.Hello):
                 code = TOO_MANY
-                # One that has gone counts until that is seen, which takes its time on a busy machine.
+                # A page that has gone occupies its place until that is noticed, which takes time on a busy machine.
                 await asyncio.wait_for(self._has_place(), PATIENCE)
                 return Page(socket, first.dark)
         with contextlib.suppress(RuntimeError):
@@ -203,7 +213,7 @@ class Server:
                 await (page.socket.send_bytes(frame) if isinstance(frame, bytes) else page.socket.send_text(frame))
 
     async def _preview(self, page: Page) -> None:
-        """Judge the newest place of what a page drags, one at a time."""
+        """Judge the newest place of a drag, one at a time."""
         while True:
             await page.dragged.wait()
             page.dragged.clear()
@@ -211,9 +221,9 @@ class Server:
             if asked is None:
                 continue
             try:
-                found = await self._judged(functools.partial(self.session.preview, asked))
+                found = await self._run_judging(functools.partial(self.session.preview, asked))
             except StaleEdit:
-                # The page waits for an answer before it asks again.
+                # The page waits for an answer before it sends another drag.
                 page.send({"kind": "preview", "n": asked.n, "stale": True})
                 continue
             except PlanflyError as error:
@@ -221,8 +231,8 @@ class Server:
             except INTERNAL as error:
                 found = {"fault": internal_text(error)}
             page.send({"kind": "preview", "rev": asked.rev, "n": asked.n, "k": asked.k, **found})
-            # It is on its way before the next is judged, which keeps the interpreter busy.
-            await asyncio.sleep(_BREATH)
+            # Let the answer leave before the next is judged, which keeps the interpreter busy.
+            await asyncio.sleep(_SEND_PAUSE_S)
 
     async def _show_all(self, page: Page) -> None:
         page.send({"kind": "choices", **self.jobs.choices(), **folder_json(self._folder)})
@@ -233,7 +243,7 @@ class Server:
         await self._show_ground(page)
 
     async def _show_ground(self, page: Page) -> None:
-        """The ground of the world and look that the page has, once."""
+        """Send the ground of a world once, in light or dark."""
         terrain, world = self.session.desk.scenario.terrain, self.session.world_shown()
         key = (hash(json.dumps(world["shown"])), page.dark)
         if terrain is None or page.seen == key:
@@ -255,10 +265,10 @@ class Server:
             page.send(frame)
 
     # ------------------------------------------------------------------
-    # What a page says.
+    # Messages of a page.
 
     async def _hear(self, page: Page, text: str) -> None:
-        """Do what a message asks.  Raises ValueError for one that is not understood."""
+        """Act on a message.  Raises ValueError for one that is not understood."""
         try:
             message = read_message(text)
         except ValidationError as error:
@@ -297,7 +307,7 @@ class Server:
             case messages.Save():
                 work = session.save_over if message.over else lambda: session.save(message.form)
                 async with self._order:
-                    saved = await self._judged(work)
+                    saved = await self._run_judging(work)
                 content = "" if message.over else base64.b64encode(saved.data).decode()
                 where = shown_path(session.document.path.parent) if message.over and session.document.path else ""
                 answer = {"name": saved.name, "losses": list(saved.losses), "where": where, "data": content}
@@ -308,14 +318,14 @@ class Server:
                 await self._change(message)
 
     async def _change(self, message: messages.Message) -> None:
-        """Change the session and show every page what came of it."""
+        """Change the session and send the result to every page."""
         session = self.session
         async with self._order:
             rev, world = session.rev, session.world_rev
-            await self._judged(lambda: self._changed(message))
+            await self._run_judging(lambda: self._changed(message))
             if session.rev == rev:
                 return
-            shown = await self._judged(session.sheet)
+            shown = await self._run_judging(session.sheet)
         if session.world_rev != world:
             self._broadcast(session.world_shown())
         self._broadcast(shown)
@@ -343,7 +353,7 @@ class Server:
             case messages.Open():
                 opened = self._opened(message)
                 if self._kept is not None and session.has_news:
-                    # What fails here is said where it is kept by and by.
+                    # An error here is reported at the next regular autosave.
                     with contextlib.suppress(OSError, PlanflyError):
                         session.keep(self._kept)
                 session.open(opened)
@@ -361,17 +371,17 @@ class Server:
         return open_dropped(message.name, data, self.session.world)
 
     def _parameters(self, name: str) -> messages.Settings:
-        """The change that a file of parameters in the folder asks for."""
+        """Return the settings in a parameter file of the folder."""
         path = file_inside(self._folder, name)
         data = read_small_file(path, messages.MAX_MESSAGE, "parameter", PlanflyError)
         text = utf8_text(data, path, PlanflyError)
         return messages.Settings(kind="settings", parameter_file=path.name, parameter_text=text)
 
     # ------------------------------------------------------------------
-    # What the processes answer.
+    # Answers of the processes.
 
     def _answered_elsewhere(self, pilot: str, answer: Answer) -> None:
-        """Called from a thread of a process's pipe."""
+        """Forward an answer from the thread of a process's pipe to the event loop."""
         if self._loop is not None and not self._loop.is_closed():
             with contextlib.suppress(RuntimeError):
                 self._loop.call_soon_threadsafe(self._answered, pilot, answer)
@@ -381,7 +391,7 @@ class Server:
             self._broadcast(message)
         if self.jobs.chosen_at_once(self.session):
             chosen = messages.Choose(kind="choose", rev=self.session.rev, which=0)
-            self._taking = asyncio.ensure_future(self._take(chosen))
+            self._take_task = asyncio.ensure_future(self._take(chosen))
 
     async def _take(self, chosen: messages.Choose) -> None:
         """Take the path that was planned when the studio began, unless the mission was edited meanwhile."""
@@ -406,7 +416,7 @@ class Server:
 
 
 async def _text(socket: WebSocket) -> str:
-    """The next message, which is text.  Raises ValueError for a binary one, and WebSocketDisconnect."""
+    """Return the next text message.  Raises ValueError for a binary one, and WebSocketDisconnect."""
     received = await socket.receive()
     if received["type"] == "websocket.disconnect":
         raise WebSocketDisconnect(received.get("code", 1000))
@@ -417,6 +427,6 @@ async def _text(socket: WebSocket) -> str:
 
 
 def _frame(kind: str, head: Json, body: bytes) -> bytes:
-    """A binary frame: its kind, the length of its head, the head as JSON, and the bytes."""
+    """Make a binary frame: its kind, the length of its head, the head as JSON, and the bytes."""
     text = json.dumps(head).encode()
     return kind.encode() + struct.pack("<I", len(text)) + text + body

@@ -1,6 +1,6 @@
-"""How a mission under edit is flown: aircraft, autopilot with its parameters, weather and limits, and changes of them.
+"""Settings of the flight: aircraft, autopilot with parameters, weather and limits.
 
-Values are checked where a scenario's and a file's of parameters are, and refused with the same words.
+Values are checked by the same code as in scenarios and parameter files, and refused with the same texts.
 """
 
 from dataclasses import dataclass, field, replace
@@ -18,18 +18,18 @@ from world.errors import PlanflyError
 from world.files import did_you_mean, temporary_folder
 from world.scenario import Scenario, from_spec, with_flight
 
-# What a file of parameters may be called.
+# Suffixes of parameter files.
 PARAMETER_FILES = (".parm", ".param", ".params")
-# Names that are listed of what a file states in vain.
-_NAMED = 8
+# Greatest number of unused names of a file that are listed.
+_MAX_LISTED_NAMES = 8
 
 
 @dataclass(frozen=True, slots=True)
 class SetParameters:
     """Parameters of the autopilot that were set in the studio.
 
-    values: by the autopilot's names and in its units.
-    file: the one that was read last, "" for none; unused: its names of which the law makes nothing.
+    values: by the names and in the units of the autopilot.
+    file: name of the file that was read last, or ""; unused: its names that the control law does not use.
     """
 
     values: dict[str, float] = field(default_factory=dict)
@@ -37,21 +37,21 @@ class SetParameters:
     unused: tuple[str, ...] = ()
 
     def text(self, title: str) -> str:
-        """As a file that ground stations read."""
+        """Return the text of a parameter file for ground stations."""
         return parameters_text(self.values, title)
 
     def airframe(self, scenario: Scenario) -> Airframe:
-        """The airframe of a scenario that flies with them, and says so.  Raises PlanflyError."""
+        """Load the airframe of a scenario with these parameters, and name their source.  Raises PlanflyError."""
         made = load_airframe(scenario, self.values)
         stored = made.autopilot.store()
         if not self.values or stored.parameters is None:
             return made
-        whose = stored.parameters._replace(source=self.file or stored.parameters.source or "the studio")
-        return replace(made, autopilot=made.autopilot.restore(stored._replace(parameters=whose)))
+        labelled = stored.parameters._replace(source=self.file or stored.parameters.source or "the studio")
+        return replace(made, autopilot=made.autopilot.restore(stored._replace(parameters=labelled)))
 
 
 def changed_world(scenario: Scenario, asked: Settings) -> Scenario:
-    """A scenario with other settings.  Raises PlanflyError for a value that it may not have."""
+    """Return a scenario with other settings.  Raises PlanflyError for an invalid value."""
     wind = None
     if asked.wind_speed is not None or asked.wind_from is not None:
         speed = scenario.wind.speed if asked.wind_speed is None else asked.wind_speed
@@ -76,10 +76,10 @@ def changed_world(scenario: Scenario, asked: Settings) -> Scenario:
 
 
 def changed_parameters(old: SetParameters, scenario: Scenario, asked: Settings) -> SetParameters:
-    """The parameters that are set after a change, of the autopilot that a scenario names.
+    """Return the parameters after a change of settings, for the autopilot of a scenario.
 
-    Another autopilot has others: none is kept.  A file takes the place of all, a single one of its own.
-    Raises PlanflyError for a name that the law does not have, and for a value that is not allowed.
+    Another autopilot has other parameters: none is kept.  A file replaces all, a single parameter only itself.
+    Raises PlanflyError for a name that the control law does not have, and for a value that is not allowed.
     """
     if asked.autopilot is not None:
         old = SetParameters()
@@ -90,7 +90,7 @@ def changed_parameters(old: SetParameters, scenario: Scenario, asked: Settings) 
     if asked.parameter is not None:
         found = read_parameters(scenario, asked.parameter, "parameter")
         if found.unused:
-            name, known = found.unused[0], [one.name for one in _parameters(scenario).values]
+            name, known = found.unused[0], [one.name for one in _law_parameters(scenario).values]
             allowed = f"one that the law of this autopilot has is expected{did_you_mean(name, known)}"
             raise PlanflyError(f"parameter: {name}: {allowed}", field="parameter", value=name, allowed=allowed)
         made = SetParameters(values | found.values, made.file, made.unused)
@@ -98,23 +98,23 @@ def changed_parameters(old: SetParameters, scenario: Scenario, asked: Settings) 
 
 
 def read_parameters(scenario: Scenario, text: str, name: str) -> SetParameters:
-    """What a file's text states for the autopilot that a scenario names.  Raises PlanflyError, with the file's name."""
-    asked = _parameters(scenario).by_origin("file")
+    """Read autopilot parameters from a file's text.  Raises PlanflyError, with the file's name."""
+    asked = _law_parameters(scenario).by_origin("file")
     with temporary_folder("planfly-studio-") as folder:
         file = folder / "set.parm"
         file.write_text(text, encoding="utf-8")
         try:
-            made = _parameters(with_flight(scenario, params=str(file)))
+            made = _law_parameters(with_flight(scenario, params=str(file)))
         except PlanflyError as error:
             raise PlanflyError(str(error).replace(str(file), name), file=name) from None
     stated = made.by_origin("file")
-    # What the scenario asks for by itself, and the text does not state, is the scenario's.
+    # Parameters that the scenario itself sets, and the text does not, belong to the scenario.
     own = {one: value for one, value in stated.items() if one not in asked or one in parse_parameters(text, name)}
     return SetParameters(own, name, made.unused)
 
 
-def _parameters(scenario: Scenario) -> Parameters:
-    """Those that the autopilot of a scenario flies with.  Raises PlanflyError for one that has none."""
+def _law_parameters(scenario: Scenario) -> Parameters:
+    """Return the autopilot parameters of a scenario.  Raises PlanflyError if its autopilot has none."""
     made = load_autopilot(scenario, find_airframe(scenario)[0])
     if made.parameters is None:
         raise PlanflyError(f"{made.title} has no parameters: choose another autopilot", field="parameter")
@@ -122,9 +122,9 @@ def _parameters(scenario: Scenario) -> Parameters:
 
 
 def settings_json(scenario: Scenario, frame: Airframe, own: SetParameters) -> dict[str, Any]:
-    """The settings as they are, for a page."""
+    """Return the present settings for a page."""
     limits, parameters = scenario.to_json().get("limits", {}), frame.autopilot.parameters
-    more = f" and {len(own.unused) - _NAMED} more" if len(own.unused) > _NAMED else ""
+    more = f" and {len(own.unused) - _MAX_LISTED_NAMES} more" if len(own.unused) > _MAX_LISTED_NAMES else ""
     return {
         "aircraft": frame.aircraft.name,
         "autopilot": frame.autopilot.name,
@@ -137,6 +137,6 @@ def settings_json(scenario: Scenario, frame: Airframe, own: SetParameters) -> di
         "ceiling": None if scenario.external else float(scenario.ceiling),
         "parameters": dict(own.values),
         "parameter_file": own.file,
-        "unused": ", ".join(own.unused[:_NAMED]) + more,
+        "unused": ", ".join(own.unused[:_MAX_LISTED_NAMES]) + more,
         "known": {} if parameters is None else {name: value for name, value, _ in parameters.values},
     }

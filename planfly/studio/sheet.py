@@ -1,4 +1,4 @@
-"""What the page draws, as plain data: the world, the mission in it with its states, and its profile; lengths in m."""
+"""Data that the page draws: the world, the mission with its states, and its profile; lengths in m."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -31,15 +31,23 @@ from world.threats import Threats
 Floats = NDArray[np.float64]
 Json = dict[str, Any]
 
-# Samples of the profile; findings that are listed; zones and threats that are cut for the profile.
-_SAMPLES, _LISTED, _MOST_CUTS = 500, 60, 120
-_PLAIN = State("ok")
-# Ground that is drawn around the area, as factors of its sides and of the longer one.
-_AROUND, _WIDE, _TALL = 1.2, 1.5, 0.9
+# Samples of the profile.
+_PROFILE_SAMPLES = 500
+# Greatest number of findings that are listed.
+_MAX_LISTED_FINDINGS = 60
+# Greatest number of zones and threats that are cut for the profile.
+_MAX_CUTS = 120
+_OK_STATE = State("ok")
+# Ratio of the drawn ground to the area, along each side.
+_GROUND_RATIO = 1.2
+# Least ratio of the width of the drawn ground to the longer side of the area.
+_MIN_WIDTH_RATIO = 1.5
+# Least ratio of the height of the drawn ground to the longer side of the area.
+_MIN_HEIGHT_RATIO = 0.9
 
 
 def rounded(values: Any, digits: int = 1) -> Any:
-    """An array as lists of rounded numbers; what is not finite is null."""
+    """Return an array as lists of rounded numbers; numbers that are not finite become null."""
     array = np.round(np.asarray(values, dtype=np.float64), digits)
     if np.isfinite(array).all():
         return array.tolist()
@@ -51,7 +59,7 @@ def rounded(values: Any, digits: int = 1) -> Any:
 
 
 def world_json(desk: Desk, setup: FlightSetup) -> Json:
-    """What stands about a mission: area, threats, zones, ends, limits."""
+    """Describe the world of a mission: area, threats, zones, ends, limits."""
     scenario, mission = desk.scenario, setup.mission
     extent = scenario.bounds if scenario.external else map_extent(scenario, desk.points(mission), [])
     return {
@@ -71,10 +79,10 @@ def world_json(desk: Desk, setup: FlightSetup) -> Json:
 
 
 def _with_surroundings(extent: Floats) -> Floats:
-    """A range with ground around it, so that a window of another form is filled, (2, 2) m."""
+    """Extend a range, (2, 2) m, so that a window of another shape is filled with ground."""
     middle, size = extent.mean(axis=1), np.diff(extent, axis=1)[:, 0]
     longest = float(size.max())
-    half = 0.5 * np.maximum(_AROUND * size, np.array([_WIDE * longest, _TALL * longest]))
+    half = 0.5 * np.maximum(_GROUND_RATIO * size, np.array([_MIN_WIDTH_RATIO * longest, _MIN_HEIGHT_RATIO * longest]))
     return np.stack([middle - half, middle + half], axis=1)
 
 
@@ -90,7 +98,7 @@ def _threats_json(threats: Threats) -> list[Json]:
 
 
 def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> list[Json]:
-    """The scenario's zones, then those of the mission's own fence, as findings number them."""
+    """Describe the scenario's zones, then the zones of the mission's own fence, as findings number them."""
     zones = airspace_of(setup).zones if mission.fences else scenario.zones
     return [
         {
@@ -107,7 +115,7 @@ def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> lis
 
 
 def sheet_json(desk: Desk, judged: Judged) -> Json:
-    """A mission with its whole geometric verdict: items, route, path, states, findings, profile."""
+    """Describe a mission with its whole geometric verdict: items, route, path, states, findings, profile."""
     verdict, setup = judged.verdict, judged.setup
     states = place_states(judged.requirements, verdict.findings)
     path = judged.requirements.path
@@ -128,7 +136,7 @@ def sheet_json(desk: Desk, judged: Judged) -> Json:
 
 
 def window_json(mission: Mission, route: Route, windows: Sequence[Window]) -> Json:
-    """The legs and corners that were judged about a moved item."""
+    """Describe the legs and corners that were judged near a moved item."""
     return {"total_legs": route.legs, "windows": [_window(mission, route, one) for one in windows]}
 
 
@@ -146,7 +154,7 @@ def _window(mission: Mission, route: Route, window: Window) -> Json:
 
 
 def items_json(desk: Desk, mission: Mission) -> list[Json]:
-    """The items that can be moved: where they are, and how the mission states them."""
+    """Describe the items that can be moved: their places, and how the mission states them."""
     points, flown = desk.points(mission), desk.flown(mission)
     found = []
     for k, (east, north, up) in zip(places(mission), points.tolist(), strict=True):
@@ -168,24 +176,24 @@ def items_json(desk: Desk, mission: Mission) -> list[Json]:
 
 
 def route_json(mission: Mission, route: Route, first: int, last: int) -> Json:
-    """Waypoints of a route, both included, with the place in the mission's list of the item of each, -1 for none."""
+    """Describe the waypoints of a route from first to last, with the index of each item, -1 for none."""
     numbers = {item.seq: k for k, item in enumerate(mission.items)}
     items = [numbers.get(seq, -1) for seq in route.items[first : last + 1].tolist()]
     return {"route": rounded(route.waypoints[first : last + 1]), "of": items}
 
 
 def _legs_of(points: Floats, legs: NDArray[np.int64], first: int, last: int) -> list[list[float]]:
-    """The path of each leg as east, north, up, east, north, up, ..."""
+    """Return the path of each leg as east, north, up, east, north, up, ..."""
     edges = np.searchsorted(legs, np.arange(first, last + 1))
     flat = np.round(points, 1)
     return [flat[begin : end + 1].ravel().tolist() for begin, end in pairwise(edges.tolist())]
 
 
 def states_json(states: PlaceStates, first: int, last: int) -> Json:
-    """States of legs and corners as rows of state and words, in order."""
+    """Return states of legs and corners as rows of state and words, in order."""
     return {
-        "legs": [_state(states.legs.get(k, _PLAIN)) for k in range(first, last)],
-        "corners": [_state(states.corners.get(k, _PLAIN)) for k in range(first, last + 1)],
+        "legs": [_state(states.legs.get(k, _OK_STATE)) for k in range(first, last)],
+        "corners": [_state(states.corners.get(k, _OK_STATE)) for k in range(first, last + 1)],
     }
 
 
@@ -198,7 +206,7 @@ def _state(state: State) -> list[str]:
 
 
 def verdict_json(verdict: Verdict) -> Json:
-    """The answer and its lines."""
+    """Return the answer and its lines."""
     shown = verdict.present()
     return {
         "state": shown.state,
@@ -212,7 +220,7 @@ def verdict_json(verdict: Verdict) -> Json:
 
 def findings_json(verdict: Verdict) -> list[Json]:
     """List the findings that failed or are left open, then the finding closest to its limit of each rule."""
-    return [_finding(number, item) for number, item in verdict.present().worth_listing(_LISTED)]
+    return [_finding(number, item) for number, item in verdict.present().worth_listing(_MAX_LISTED_FINDINGS)]
 
 
 def _finding(number: int, item: Finding) -> Json:
@@ -233,16 +241,16 @@ def _finding(number: int, item: Finding) -> Json:
 
 
 def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
-    """Ground under the route, its waypoints' distances, and what of threats and zones stands over it."""
+    """Return the ground under the route, distances of its waypoints, and threats and zones over it."""
     route = setup.route.waypoints
     at = route_distance(route)
-    distance, points = route_samples(route, max(float(at[-1]) / _SAMPLES, 1.0))
+    distance, points = route_samples(route, max(float(at[-1]) / _PROFILE_SAMPLES, 1.0))
     ground = ground_under(scenario, points)
     low = float(min(points[:, 2].min(), np.nanmin(ground) if ground is not None else np.inf)) - 50.0
     high = float(points[:, 2].max()) + 300.0
     plane = PathPlane(distance, points, ground, low, high)
     cuts: list[Json] = []
-    if len(scenario.threats) <= _MOST_CUTS:
+    if len(scenario.threats) <= _MAX_CUTS:
         cuts += [
             {
                 "role": layer.role,
@@ -253,7 +261,7 @@ def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
             }
             for layer in threat_cuts(scenario.threats, plane, frozenset())[0]
         ]
-    if len(scenario.zones) <= _MOST_CUTS:
+    if len(scenario.zones) <= _MAX_CUTS:
         cuts += [
             {
                 "role": "zone",

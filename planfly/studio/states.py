@@ -1,7 +1,7 @@
-"""What a verdict says of each leg and corner of a route, and of each threat and zone: its state and the closest limit.
+"""States of legs, corners, threats and zones according to a verdict, each with the closest limit.
 
-A state is "fail", "open" (not judged, so that it is not flyable), "near" a limit, or "ok".  Numbers and words are those
-of the finding that is closest to its limit.
+A state is "fail", "open" (not judged, therefore not flyable), "near" a limit, or "ok".  Numbers and words are taken
+from the finding that is closest to its limit.
 """
 
 import math
@@ -20,15 +20,15 @@ from world.threats import Threats
 
 Floats = NDArray[np.float64]
 
-# Of a rule whose margin has no scale, such as a turn's, the last tenth before the limit is near it.
-_NEAR_SHARE = 0.1
+# For a rule whose margin has no scale, such as turns, near is the last tenth before the limit.
+_NEAR_FRACTION = 0.1
 _ORDER = {"fail": 0, "open": 1, "near": 2, "ok": 3}
 
 
 class State(NamedTuple):
-    """The state of a place.
+    """State of a place.
 
-    closeness: what is left to the limit by what a person would call noticeable; below 1 is near, below 0 beyond.
+    closeness: margin as a multiple of a noticeable difference; below 1 is near the limit, below 0 beyond it.
     text: the finding in a few words, for the pointer.
     """
 
@@ -38,10 +38,10 @@ class State(NamedTuple):
 
 
 class PlaceStates(NamedTuple):
-    """States by the numbers of the route; places of which nothing was found have none.
+    """States by the numbers of the route; places without findings have none.
 
     legs, corners: by leg and by waypoint.
-    threats, zones: those that fail, by their numbers.
+    threats, zones: the failed ones, by their numbers.
     """
 
     legs: dict[int, State]
@@ -51,9 +51,9 @@ class PlaceStates(NamedTuple):
 
 
 def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *, shift: int = 0) -> PlaceStates:
-    """The states that findings come to; those of threats, zones and bounds colour the legs on which they are violated.
+    """Return the states of all places; failed threats, zones and bounds colour the legs that violate them.
 
-    shift: added to the numbers of legs and corners, of a part of a route.
+    shift: added to the numbers of legs and corners of a part of a route.
     """
     legs: dict[int, State] = {}
     corners: dict[int, State] = {}
@@ -66,17 +66,17 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
             continue
         place = item.place
         if place.kind == "leg" and place.index is not None:
-            _note(legs, (place.index + shift,), state)
+            _set_worse_state(legs, (place.index + shift,), state)
         elif place.kind == "waypoint" and place.index is not None:
-            _note(corners, (place.index + shift,), state)
+            _set_worse_state(corners, (place.index + shift,), state)
         elif state.state == "fail":
-            _note(legs, (leg + shift for leg in violated_legs(requirements, item)), state)
+            _set_worse_state(legs, (leg + shift for leg in violated_legs(requirements, item)), state)
             if place.index is not None:
                 (threats if place.kind in ("missile", "radar") else zones).add(place.index)
     return PlaceStates(legs, corners, frozenset(threats), frozenset(zones))
 
 
-def _note(states: dict[int, State], numbers: Iterable[int], state: State) -> None:
+def _set_worse_state(states: dict[int, State], numbers: Iterable[int], state: State) -> None:
     for number in numbers:
         old = states.get(number)
         if old is None or (_ORDER[state.state], state.closeness) < (_ORDER[old.state], old.closeness):
@@ -84,9 +84,9 @@ def _note(states: dict[int, State], numbers: Iterable[int], state: State) -> Non
 
 
 def state_of(item: Finding, *, unjudged: bool = False) -> State | None:
-    """The state that one finding gives its place; None for one that says nothing of it.
+    """Return the state that one finding gives its place, or None for a finding without influence.
 
-    unjudged: whether the verdict is not given for want of it.
+    unjudged: true if the verdict is withheld because of this finding.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import Place
@@ -103,7 +103,7 @@ def state_of(item: Finding, *, unjudged: bool = False) -> State | None:
     if item.margin is None or item.planned is None:
         return None
     closeness = _closeness(item)
-    return State("near" if closeness < 1.0 else "ok", closeness, _numbers(item))
+    return State("near" if closeness < 1.0 else "ok", closeness, _value_text(item))
 
 
 def _word(item: Finding) -> str:
@@ -115,22 +115,22 @@ def _closeness(item: Finding) -> float:
     if scale is None:
         if item.limit is None or not item.limit:
             return math.inf
-        scale = _NEAR_SHARE * abs(item.limit)
+        scale = _NEAR_FRACTION * abs(item.limit)
     return margin / scale
 
 
-def _numbers(item: Finding) -> str:
+def _value_text(item: Finding) -> str:
     unit = UNITS.get(item.unit, "")
     text = f"{_word(item)} {item.planned:.1f}{unit}"
     return text if item.limit is None else f"{text} of {item.limit:.1f}{unit}"
 
 
 # ----------------------------------------------------------------------
-# The legs on which a threat, a zone or the area is violated: their findings name what is violated.
+# Legs that violate a threat, a zone or the area: the findings themselves name only the violated object.
 
 
 def violated_legs(requirements: RouteRequirements, item: Finding) -> tuple[int, ...]:
-    """Legs of the planned path on which a failed finding of a threat, a zone or the area holds."""
+    """Return the legs of the planned path on which a failed finding of a threat, zone or area applies."""
     path, place = requirements.path, item.place
     scenario = requirements.setup.scenario
     if place.kind in ("missile", "radar") and place.index is not None:
@@ -148,7 +148,7 @@ def violated_legs(requirements: RouteRequirements, item: Finding) -> tuple[int, 
 
 
 def sphere_segments(points: Floats, threats: Threats, number: int, *, missile: bool) -> NDArray[np.bool_]:
-    """Whether each segment of a path comes into a threat's sphere, (n - 1,).  points: (n, 3) m."""
+    """Return whether each segment of a path enters the sphere of a threat, (n - 1,).  points: (n, 3) m."""
     radius = float((threats.kill_radius if missile else threats.detection_radius)[number])
     start, step = points[:-1] - threats.position[number], np.diff(points, axis=0)
     length2 = (step**2).sum(axis=1)

@@ -1,6 +1,6 @@
-"""What the studio's processes do: fly a mission, plan a path.  Each takes what can be pickled, and gives data.
+"""Tasks of the studio's processes: fly a mission, plan a path.
 
-Returns and campaigns, which take longer, are in `planfly.studio.long_works`.
+Arguments are pickled, results are data.  Returns and campaigns, which take longer, are in `planfly.studio.long_works`.
 """
 
 import math
@@ -29,14 +29,16 @@ from planner.search.plan_front import FrontPlan
 from world.scenario import Scenario, from_spec
 
 Floats = NDArray[np.float64]
-# A search for one path, and for several, at most, s: a hand waits for it.
-SECONDS, SECONDS_FOR_SEVERAL = 25.0, 60.0
-# Rows of a flown track that the page draws.
-_DRAWN = 1_500
+# Longest search for one path, s: a user waits for it.
+SECONDS = 25.0
+# Longest search for several paths, s.
+SECONDS_FOR_SEVERAL = 60.0
+# Greatest number of rows of a flown track that the page draws.
+_MAX_DRAWN_ROWS = 1_500
 
 
 def fly(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
-    """Fly a mission by the law of its autopilot, and judge the flight."""
+    """Fly a mission with the control law of its autopilot, and judge the flight."""
     desk, mission = payload
     setup = desk.setup(mission)
     flown = fly_and_judge(setup, desk.airframe, None, advance, reference="never")
@@ -51,34 +53,35 @@ def fly(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
         "autopilot": setup.autopilot.title,
         "seconds": seconds,
         "figures": flight_figures(mission, setup.route, flown.verdict.findings, seconds),
-        **_track(setup.route.waypoints, flown.track, flown.verdict.leg_ends),
+        **_track_json(setup.route.waypoints, flown.track, flown.verdict.leg_ends),
     }
 
 
-def _track(route: Floats, track: Track, leg_ends: Sequence[float]) -> dict[str, Any]:
-    """A flown track for the map, and for the profile by its progress along the route.
+def _track_json(route: Floats, track: Track, leg_ends: Sequence[float]) -> dict[str, Any]:
+    """Return a flown track for the map, and its progress along the route for the profile.
 
-    leg_ends: when each leg but the last had ended, as the verdict found; what guidance noted is not relied on.
+    leg_ends: when each leg but the last ended, according to the verdict; the record of the guidance is not relied on.
     """
     if not len(track):
         return {"track": [], "along": []}
     if len(leg_ends) == len(route) - 2:
         track = replace(track, leg=np.searchsorted(np.array(leg_ends), track.time).astype(track.leg.dtype))
-    rows = np.union1d(np.arange(0, len(track), max(1, len(track) // _DRAWN)), [len(track) - 1])
+    rows = np.union1d(np.arange(0, len(track), max(1, len(track) // _MAX_DRAWN_ROWS)), [len(track) - 1])
     along = np.asarray(track_distance(route, track))
     return {"track": rounded(track.position[rows]), "along": rounded(along[rows]), "time": rounded(track.time[rows])}
 
 
 # ----------------------------------------------------------------------
-# Planned.
+# Planning.
 
 
 @dataclass(frozen=True, slots=True)
 class PlanAsked:
-    """Between which places to plan, in the world of a scenario.
+    """Request to plan between two places in the world of a scenario.
 
-    ends: (2, 3) m; None for the scenario's own.  algorithm: None for the default.
-    ways: one; or so many at most, none better than another in length, exposure, clearance and energy at once.
+    ends: (2, 3) m; None for the ends of the scenario.  algorithm: None for the default.
+    ways: greatest number of paths; of several, none is better than another in length, exposure, clearance and energy at
+    once.
     """
 
     scenario: Scenario
@@ -90,29 +93,29 @@ class PlanAsked:
 
 
 def plan(asked: PlanAsked, advance: Advance) -> list[FrontPlan]:
-    """A path, or several to choose from, the shortest first; where none is safe the one that comes nearest to it."""
+    """Plan a path, or several, the shortest first; if none is safe, return the best one."""
     scenario = asked.scenario if asked.ends is None else between(asked.scenario, *asked.ends)
     seconds = SECONDS if asked.ways == 1 else SECONDS_FOR_SEVERAL
-    airframe, seed, stop = asked.airframe, asked.seed, partial(_ended, time.monotonic() + seconds)
-    # Between two items of a mission it goes on to what follows the second.
+    airframe, seed, stop = asked.airframe, asked.seed, partial(_stop_reason, time.monotonic() + seconds)
+    # Between two items of a mission, the path must join the leg after the second.
     onward = asked.ends is not None
     if asked.ways > 1:
         front = make_front(scenario, airframe, seed, asked.ways, advance, stop=stop, onward=onward)
         return list(front.plans) or [front.default]
     made = make_plan(scenario, airframe, seed, asked.algorithm, advance, stop=stop, onward=onward)
-    # Beside no other nothing is to compare: what takes longer to work out is not known.
+    # A single path needs no comparison: quantities that take longer to compute are left out.
     length = float(np.linalg.norm(np.diff(made.waypoints, axis=0), axis=1).sum())
     clearance = float(made.certificate.clearance) + scenario.limits.min_clearance_m
     return [FrontPlan(made, length, math.nan, clearance, math.nan, math.nan)]
 
 
-def _ended(deadline: float) -> str:
-    """Why a search is to end: "" to go on."""
+def _stop_reason(deadline: float) -> str:
+    """Return the reason to end a search, "" to go on."""
     return "budget" if time.monotonic() > deadline else ""
 
 
 def between(scenario: Scenario, start: tuple[float, ...], destination: tuple[float, ...]) -> Scenario:
-    """A scenario with other ends, (3,) m each, in the air and without courses."""
+    """Return a scenario with other ends, (3,) m each, in the air and without courses."""
     spec = scenario.to_json()
     for key, (east, north, up) in (("start", start), ("destination", destination)):
         spec[key] = {"east_m": east, "north_m": north, "amsl_m": up}
