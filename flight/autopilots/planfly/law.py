@@ -376,7 +376,7 @@ def _set_throttle(
     along: float,
     dt: float,
 ) -> None:  # pragma: no cover - compiled
-    """Set the throttle: for level flight, for the slope relative to the air ahead, and for the airspeed error."""
+    """Set throttle for level flight, for the slope relative to the air, and for the airspeed error."""
     slow = memory.speed_command - airspeed
     if memory.arc_speed > 0.0:
         # In an arc and before it the ground speed matters too, as far as the air allows.
