@@ -41,14 +41,14 @@ class CommandResult:
 
 @dataclass(slots=True)
 class ArmingState:
-    """The vehicle's state as its commands see it.
+    """The vehicle's state for its commands.
 
     mode: ArduPlane's number.
-    judging: a verdict on the mission is on its way.
+    judging: True while a verdict on the mission is awaited.
     judged: the last verdict; None without a mission.
     force: PFLY_FORCE.
-    end_requested: the flight is to be ended.
-    place: where the flight that goes on is to be diverted to by its new mode; None for no such wish.
+    end_requested: True if the flight is to be ended.
+    place: target of the current flight's diversion in its new mode; None for no diversion.
     mission_state: MISSION_STATE of MISSION_CURRENT.
     """
 

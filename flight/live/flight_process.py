@@ -1,4 +1,4 @@
-"""Flight process of the live vehicle, separate from the link since JSBSim holds the interpreter's lock.
+"""Flight process of the live vehicle, apart from the link since JSBSim holds the interpreter's lock.
 
 Requests arrive over a pipe and events go back: a state snapshot as packed bytes, everything else pickled.  Both ends
 belong to planfly; nothing from a station is ever unpickled.
@@ -328,7 +328,7 @@ def _run_flight(
         return True
     flown = _LoggedFlight(connection, requests, factory, flight, log)
     try:
-        ended, go_on = flown.in_step()
+        ended, go_on = flown.run_in_real_time()
         if go_on:
             send_event(connection, FlightEnded(ended))
         judged = flown.finish(ended, requests.ending if go_on else lambda: True)
@@ -362,7 +362,7 @@ class _LoggedFlight:
         self._loiter: DivertFlight | None = None
         self._loiter_logs = 0
 
-    def in_step(self) -> tuple[str, bool]:
+    def run_in_real_time(self) -> tuple[str, bool]:
         """Step the flight by the clock; return how it ended, and True if the process continues."""
         clock, speed = time.monotonic, self._factory.speed
         started = begun = clock()

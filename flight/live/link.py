@@ -29,7 +29,6 @@ from world.errors import FlightError
 from world.running_clock import RunningClock
 
 # ----------------------------------------------------------------------
-# ----------------------------------------------------------------------
 # MAVLink frames in datagrams: found, checked and decoded, for arbitrary bytes.
 
 # First byte of a MAVLink 1 frame.
@@ -273,10 +272,10 @@ _MAX_DATAGRAMS_PER_POLL = 200
 
 @dataclass(slots=True)
 class Peer:
-    """A station that has made itself known.
+    """A station that has identified itself.
 
-    periods: s between messages, None for none at all.  due: when each is to be sent next.  parameter: the next one to
-    send of all that it asked for.
+    periods: s between messages, None for a message that is off.  due: next time of each.
+    parameter: the next one to send, if it asked for all.
     """
 
     address: Address
@@ -296,13 +295,16 @@ class Peer:
 
 @dataclass(slots=True)
 class Dropped:
-    """Frames that were not taken, by the reason.
+    """Numbers of dropped frames, by reason.
 
-    address: from an address that is not allowed, datagrams.  unsigned, forged: without a signature, and with one that
-    the key did not make.  replayed: signed by the key, and no newer than one before it in its stream.  old: the first
-    of a stream, and from more than a minute ago.  future: signed by the key, and more than a day ahead of our clock.
-    streams: of more streams than are kept.  stranger: from another machine, and nobody that has sent a HEARTBEAT.
-    others: to another system, or from ours.
+    address: datagrams from an address that is not allowed.
+    unsigned, forged: without a signature, and with a signature that does not match the key.
+    replayed: signed by the key, and no newer than an earlier frame of its stream.
+    old: the first of a stream, and from more than a minute ago.
+    future: signed by the key, and more than a day ahead of this machine's clock.
+    streams: of more streams than are stored.
+    stranger: from another machine that has sent no HEARTBEAT.
+    others: to another system, or from the vehicle itself.
     """
 
     address: int = 0
@@ -318,7 +320,7 @@ class Dropped:
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """Who may talk to the vehicle: anyone on this machine; beyond it a key, or addresses, must be given."""
+    """Access to the vehicle: open on this machine; from other machines a key or addresses are required."""
 
     bind: Address
     to: tuple[Address, ...]

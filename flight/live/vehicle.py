@@ -1,4 +1,4 @@
-"""The live vehicle: stations on one side, the process that flies on the other, and the state between them."""
+"""The live vehicle: the stations' link, the flight process, and the state between them."""
 
 import contextlib
 import errno
@@ -48,21 +48,21 @@ from flight.live.telemetry import (
 from flight.mission.items import Home, Mission, MissionItem
 
 # ----------------------------------------------------------------------
-# What a live vehicle sends without being asked: heartbeats, telemetry, texts, parameters that stream.
+# Messages that a live vehicle sends unasked: heartbeats, telemetry, texts, parameter streams.
 
-# A message that is late by more than this (s) is not made up for.
-_LATE = 0.5
-# Between heartbeats, and between checks of a message that a station has switched off, s.
-_SECOND = 1.0
+# Beyond this delay a message is skipped instead of sent late, s.
+_MAX_DELAY_S = 0.5
+# Interval of heartbeats, and of checks of a message that a station has switched off, s.
+_HEARTBEAT_PERIOD_S = 1.0
 
-# Shows a text to a person at the terminal.
+# Function that shows a text at the terminal.
 ShowText = Callable[[str], None]
 
 
 class Downlink:
     """Sends to every station that has sent a heartbeat.
 
-    show: gets each text too.  pause: how long the caller sleeps at most, s.
+    show: also gets each text.  pause: longest sleep of the caller, s.
     """
 
     def __init__(self, link: Link, status: Status, parameters: Parameters, show: ShowText, pause: float) -> None:
@@ -101,7 +101,9 @@ class Downlink:
         """Send what is due."""
         if now >= self._next_heartbeat:
             self._next_heartbeat = (
-                now + _SECOND if now - self._next_heartbeat > _LATE else self._next_heartbeat + _SECOND
+                now + _HEARTBEAT_PERIOD_S
+                if now - self._next_heartbeat > _MAX_DELAY_S
+                else self._next_heartbeat + _HEARTBEAT_PERIOD_S
             )
             self._link.forget_silent()
             self._link.send_heartbeat(heartbeat(self._status))
@@ -115,10 +117,10 @@ class Downlink:
                 continue
             period = peer.periods[name]
             if period is None:
-                peer.due[name] = now + _SECOND
+                peer.due[name] = now + _HEARTBEAT_PERIOD_S
                 continue
             self._link.send(telemetry_message(name, self._status), peer)
-            peer.due[name] = due + period if now - due < _LATE else now + period
+            peer.due[name] = due + period if now - due < _MAX_DELAY_S else now + period
 
     def _stream_parameters(self, peer: Peer) -> None:
         if peer.parameter is None:
@@ -132,14 +134,14 @@ class Downlink:
 
 
 # ----------------------------------------------------------------------
-# How far a flight is along its mission, in the numbers that stations have for its items.
+# Progress of a flight along its mission, in the stations' numbers of its items.
 
 
 class MissionProgress:
-    """Tells stations which item is flown to and which were reached.
+    """Reports to stations the current item and the items that were reached.
 
-    shift: what to add to an item's seq for the station's number.
-    first: the station's number of the item that the next flight starts at; 0 for the whole mission.
+    shift: offset from an item's seq to the station's number.
+    first: the station's number of the item at which the next flight starts; 0 for the whole mission.
     """
 
     def __init__(self, server: MissionServer, arming: ArmingState, status: Status, down: Downlink) -> None:
@@ -149,25 +151,28 @@ class MissionProgress:
         self._status = status
         self._down = down
         self._leg = -1
-        # Of the way that is flown where it is not the judged mission's, seq of the item at each waypoint.
+        # Seq of the item at each waypoint of a diverted route, or None on the judged mission.
         self._way: tuple[int, ...] | None = None
         self.shift = 0
         self.first = 0
 
     def started(self) -> None:
-        """A flight begins."""
+        """Note that a flight begins."""
         self._leg, self._way = -1, None
 
     def diverted(self, items: tuple[int, ...]) -> None:
-        """Another way begins.  items: seq of the mission's item at each waypoint, none beside the mission."""
+        """Note that another route begins.
+
+        items: seq of the mission's item at each waypoint; empty for a route outside the mission.
+        """
         self._leg, self._way = -1, items
 
     def at_start(self) -> None:
-        """The item that a mission that is not being flown starts with."""
+        """Set the current item of a mission that is not being flown: its start."""
         self._status.current = self.first or (self._item(0) if self._arming.judged is not None else 0)
 
     def refresh(self) -> None:
-        """Bring what the status says of the mission up to date."""
+        """Update the mission fields of the status."""
         items = self._server.lists[MissionType.MISSION]
         self._status.total = max(0, len(items) - 1) if items else 0
         if self._arming.mission_state not in (ACTIVE, PAUSED, COMPLETE):
@@ -184,11 +189,11 @@ class MissionProgress:
         self.send_current()
 
     def completed(self) -> None:
-        """The last waypoint is reached."""
+        """Report the last waypoint as reached."""
         self._reached(len(self._items()) - 1)
 
     def send_current(self) -> None:
-        """Send the item that is flown to."""
+        """Send the current item."""
         message: Any = telemetry_message("MISSION_CURRENT", self._status)
         self._down.send_to_all(message)
 
@@ -198,25 +203,26 @@ class MissionProgress:
             self._down.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._item(waypoint)))
 
     def _items(self) -> tuple[int, ...]:
-        """Seq of the item at each waypoint of the mission as it is flown, -1 for none."""
+        """Return the seq of the item at each waypoint of the flown mission, -1 for no item."""
         if self._way is not None:
             return self._way
         return () if self._arming.judged is None else self._arming.judged.items
 
     def _item(self, waypoint: int) -> int:
-        """Station's number of the item at a waypoint, or of the next that is one."""
+        """Return the station's number of the item at a waypoint, or of the next waypoint with an item."""
         items = self._items()
         following = [item for item in items[waypoint:] if item >= 0] or [item for item in items if item >= 0][-1:]
         return following[0] + self.shift if following else 0
 
 
 # Longest wait for the network or the flight, s.
-_NAP = 0.02
-# Time that the process that flies has to close its log when the vehicle is shut down, s.
+_MAX_WAIT_S = 0.02
+# Time for the flight process to close its log when the vehicle is shut down, s.
 CLOSING = 0.8
+# Number of crashes in a row after which the vehicle gives up.
 _MAX_CRASHES = 3
-# Within this time (s) the same text is sent once.
-_SAME_TEXT = 3.0
+# Within this time the same text is sent once, s.
+_REPEATED_TEXT_TIME_S = 3.0
 
 
 class Standby(NamedTuple):
@@ -227,7 +233,7 @@ class Standby(NamedTuple):
 
 
 class Vehicle:
-    """A vehicle that stands ready, takes missions, and flies them on a station's command."""
+    """A vehicle that stands ready, accepts missions, and flies them on a station's command."""
 
     def __init__(
         self,
@@ -238,24 +244,24 @@ class Vehicle:
         battery: float,
         show: ShowText,
     ) -> None:
-        """Start the process that flies.
+        """Start the flight process.
 
         link: the stations.
-        spawn: starts a process that flies, and returns the link's end of its pipe.
-        parameters: what stations may read and set.
+        spawn: starts a flight process, and returns the link's end of its pipe.
+        parameters: parameters that stations may read, and partly set.
         standby: the aircraft before it has a mission.
         battery: Wh when full.
-        show: gets what a person at the terminal should read.
+        show: shows a text at the terminal.
         """
         self.link = link
         self.arming = ArmingState()
         self.server = MissionServer(go_to=self._go_to)
         self.status = Status(standby.snapshot, standby.home, battery=battery)
-        self.down = Downlink(link, self.status, parameters, show, _NAP)
+        self.down = Downlink(link, self.status, parameters, show, _MAX_WAIT_S)
         self.requests = Requests(self.arming, parameters, self.status, self._start_at)
         self._standby = standby
         self._spawn = spawn
-        # In a row, without being ready in between.
+        # Crashes in a row, without becoming ready in between.
         self._deaths = 0
         self._flight = spawn()
         self._ready = False
@@ -263,34 +269,34 @@ class Vehicle:
         self._show = show
         self._clock = link.clock
         self._born = self._clock()
-        # Which mission is judged or flown.
+        # Number of the mission that is judged or flown.
         self._number = 0
         self._outstanding = self._brief = False
-        # The upload in which the item that the next flight starts at was chosen.
+        # Upload in which the start item of the next flight was chosen.
         self._chosen_in: tuple[MissionItem, ...] = ()
-        # Parameters of the law that the mission is judged and flown with.
+        # Parameters of the law with which the mission is judged and flown.
         self._flown_with: tuple[tuple[str, float], ...] = ()
         self._last_text, self._last_text_at = "", 0.0
         self._progress = MissionProgress(self.server, self.arming, self.status, self.down)
 
     def load(self, mission: Mission) -> None:
-        """Take a mission from a file, as if a station had uploaded it."""
+        """Load a mission from a file, as if a station had uploaded it."""
         for kind, items in zip(MissionType, listed(mission), strict=True):
             self.server.lists[kind] = items
         self.server.changed.add(MissionType.MISSION)
 
     def load_fence(self, fences: Sequence[MissionItem]) -> None:
-        """Take a fence from a file, as if a station had uploaded it; missions that follow are judged by it."""
+        """Load a fence from a file, as if a station had uploaded it; later missions are judged with it."""
         self.server.lists[MissionType.FENCE] = tuple(fences)
         self.server.changed.add(MissionType.FENCE)
 
     def run(self, stop: Callable[[], bool]) -> None:
-        """Serve until ``stop`` says so, then end the flight and its process."""
+        """Serve until ``stop`` returns True, then end the flight and its process."""
         while not stop():
-            self.step(_NAP)
+            self.step(_MAX_WAIT_S)
 
     def close(self) -> None:
-        """Have the process that flies end its flight, if it has begun to serve; its last texts go to the terminal."""
+        """Make the flight process end its flight, if it is ready; its last texts go to the terminal."""
         until = self._clock() + CLOSING
         with contextlib.suppress(OSError, EOFError):
             if self._ready:
@@ -302,7 +308,7 @@ class Vehicle:
         self._flight.close()
 
     def step(self, patience: float) -> None:
-        """Wait for something to do, at most ``patience`` s, and do it."""
+        """Wait for an event, at most ``patience`` s, and handle it."""
         watched: list[Any] = [self.link, self._flight]
         readable: list[Any] = wait(watched, self.down.wait(self._clock(), patience))
         now = self._clock()
@@ -339,8 +345,8 @@ class Vehicle:
                 self.link.send(response.message, response.peer)
                 continue
             now = self._clock()
-            # A station that tries again soon gets the text once.
-            if self._last_text != response.text or now - self._last_text_at > _SAME_TEXT:
+            # A station that repeats a request soon gets the text once.
+            if self._last_text != response.text or now - self._last_text_at > _REPEATED_TEXT_TIME_S:
                 self.down.send_text(*response)
             self._last_text, self._last_text_at = response.text, now
 
@@ -370,7 +376,7 @@ class Vehicle:
         self._refresh()
 
     def _changes(self) -> None:
-        """Have a changed mission judged; a fence or rally points that change belong to it."""
+        """Request a verdict on a changed mission; a fence or rally points that change belong to it."""
         # One request at a time: stations that upload faster than missions are judged must not fill the pipe.
         if not self.server.changed or self.arming.flying or self._outstanding:
             return
@@ -390,7 +396,7 @@ class Vehicle:
             self._progress.first = 0
         mission, self._progress.shift = uploaded(self.server.lists, self._standby.home)
         mission = flown_from(mission, self._progress.first - self._progress.shift)
-        # A fence or rally points that are changed need not repeat the texts about the mission.
+        # A changed fence or changed rally points need not repeat the texts about the mission.
         self._brief = MissionType.MISSION not in changed and (self._brief or not self.arming.judging)
         self.arming.mission_uploaded()
         self._outstanding = True
@@ -399,7 +405,7 @@ class Vehicle:
         self._refresh()
 
     def _divert(self, place: Place) -> None:
-        """Send the aircraft another way: on with the mission at the present item, home, or to circle at a place."""
+        """Divert the aircraft: to the mission's current item, home, or to a loiter at a place."""
         mission, shift = uploaded(self.server.lists, self._standby.home)
         mission = replace(mission, home=self.status.home)
         if self.arming.mode == AUTO:
@@ -407,7 +413,7 @@ class Vehicle:
         self._ask(DivertFlight(self.arming.mode, mission, place))
 
     def _go_to(self, item: MissionItem) -> str:
-        """Fly to an item's place; why not, "" if it does."""
+        """Fly to an item's place; return why not, "" if it does."""
         return self.arming.go_to(Place(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
 
     def _diverted(self, event: FlightDiverted) -> None:
@@ -421,9 +427,11 @@ class Vehicle:
         self._refresh()
 
     def _start_at(self, seq: int) -> CommandResult:
-        """Have the next flight start at an item, by the station's number, or the present one go on there.
+        """Set the start item of the next flight, or continue the current flight at it.
 
-        What starts there is judged as what is flown.
+        seq: the station's number of the item.
+
+        A new start is judged as it will be flown.
         """
         mission, shift = uploaded(self.server.lists, self._standby.home)
         problem = start_problem(mission, seq - shift, in_flight=self.arming.flying)
@@ -455,7 +463,7 @@ class Vehicle:
             self._lost()
 
     def _lost(self) -> None:
-        """Start another process in place of one that has died: JSBSim can abort, and that must not end the vehicle."""
+        """Start another flight process after a crash: JSBSim can abort, and that must not end the vehicle."""
         self._flight.close()
         self._deaths += 1
         if self._deaths >= _MAX_CRASHES:
@@ -491,7 +499,7 @@ class Vehicle:
             return
         self._outstanding = False
         if self.server.changed:
-            # It is about a mission that is no longer here.
+            # The verdict is about a mission that was replaced.
             self._changes()
             return
         before = self.arming.judged
@@ -515,7 +523,7 @@ class Vehicle:
         self.down.send_text(f"flight {ended}; disarmed", INFO if completed else CRITICAL)
         self._progress.send_current()
         if self._progress.first:
-            # The next flight is of the whole mission again.
+            # The next flight is the whole mission again.
             self._progress.first = 0
             self.server.changed.add(MissionType.MISSION)
 
