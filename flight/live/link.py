@@ -434,39 +434,41 @@ class Link:
                 self.dropped.others += 1
                 continue
             if self._signing is not None and (reason := self._signing.refuses(frame, self._wall())):
-                self._count(reason)
+                self._count_dropped(reason)
                 if reason is Refused.FUTURE:
-                    self._name_ahead(source[0])
+                    self._notice_clock_ahead(source[0])
                 continue
             message = self._decoder.message(frame)
             if message is None:
                 continue
             peer = self.peers.get(source)
-            if frame.number == mavlink.MAVLINK_MSG_ID_HEARTBEAT or self._is_asked_here(message, source):
-                peer = self._heard(source, frame.system, frame.component)
+            if frame.number == mavlink.MAVLINK_MSG_ID_HEARTBEAT or self._is_local_request(message, source):
+                peer = self._register_peer(source, frame.system, frame.component)
             if peer is None:
                 self.dropped.stranger += 1
-                self._name_stranger(message, source[0])
-            elif not self._for_us(message):
+                self._notice_stranger(message, source[0])
+            elif not self._is_for_vehicle(message):
                 self.dropped.others += 1
             else:
                 peer.system, peer.component = frame.system, frame.component
                 found.append((message, peer))
         return found
 
-    def _is_asked_here(self, message: Any, source: Address) -> bool:
+    def _is_local_request(self, message: Any, source: Address) -> bool:
         """Return True if a message from this machine, where heartbeats are optional, addresses the vehicle."""
-        return is_loopback(source[0]) and getattr(message, "target_system", 0) == SYSTEM and self._for_us(message)
+        return (
+            is_loopback(source[0]) and getattr(message, "target_system", 0) == SYSTEM and self._is_for_vehicle(message)
+        )
 
-    def _name_stranger(self, message: Any, host: str) -> None:
+    def _notice_stranger(self, message: Any, host: str) -> None:
         """Add a notice, once for each address, that it gets no answer, and why."""
-        if host in self._strangers or len(self._strangers) >= _MAX_NAMED_STRANGERS or not self._for_us(message):
+        if host in self._strangers or len(self._strangers) >= _MAX_NAMED_STRANGERS or not self._is_for_vehicle(message):
             return
         self._strangers.add(host)
         full = "" if len(self.peers) < MAX_PEERS else f", and {MAX_PEERS} stations are served already"
         self._notices.append(f"{host} sends {message.get_type()} and no HEARTBEAT{full}: it is not answered")
 
-    def _name_ahead(self, host: str) -> None:
+    def _notice_clock_ahead(self, host: str) -> None:
         """Add a notice, once for each address with the key, that its clock or this machine's is wrong."""
         if host in self._ahead or len(self._ahead) >= _MAX_NAMED_STRANGERS:
             return
@@ -480,7 +482,7 @@ class Link:
         found, self._notices = self._notices, []
         return found
 
-    def _count(self, reason: Refused) -> None:
+    def _count_dropped(self, reason: Refused) -> None:
         dropped = self.dropped
         dropped.unsigned += reason is Refused.UNSIGNED
         dropped.forged += reason is Refused.FORGED
@@ -489,7 +491,7 @@ class Link:
         dropped.future += reason is Refused.FUTURE
         dropped.streams += reason is Refused.STREAMS
 
-    def _heard(self, source: Address, system: int, component: int) -> Peer | None:
+    def _register_peer(self, source: Address, system: int, component: int) -> Peer | None:
         now = self.clock()
         self.peers = {key: peer for key, peer in self.peers.items() if now - peer.heard < SILENCE}
         peer = self.peers.get(source)
@@ -497,18 +499,18 @@ class Link:
             if len(self.peers) >= MAX_PEERS:
                 return None
             # One sequence of frames per station: a station takes a second one for lost packets.
-            peer = Peer(source, system, component, now, self._counter(source))
+            peer = Peer(source, system, component, now, self._frame_sequence(source))
             # Spread over the first tenth of a second, so that not everything is sent at once.
             peer.due = {name: now + 0.1 * k / len(PERIODS) for k, name in enumerate(PERIODS)}
             self.peers[source] = peer
         peer.heard = now
         return peer
 
-    def _counter(self, address: Address) -> Any:
+    def _frame_sequence(self, address: Address) -> Any:
         return self._hello.get(address) or mavlink.MAVLink(None, SYSTEM, COMPONENT)
 
     @staticmethod
-    def _for_us(message: Any) -> bool:
+    def _is_for_vehicle(message: Any) -> bool:
         system = getattr(message, "target_system", 0)
         component = getattr(message, "target_component", 0)
         return system in (0, SYSTEM) and component in (0, COMPONENT)

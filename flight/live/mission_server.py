@@ -307,7 +307,7 @@ class _Finished:
     left: int
 
 
-def _refuse_go_to(_item: MissionItem) -> str:
+def _refuse_go_to(_receive_item: MissionItem) -> str:
     return "go-to denied: not in flight"
 
 
@@ -335,7 +335,7 @@ class MissionServer:
         ``now``: s, any clock that never goes back.
         """
         if message.get_type() in _HANDLERS and message.get_type() not in _ITEMS:
-            self._moved_on(station)
+            self._stop_confirmations(station)
         try:
             kind = MissionType(getattr(message, "mission_type", 0))
         except ValueError:
@@ -369,9 +369,9 @@ class MissionServer:
                 replies.append(_request(done.station, done.count - 1, kind))
         return replies
 
-    def _count(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+    def _begin_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         count = int(message.count)
-        refusal = self._refusal(station, kind, now)
+        refusal = self._upload_refusal(station, kind, now)
         if refusal:
             return [self._ack(station, mavlink.MAV_MISSION_DENIED, kind, refusal)]
         if count > MAX_UPLOADED:
@@ -385,7 +385,7 @@ class MissionServer:
         self._finished.pop(kind, None)
         return [self._request(upload, kind, now)]
 
-    def _guided(self, message: Any, station: Station, kind: MissionType) -> MissionReply:
+    def _handle_go_to(self, message: Any, station: Station, kind: MissionType) -> MissionReply:
         try:
             item = from_message(message, "go-to")
         except MissionError as error:
@@ -396,10 +396,10 @@ class MissionServer:
         result = mavlink.MAV_MISSION_DENIED if problem else mavlink.MAV_MISSION_ACCEPTED
         return self._ack(station, result, kind, problem)
 
-    def _item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+    def _receive_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         upload = self._uploads.get(kind)
         if message.current in _GUIDED and (upload is None or upload.station != station):
-            return [self._guided(message, station, kind)]
+            return [self._handle_go_to(message, station, kind)]
         if upload is None or upload.station != station:
             done = self._finished.get(kind)
             known = done is not None and (done.station, done.count) == (station, message.seq + 1)
@@ -415,10 +415,10 @@ class MissionServer:
         try:
             item = from_message(message, _NAMES[kind])
         except MissionError as error:
-            return [self._fail(upload, kind, _result_of(message), str(error))]
+            return [self._reject_upload(upload, kind, _refusal_result(message), str(error))]
         wrong = _placement_problem(item, kind)
         if wrong:
-            return [self._fail(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, wrong)]
+            return [self._reject_upload(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, wrong)]
         upload.items.append(item)
         upload.floats = message.get_type() == "MISSION_ITEM"
         upload.wait = min(max(RETRY, 1.5 * (now - upload.first_asked)), SLOWEST_RETRY)
@@ -432,7 +432,7 @@ class MissionServer:
         floats = message.get_type() == "MISSION_ITEM"
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind, _FLOAT_WARNING if floats else "")]
 
-    def _list(self, _message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
+    def _send_count(self, _message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
         count = len(self.lists[kind])
         return [
             MissionReply(
@@ -440,7 +440,7 @@ class MissionServer:
             )
         ]
 
-    def _wanted(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
+    def _send_item(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
         items = self.lists[kind]
         if not message.seq < len(items):
             return [self._ack(station, mavlink.MAV_MISSION_INVALID_SEQUENCE, kind)]
@@ -453,12 +453,12 @@ class MissionServer:
         )
         return [MissionReply(station, item)]
 
-    def _clear_one(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+    def _clear_list(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         return self._clear(station, (kind,), kind, now)
 
     def _clear(self, station: Station, kinds: tuple[MissionType, ...], named: int, now: float) -> list[MissionReply]:
         for kind in kinds:
-            refusal = self._refusal(station, kind, now)
+            refusal = self._upload_refusal(station, kind, now)
             if refusal:
                 return [self._ack(station, mavlink.MAV_MISSION_DENIED, named, refusal)]
         for kind in kinds:
@@ -469,7 +469,7 @@ class MissionServer:
                 self.changed.add(kind)
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, named)]
 
-    def _stopped(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+    def _cancel_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         """Free the lock of a station that gives up (MISSION_ACK with an error)."""
         upload = self._uploads.get(kind)
         if upload is None or upload.station != station or message.type == mavlink.MAV_MISSION_ACCEPTED:
@@ -481,13 +481,13 @@ class MissionServer:
         del self._uploads[kind]
         return []
 
-    def _moved_on(self, station: Station) -> None:
+    def _stop_confirmations(self, station: Station) -> None:
         """Stop requests to a station for its finished uploads: it sends other messages now."""
         for done in self._finished.values():
             if done.station == station:
                 done.left = 0
 
-    def _refusal(self, station: Station, kind: MissionType, now: float) -> str:
+    def _upload_refusal(self, station: Station, kind: MissionType, now: float) -> str:
         if self.locked and kind == MissionType.MISSION:
             return self.locked
         for upload in self._uploads.values():
@@ -505,7 +505,7 @@ class MissionServer:
             return _request(upload.station, len(upload.items), kind, mavlink.MAVLink_mission_request_message)
         return _request(upload.station, len(upload.items), kind)
 
-    def _fail(self, upload: _Upload, kind: MissionType, result: int, text: str) -> MissionReply:
+    def _reject_upload(self, upload: _Upload, kind: MissionType, result: int, text: str) -> MissionReply:
         del self._uploads[kind]
         return self._ack(upload.station, result, kind, f"{text}; nothing changed")
 
@@ -530,7 +530,7 @@ def _placement_problem(item: MissionItem, kind: MissionType) -> str:
     return "" if fits else f"{_NAMES[kind]}: item {item.seq}: command {item.command} does not belong there"
 
 
-def _result_of(message: Any) -> int:
+def _refusal_result(message: Any) -> int:
     """Return MAV_MISSION_RESULT for an item that `from_message` refused, by the invalid number."""
     degree = 1.0 if message.get_type() == "MISSION_ITEM" else 1e7
     if abs(message.x) > 90.0 * degree:
@@ -542,12 +542,12 @@ def _result_of(message: Any) -> int:
 
 _ITEMS = ("MISSION_ITEM_INT", "MISSION_ITEM")
 _HANDLERS = {
-    "MISSION_COUNT": MissionServer._count,
-    "MISSION_ITEM_INT": MissionServer._item,
-    "MISSION_ITEM": MissionServer._item,
-    "MISSION_REQUEST_LIST": MissionServer._list,
-    "MISSION_REQUEST_INT": MissionServer._wanted,
-    "MISSION_REQUEST": MissionServer._wanted,
-    "MISSION_CLEAR_ALL": MissionServer._clear_one,
-    "MISSION_ACK": MissionServer._stopped,
+    "MISSION_COUNT": MissionServer._begin_upload,
+    "MISSION_ITEM_INT": MissionServer._receive_item,
+    "MISSION_ITEM": MissionServer._receive_item,
+    "MISSION_REQUEST_LIST": MissionServer._send_count,
+    "MISSION_REQUEST_INT": MissionServer._send_item,
+    "MISSION_REQUEST": MissionServer._send_item,
+    "MISSION_CLEAR_ALL": MissionServer._clear_list,
+    "MISSION_ACK": MissionServer._cancel_upload,
 }

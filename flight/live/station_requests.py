@@ -117,7 +117,7 @@ class Parameters:
         if entry.flies:
             if in_flight:
                 return number, f"{entry.name} {value:g} refused in flight, which is logged with one set; {kept}"
-            return number, self._state(entry, value)
+            return number, self._set_law_parameter(entry, value)
         if entry.high is None:
             return number, f"{entry.name} {entry.fixed}: {kept}"
         if not (math.isfinite(value) and entry.low <= value <= entry.high):
@@ -125,7 +125,7 @@ class Parameters:
         self.put(entry.name, value)
         return number, ""
 
-    def _state(self, entry: Parameter, value: float) -> str:
+    def _set_law_parameter(self, entry: Parameter, value: float) -> str:
         """Change a parameter of the law; return why it was refused, "" if it was changed."""
         if not math.isfinite(value):
             return f"{entry.name} {value:g}: a finite number is expected; {entry.value:g} kept"
@@ -258,7 +258,7 @@ class Requests:
         replies: list[Response] = []
         for item in waiting:
             reply = self.arming.arm(item.param1 == 1.0, item.param2)
-            replies += self._answered(item.peer, item.system, item.component, _ARM_COMMAND, reply)
+            replies += self._acknowledge(item.peer, item.system, item.component, _ARM_COMMAND, reply)
         return replies
 
     def _command(self, message: Any, peer: Peer, now: float) -> list[Response]:
@@ -271,12 +271,15 @@ class Requests:
                     self._waiting.append(_WaitingArmCommand(peer, system, component, message.param1, message.param2))
                 else:
                     reply = CommandResult(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
-            return self._answered(peer, system, component, number, reply)
+            return self._acknowledge(peer, system, component, number, reply)
         if number in _MESSAGE_COMMANDS:
             reply, extra = self._message_command(number, message, peer, now)
         else:
             reply, extra = self._flight_command(number, message), []
-        return [*self._answered(peer, system, component, number, reply), *(PeerMessage(peer, item) for item in extra)]
+        return [
+            *self._acknowledge(peer, system, component, number, reply),
+            *(PeerMessage(peer, item) for item in extra),
+        ]
 
     def _flight_command(self, number: int, message: Any) -> CommandResult:
         if number == mavlink.MAV_CMD_DO_SET_MODE:
@@ -323,7 +326,7 @@ class Requests:
             peer.due[name] = now
         return CommandResult(ACCEPTED)
 
-    def _streams(self, message: Any, peer: Peer, now: float) -> list[Response]:
+    def _set_streams(self, message: Any, peer: Peer, now: float) -> list[Response]:
         for name in STREAMS.get(int(message.req_stream_id), ()):
             rate = int(message.req_message_rate)
             period = min(_MAX_PERIOD_S, max(_MIN_PERIOD_S, 1.0 / rate)) if message.start_stop and rate else None
@@ -335,7 +338,7 @@ class Requests:
         reply = self.arming.set_mode(int(message.custom_mode))
         # SET_MODE is a message; ArduPilot acknowledges it as the command of its number.
         number = mavlink.MAVLINK_MSG_ID_SET_MODE
-        return self._answered(peer, message.get_srcSystem(), message.get_srcComponent(), number, reply)
+        return self._acknowledge(peer, message.get_srcSystem(), message.get_srcComponent(), number, reply)
 
     def _mission_set_current(self, message: Any, peer: Peer, now: float) -> list[Response]:
         reply = self.start_at(int(message.seq))
@@ -381,7 +384,7 @@ class Requests:
         return [PeerMessage(peer, mavlink.MAVLink_timesync_message(int(self.status.wall * 1e9), message.ts1))]
 
     @staticmethod
-    def _answered(peer: Peer, system: int, component: int, number: int, reply: CommandResult) -> list[Response]:
+    def _acknowledge(peer: Peer, system: int, component: int, number: int, reply: CommandResult) -> list[Response]:
         ack = mavlink.MAVLink_command_ack_message(number, reply.result, 0, 0, system, component)
         replies: list[Response] = [PeerMessage(peer, ack)]
         if reply.text:
@@ -444,7 +447,7 @@ _HANDLERS: dict[str, Callable[[Requests, Any, Peer, float], list[Response]]] = {
     "MISSION_SET_CURRENT": Requests._mission_set_current,
     "SET_POSITION_TARGET_GLOBAL_INT": Requests._go_to,
     "SET_POSITION_TARGET_LOCAL_NED": Requests._go_to,
-    "REQUEST_DATA_STREAM": Requests._streams,
+    "REQUEST_DATA_STREAM": Requests._set_streams,
     "PARAM_REQUEST_LIST": Requests._list_parameters,
     "PARAM_REQUEST_READ": Requests._read_parameter,
     "PARAM_SET": Requests._write_parameter,

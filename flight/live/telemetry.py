@@ -354,9 +354,9 @@ def _position(status: Status) -> Any:
         round(now.lon_deg * 1e7),
         round(now.amsl * 1e3),
         round((now.amsl - status.home.alt) * 1e3),
-        _short(now.v_north * 100),
-        _short(now.v_east * 100),
-        _short(now.v_down * 100),
+        _to_int16(now.v_north * 100),
+        _to_int16(now.v_east * 100),
+        _to_int16(now.v_down * 100),
         round(_degrees(now.yaw) * 100) % 36000,
     )
 
@@ -383,7 +383,7 @@ def _sys_status(status: Status) -> Any:
     present = _SENSORS | _PREARM
     return mavlink.MAVLink_sys_status_message(
         present, present, health, min(1000, round(status.load * 1000)), 44_400,
-        _short(status.snapshot.current * 100), round(share * 100), 0, 0, 0, 0, 0, 0,
+        _to_int16(status.snapshot.current * 100), round(share * 100), 0, 0, 0, 0, 0, 0,
     )  # fmt: skip
 
 
@@ -412,7 +412,7 @@ def _wind_cov(status: Status) -> Any:
     )
 
 
-def _extended(status: Status) -> Any:
+def _extended_state(status: Status) -> Any:
     landed = mavlink.MAV_LANDED_STATE_IN_AIR if status.flying else mavlink.MAV_LANDED_STATE_ON_GROUND
     return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, landed)
 
@@ -435,7 +435,7 @@ def _system_time(status: Status) -> Any:
     return mavlink.MAVLink_system_time_message(int(status.wall * 1e6), _ms(status))
 
 
-def _short(value: float) -> int:
+def _to_int16(value: float) -> int:
     return max(-32767, min(32767, round(value)))
 
 
@@ -453,7 +453,7 @@ _MAKERS = {
     "GPS_RAW_INT": _gps,
     "WIND": _wind,
     "WIND_COV": _wind_cov,
-    "EXTENDED_SYS_STATE": _extended,
+    "EXTENDED_SYS_STATE": _extended_state,
     "HOME_POSITION": _home,
     "AUTOPILOT_VERSION": _autopilot_version,
     "SYSTEM_TIME": _system_time,

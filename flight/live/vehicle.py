@@ -169,7 +169,7 @@ class MissionProgress:
 
     def at_start(self) -> None:
         """Set the current item of a mission that is not being flown: its start."""
-        self._status.current = self.first or (self._item(0) if self._arming.judged is not None else 0)
+        self._status.current = self.first or (self._station_number(0) if self._arming.judged is not None else 0)
 
     def refresh(self) -> None:
         """Update the mission fields of the status."""
@@ -180,37 +180,37 @@ class MissionProgress:
 
     def on_leg(self, leg: int) -> None:
         """Send the waypoints that were reached since the last snapshot."""
-        if leg == self._leg or leg < 0 or not self._items():
+        if leg == self._leg or leg < 0 or not self._waypoint_items():
             return
         for waypoint in range(max(0, self._leg + 1), leg + 1):
-            self._reached(waypoint)
+            self._report_reached(waypoint)
         self._leg = leg
-        self._status.current = self._item(leg + 1)
+        self._status.current = self._station_number(leg + 1)
         self.send_current()
 
     def completed(self) -> None:
         """Report the last waypoint as reached."""
-        self._reached(len(self._items()) - 1)
+        self._report_reached(len(self._waypoint_items()) - 1)
 
     def send_current(self) -> None:
         """Send the current item."""
         message: Any = telemetry_message("MISSION_CURRENT", self._status)
         self._down.send_to_all(message)
 
-    def _reached(self, waypoint: int) -> None:
-        items = self._items()
+    def _report_reached(self, waypoint: int) -> None:
+        items = self._waypoint_items()
         if 0 <= waypoint < len(items) and items[waypoint] >= 0:
-            self._down.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._item(waypoint)))
+            self._down.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._station_number(waypoint)))
 
-    def _items(self) -> tuple[int, ...]:
+    def _waypoint_items(self) -> tuple[int, ...]:
         """Return the seq of the item at each waypoint of the flown mission, -1 for no item."""
         if self._way is not None:
             return self._way
         return () if self._arming.judged is None else self._arming.judged.items
 
-    def _item(self, waypoint: int) -> int:
+    def _station_number(self, waypoint: int) -> int:
         """Return the station's number of the item at a waypoint, or of the next waypoint with an item."""
-        items = self._items()
+        items = self._waypoint_items()
         following = [item for item in items[waypoint:] if item >= 0] or [item for item in items if item >= 0][-1:]
         return following[0] + self.shift if following else 0
 
@@ -258,7 +258,7 @@ class Vehicle:
         self.server = MissionServer(go_to=self._go_to)
         self.status = Status(standby.snapshot, standby.home, battery=battery)
         self.down = Downlink(link, self.status, parameters, show, _MAX_WAIT_S)
-        self.requests = Requests(self.arming, parameters, self.status, self._start_at)
+        self.requests = Requests(self.arming, parameters, self.status, self._set_start_item)
         self._standby = standby
         self._spawn = spawn
         # Crashes in a row, without becoming ready in between.
@@ -314,32 +314,32 @@ class Vehicle:
         now = self._clock()
         self.status.boot, self.status.wall = now - self._born, time.time()
         if self._flight in readable:
-            self._from_flight()
+            self._receive_events()
         if self.link in readable:
             for message, peer in self.link.receive():
-                self._from_station(message, peer, now)
+                self._handle_message(message, peer, now)
             for notice in self.link.notices():
                 self._show(notice)
         for reply in self.server.tick(now):
             self._send_reply(reply.station, reply.message, reply.text)
-        self._changes()
+        self._judge_changes()
         self.down.tick(now)
         used = self._clock() - now
         self.status.load += 0.01 * (used / max(used, patience) - self.status.load)
 
-    def _from_station(self, message: Any, peer: Peer, now: float) -> None:
+    def _handle_message(self, message: Any, peer: Peer, now: float) -> None:
         self.server.locked = "in flight: the mission cannot change" if self.arming.flying else ""
         station = Station(peer.address, message.get_srcSystem(), message.get_srcComponent())
         for reply in self.server.handle(message, station, now):
             self._send_reply(reply.station, reply.message, reply.text)
-        self._changes()
-        self._pass_on(self.requests.handle(message, peer, now))
+        self._judge_changes()
+        self._send_responses(self.requests.handle(message, peer, now))
         if self._flown_with != tuple(self._parameters.stated.items()) and self.server.lists[MissionType.MISSION]:
             self.server.changed.add(MissionType.MISSION)
-            self._changes()
-        self._after_command()
+            self._judge_changes()
+        self._apply_state()
 
-    def _pass_on(self, responses: list[Response]) -> None:
+    def _send_responses(self, responses: list[Response]) -> None:
         for response in responses:
             if not isinstance(response, StatusText):
                 self.link.send(response.message, response.peer)
@@ -361,10 +361,10 @@ class Vehicle:
         if text:
             self.down.send_text(text, WARNING)
 
-    def _after_command(self) -> None:
+    def _apply_state(self) -> None:
         if self.arming.end_requested:
             self.arming.end_requested = False
-            self._ask(EndFlight())
+            self._send_request(EndFlight())
         if self.arming.place is not None:
             self._divert(self.arming.place)
             self.arming.place = None
@@ -372,10 +372,10 @@ class Vehicle:
             self.arming.flight_started()
             self._progress.started()
             self.down.send_text("mission started")
-            self._ask(StartFlight())
+            self._send_request(StartFlight())
         self._refresh()
 
-    def _changes(self) -> None:
+    def _judge_changes(self) -> None:
         """Request a verdict on a changed mission; a fence or rally points that change belong to it."""
         # One request at a time: stations that upload faster than missions are judged must not fill the pipe.
         if not self.server.changed or self.arming.flying or self._outstanding:
@@ -389,7 +389,7 @@ class Vehicle:
         if not self.server.lists[MissionType.MISSION]:
             self.arming.mission_cleared()
             self.status.snapshot, self.status.home = self._standby
-            self._pass_on(self.requests.verdict_came())
+            self._send_responses(self.requests.verdict_came())
             self._refresh()
             return
         if self.server.lists[MissionType.MISSION] is not self._chosen_in:
@@ -401,7 +401,7 @@ class Vehicle:
         self.arming.mission_uploaded()
         self._outstanding = True
         self._flown_with = tuple(self._parameters.stated.items())
-        self._ask(JudgeMission(mission, self._number, self._flown_with))
+        self._send_request(JudgeMission(mission, self._number, self._flown_with))
         self._refresh()
 
     def _divert(self, place: Place) -> None:
@@ -410,13 +410,13 @@ class Vehicle:
         mission = replace(mission, home=self.status.home)
         if self.arming.mode == AUTO:
             mission = flown_from(mission, self.status.current - shift)
-        self._ask(DivertFlight(self.arming.mode, mission, place))
+        self._send_request(DivertFlight(self.arming.mode, mission, place))
 
     def _go_to(self, item: MissionItem) -> str:
         """Fly to an item's place; return why not, "" if it does."""
         return self.arming.go_to(Place(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
 
-    def _diverted(self, event: FlightDiverted) -> None:
+    def _handle_diversion(self, event: FlightDiverted) -> None:
         if event.problem:
             wanted, self.arming.mode = self.arming.mode, event.mode
             self.arming.diverted(event.mode)
@@ -426,7 +426,7 @@ class Vehicle:
             self.down.send_text(f"flying in {MODE_NAMES[event.mode]}")
         self._refresh()
 
-    def _start_at(self, seq: int) -> CommandResult:
+    def _set_start_item(self, seq: int) -> CommandResult:
         """Set the start item of the next flight, or continue the current flight at it.
 
         seq: the station's number of the item.
@@ -446,23 +446,23 @@ class Vehicle:
         if first != self._progress.first:
             self._progress.first, self._chosen_in = first, self.server.lists[MissionType.MISSION]
             self.server.changed.add(MissionType.MISSION)
-            self._changes()
+            self._judge_changes()
         return CommandResult(ACCEPTED)
 
-    def _ask(self, request: FlightRequest) -> None:
+    def _send_request(self, request: FlightRequest) -> None:
         try:
             self._flight.send(request)
         except (BrokenPipeError, ConnectionResetError):
-            self._lost()
+            self._restart_process()
 
-    def _from_flight(self) -> None:
+    def _receive_events(self) -> None:
         try:
             while self._flight.poll():
-                self._take(read_event(self._flight.recv_bytes()))
+                self._handle_event(read_event(self._flight.recv_bytes()))
         except (EOFError, BrokenPipeError, ConnectionResetError):
-            self._lost()
+            self._restart_process()
 
-    def _lost(self) -> None:
+    def _restart_process(self) -> None:
         """Start another flight process after a crash: JSBSim can abort, and that must not end the vehicle."""
         self._flight.close()
         self._deaths += 1
@@ -471,22 +471,22 @@ class Vehicle:
         self._flight = self._spawn()
         self._ready = False
         if self.arming.flying:
-            self._ended("lost: the process that flew it has died")
+            self._handle_flight_end("lost: the process that flew it has died")
         if self.server.lists[MissionType.MISSION]:
             text = StatusText("the process that flies has died; upload the mission again", CRITICAL)
-            self._judged(MissionJudged(self._number, False, False, (text,)))
+            self._handle_verdict(MissionJudged(self._number, False, False, (text,)))
 
-    def _take(self, event: Snapshot | Event) -> None:
+    def _handle_event(self, event: Snapshot | Event) -> None:
         if isinstance(event, Snapshot):
             if event.finite:
                 self.status.snapshot = event
                 self._progress.on_leg(int(event.leg))
         elif isinstance(event, MissionJudged):
-            self._judged(event)
+            self._handle_verdict(event)
         elif isinstance(event, FlightDiverted):
-            self._diverted(event)
+            self._handle_diversion(event)
         elif isinstance(event, FlightEnded):
-            self._ended(event.ended)
+            self._handle_flight_end(event.ended)
         elif isinstance(event, ProcessReady):
             self._deaths = 0
             self._ready = True
@@ -494,13 +494,13 @@ class Vehicle:
         else:
             self._send_texts(event.texts)
 
-    def _judged(self, judged: MissionJudged) -> None:
+    def _handle_verdict(self, judged: MissionJudged) -> None:
         if judged.number != self._number:
             return
         self._outstanding = False
         if self.server.changed:
             # The verdict is about a mission that was replaced.
-            self._changes()
+            self._judge_changes()
             return
         before = self.arming.judged
         if not self._brief or before is None or before.texts != judged.texts:
@@ -511,10 +511,10 @@ class Vehicle:
         if judged.start is not None and judged.home is not None:
             self.status.snapshot, self.status.home = judged.start, judged.home
         self._progress.at_start()
-        self._pass_on(self.requests.verdict_came())
-        self._after_command()
+        self._send_responses(self.requests.verdict_came())
+        self._apply_state()
 
-    def _ended(self, ended: str) -> None:
+    def _handle_flight_end(self, ended: str) -> None:
         completed = ended == "completed"
         if completed and self.arming.mode == AUTO:
             self._progress.completed()

@@ -208,14 +208,15 @@ class ArduPilotParameters:
     takeoff_slew: of the throttle's range in a take-off, 1/s; 0 for throttle_slew, negative for no limit.
     takeoff_throttle: 0..1, 0 for throttle_max.
     landing_pitch: rad, minimum in the flare.  landing_pitch_max: rad, maximum; 0 for pitch_limit_max.
-    landing_speed_weight: of TECS in a landing, negative for a weight that falls to 0 on the leg.  landing_time: s, of
-    TECS.
+    landing_speed_weight: of TECS in a landing, negative for a weight that falls to 0 on the leg.
+    landing_time: s, of TECS.
     landing_sink_change: m/s of sink rate for each metre beyond the landing point.  flare_holdoff: m, height at which
         the final sink rate is reached.
     fence_type: bits of the limits that its fence has: 1 and 8 altitudes, 2 a circle about home, 4 the mission's fence.
     altitude_offset: m, added to the altitudes of mission items.  soaring, quadplane, rudder_only: 1 if it soars, has
-        lift motors, or steers by the rudder alone; none of these four is flown.  throttle_failsafe to
-        fence_auto_enable: causes to leave the mission, and the reactions; see `flight.autopilots.arduplane.failsafes`.
+        lift motors, or steers by the rudder alone; none of these four is flown.
+    throttle_failsafe to fence_auto_enable: causes to leave the mission, and the reactions; see
+        `flight.autopilots.arduplane.failsafes`.
     """
 
     not_flown: ClassVar[tuple[str, ...]] = NOT_FLOWN

@@ -33,8 +33,12 @@ from world.terrain import Heights
 
 Floats = NDArray[np.float64]
 
-# Lateral laws, as in `memory.law`.
-CROSS_TRACK, L1, VECTOR_FIELD = range(3)
+# Value of `memory.law` for planfly's own law.
+CROSS_TRACK = 0
+# Value of `memory.law` for L1.
+L1 = 1
+# Value of `memory.law` for the vector field.
+VECTOR_FIELD = 2
 # Lateral laws by their names in a scenario's `[flight] guidance`.
 LAWS: dict[Guidance, int] = {"path": CROSS_TRACK, "l1": L1, "vector-field": VECTOR_FIELD}
 # Time constant of the energy rate, s.
