@@ -70,7 +70,7 @@ def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wi
 
     airspeed: commanded, m/s, equivalent.  Beyond the grid of trims, the values at its edge apply.
     """
-    speeds, trims, alpha, lift = _load_trims(aircraft)
+    speeds, trims, alpha, lift = _trimmed(aircraft)
     excess = filled_excess(trims)
     has_power = bool(envelope.power_level.size)
     power = np.full((3, len(speeds), len(_ALTITUDES_M)), np.nan)
@@ -87,12 +87,12 @@ def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wi
     return PointMass(record, excess, power, bool(np.isfinite(trims[0]).any()))
 
 
-# Version of the cached tables: increase it with any change of what `_compute_trims` computes.
+# Version of the cached tables: increase it with any change of what `_trims` computes.
 _CACHE_VERSION = 2
 
 
 @functools.lru_cache(maxsize=8)
-def _load_trims(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
+def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
     """Return airspeeds (v,), specific excess power (t, v, h), and two terms of the angle of attack.
 
     The terms are the angle without lift, and the part from lift times the square of airspeed.  Excess power is NaN if
@@ -105,7 +105,7 @@ def _load_trims(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
     shapes = {"excess": (_THROTTLE_COUNT, _AIRSPEED_COUNT, len(_ALTITUDES_M)), "alpha": (_AIRSPEED_COUNT,)}
     tables = read_tables(file, key, shapes)
     if tables is None:
-        tables = _compute_trims(aircraft, speeds)
+        tables = _trims(aircraft, speeds)
         write_tables(file, key, tables)
     alphas = tables["alpha"]
     _fill(alphas)
@@ -114,7 +114,7 @@ def _load_trims(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
     return speeds, tables["excess"], float(alpha), float(lift)
 
 
-def _compute_trims(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats]:
+def _trims(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats]:
     """Return specific excess power (t, v, h) and angle of attack (v,) at the lowest altitude.
 
     Both are NaN if there is no trim.  speeds: (v,) m/s.

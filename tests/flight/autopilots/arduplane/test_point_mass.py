@@ -41,7 +41,7 @@ def made(monkeypatch: pytest.MonkeyPatch, slowest_glide: float) -> PointMass:
 
     monkeypatch.setattr(subject, "trim", trim)
     # Not the kept trims of that aircraft, nor these for anyone else.
-    monkeypatch.setattr(subject, "_load_trims", subject._load_trims.__wrapped__)
+    monkeypatch.setattr(subject, "_trimmed", subject._trimmed.__wrapped__)
     monkeypatch.setattr(subject, "read_tables", lambda *_: None)
     monkeypatch.setattr(subject, "write_tables", lambda *_: None)
     one = airframe()
@@ -66,7 +66,7 @@ def test_trims_are_kept_to_the_last_bit_for_the_model_that_they_are_of(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(subject, "user_cache_dir", lambda name: str(tmp_path / name))
-    keep = subject._load_trims.__wrapped__
+    keep = subject._trimmed.__wrapped__
     aircraft = airframe().aircraft
     made = keep(aircraft)
     (file,) = (tmp_path / "planfly").iterdir()
@@ -78,7 +78,7 @@ def test_trims_are_kept_to_the_last_bit_for_the_model_that_they_are_of(
             np.testing.assert_array_equal(one, again)
     # One of another model, or that is damaged, is made anew.
     trims = {"excess": made[1], "alpha": np.zeros(len(made[0]))}
-    monkeypatch.setattr(subject, "_compute_trims", lambda *_: trims)
+    monkeypatch.setattr(subject, "_trims", lambda *_: trims)
     for damaged in (sound.replace('"model_hash": "', '"model_hash": "0'), sound[:99], sound.replace("null", "[1]")):
         file.write_text(damaged, encoding="utf-8")
         assert keep(aircraft)[2:] == (0.0, 0.0)
