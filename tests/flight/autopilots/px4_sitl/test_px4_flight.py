@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4.parameters import Px4Parameters
+from flight.autopilots.px4.parameters import load_parameters
 from flight.autopilots.px4_sitl import flight as px4_flight
 from flight.autopilots.px4_sitl import physics
 from flight.autopilots.px4_sitl.autopilot import Px4Sitl
@@ -59,11 +59,11 @@ def left_behind() -> list[Path]:
 
 
 def make_setup(way: Floats = SHORT, **keywords: object) -> FlightSetup:
-    return replace(setup_maker(AEROSONDE)(way, **keywords), autopilot=Px4(Px4Parameters.load(AEROSONDE)))
+    return replace(setup_maker(AEROSONDE)(way, **keywords), autopilot=Px4(load_parameters(AEROSONDE)))
 
 
 def fly(setup: FlightSetup, program: Path, log: Path | None = None) -> tuple[SimulatedFlight, FlightSetup]:
-    with Px4Flight(setup, AEROSONDE, Px4Sitl(Px4Parameters.load(AEROSONDE), binary=program)) as flight:
+    with Px4Flight(setup, AEROSONDE, Px4Sitl(load_parameters(AEROSONDE), binary=program)) as flight:
         flight.prepare()
         flown = fly_to_end(flight, None, None)
         if log is not None:
@@ -157,7 +157,7 @@ def test_what_goes_wrong_with_px4_is_one_line_that_names_it(
 @pytest.mark.usefixtures("short_run_in")
 def test_a_dive_into_the_ground_is_a_flight_that_ended_so(fake_px4: MakeFake) -> None:
     setup = setup_maker(AEROSONDE)(WAY * [1.0, 3.0, 1.0] - [0.0, 0.0, 300.0])
-    flown, _ = fly(replace(setup, autopilot=Px4(Px4Parameters.load(AEROSONDE))), fake_px4("dive"))
+    flown, _ = fly(replace(setup, autopilot=Px4(load_parameters(AEROSONDE))), fake_px4("dive"))
     assert flown.ended == "ground contact" or flown.ended.startswith("loss of control")
     assert flown.track.clearance[-1] < 100.0
 
