@@ -1,8 +1,8 @@
-"""ArduPlane's parameters for a mission, in SI units and radians.
+"""ArduPlane's parameters that decide how it flies a mission, in SI units and radians.
 
-Names, units, ranges and defaults are from ArduPlane's complete parameter list (ardupilot.org, Plane, version 4.6); an
-older name stands next to the present name, with the factor to the present unit.  A parameter is taken from the first
-source that states it: the user's file, the file `ardupilot.parm` of the aircraft, ArduPlane's defaults.
+Names, units, ranges and defaults are those of ArduPlane's complete parameter list (ardupilot.org, Plane, version 4.6);
+an older name stands beside the present one with what takes its value to the present unit.  Of three sources the first
+that states a parameter counts: the file that a person gives, the file `ardupilot.parm` of the aircraft, ArduPlane.
 """
 
 import math
@@ -25,25 +25,25 @@ from world.kernels import Record, record_dtype
 Floats = NDArray[np.float64]
 
 
-# ArduPlane release of this law, its parameters and defaults.
+# Whose law, parameters and defaults these are.
 RELEASE = "4.6"
-# Parameter file in the aircraft's folder, next to its model.
+# Of an aircraft, beside its model: what ArduPlane has to be told of it.
 AIRCRAFT_FILE = "ardupilot.parm"
 
-_RAD_PER_DEG = math.pi / 180.0
-_PER_PERCENT = 0.01
-_PER_CENTI = 0.01
-_M_PER_KM = 1000.0
+_DEGREE = math.pi / 180.0
+_PERCENT = 0.01
+_CENTI = 0.01
+_KILOMETRE = 1000.0
 
 
 class Definition(NamedTuple):
     """One parameter.
 
-    name: in ArduPlane.
-    default: in ArduPlane, in its unit.
-    low, high: accepted range in that unit.
+    name: ArduPlane's.
+    default: ArduPlane's, in its unit.
+    low, high: what is taken, in that unit.
     to_si: factor to SI and radians.
-    old: an older name, and the factor from its unit to the unit of the present name.
+    old: an older name, and the factor from its unit to that of the present name.
     """
 
     name: str
@@ -63,21 +63,21 @@ DEFINITIONS = {
     "wp_radius": Definition("WP_RADIUS", 90.0, 0.0, 32767.0),
     "wp_max_radius": Definition("WP_MAX_RADIUS", 0.0, 0.0, 32767.0),
     "wp_loiter_rad": Definition("WP_LOITER_RAD", 60.0, -32767.0, 32767.0),
-    "roll_limit": Definition("ROLL_LIMIT_DEG", 45.0, 5.0, 90.0, _RAD_PER_DEG, ("LIM_ROLL_CD", _PER_CENTI)),
-    "pitch_limit_max": Definition("PTCH_LIM_MAX_DEG", 20.0, 0.0, 90.0, _RAD_PER_DEG, ("LIM_PITCH_MAX", _PER_CENTI)),
-    "pitch_limit_min": Definition("PTCH_LIM_MIN_DEG", -25.0, -90.0, 0.0, _RAD_PER_DEG, ("LIM_PITCH_MIN", _PER_CENTI)),
-    "pitch_trim": Definition("PTCH_TRIM_DEG", 0.0, -45.0, 45.0, _RAD_PER_DEG, ("TRIM_PITCH_CD", _PER_CENTI)),
+    "roll_limit": Definition("ROLL_LIMIT_DEG", 45.0, 5.0, 90.0, _DEGREE, ("LIM_ROLL_CD", _CENTI)),
+    "pitch_limit_max": Definition("PTCH_LIM_MAX_DEG", 20.0, 0.0, 90.0, _DEGREE, ("LIM_PITCH_MAX", _CENTI)),
+    "pitch_limit_min": Definition("PTCH_LIM_MIN_DEG", -25.0, -90.0, 0.0, _DEGREE, ("LIM_PITCH_MIN", _CENTI)),
+    "pitch_trim": Definition("PTCH_TRIM_DEG", 0.0, -45.0, 45.0, _DEGREE, ("TRIM_PITCH_CD", _CENTI)),
     "roll_time": Definition("RLL2SRV_TCONST", 0.5, 0.05, 10.0),
     "pitch_time": Definition("PTCH2SRV_TCONST", 0.5, 0.05, 10.0),
     "rudder_mix": Definition("KFF_RDDRMIX", 0.5, 0.0, 1.0),
-    "airspeed_cruise": Definition("AIRSPEED_CRUISE", 12.0, 1.0, 500.0, 1.0, ("TRIM_ARSPD_CM", _PER_CENTI)),
+    "airspeed_cruise": Definition("AIRSPEED_CRUISE", 12.0, 1.0, 500.0, 1.0, ("TRIM_ARSPD_CM", _CENTI)),
     "airspeed_min": Definition("AIRSPEED_MIN", 9.0, 1.0, 500.0, 1.0, ("ARSPD_FBW_MIN", 1.0)),
     "airspeed_max": Definition("AIRSPEED_MAX", 22.0, 1.0, 500.0, 1.0, ("ARSPD_FBW_MAX", 1.0)),
     "stall_prevention": Definition("STALL_PREVENTION", 1.0, 0.0, 1.0),
-    "throttle_min": Definition("THR_MIN", 0.0, -100.0, 100.0, _PER_PERCENT),
-    "throttle_max": Definition("THR_MAX", 100.0, 1.0, 100.0, _PER_PERCENT),
-    "throttle_cruise": Definition("TRIM_THROTTLE", 45.0, 0.0, 100.0, _PER_PERCENT),
-    "throttle_slew": Definition("THR_SLEWRATE", 100.0, 0.0, 500.0, _PER_PERCENT),
+    "throttle_min": Definition("THR_MIN", 0.0, -100.0, 100.0, _PERCENT),
+    "throttle_max": Definition("THR_MAX", 100.0, 1.0, 100.0, _PERCENT),
+    "throttle_cruise": Definition("TRIM_THROTTLE", 45.0, 0.0, 100.0, _PERCENT),
+    "throttle_slew": Definition("THR_SLEWRATE", 100.0, 0.0, 500.0, _PERCENT),
     "glide_slope_min": Definition("GLIDE_SLOPE_MIN", 15.0, 0.0, 1000.0),
     "glide_slope_threshold": Definition("GLIDE_SLOPE_THR", 5.0, 0.0, 100.0),
     "tecs_climb_max": Definition("TECS_CLMB_MAX", 5.0, 0.1, 100.0),
@@ -91,34 +91,34 @@ DEFINITIONS = {
     "tecs_roll_to_throttle": Definition("TECS_RLL2THR", 10.0, 0.0, 100.0),
     "tecs_speed_weight": Definition("TECS_SPDWEIGHT", 1.0, 0.0, 2.0),
     "tecs_pitch_damping": Definition("TECS_PTCH_DAMP", 0.3, 0.0, 5.0),
-    "tecs_pitch_max": Definition("TECS_PITCH_MAX", 15.0, 0.0, 90.0, _RAD_PER_DEG),
-    "tecs_pitch_min": Definition("TECS_PITCH_MIN", 0.0, -90.0, 0.0, _RAD_PER_DEG),
+    "tecs_pitch_max": Definition("TECS_PITCH_MAX", 15.0, 0.0, 90.0, _DEGREE),
+    "tecs_pitch_min": Definition("TECS_PITCH_MIN", 0.0, -90.0, 0.0, _DEGREE),
     "tecs_height_demand_time": Definition("TECS_HDEM_TCONST", 3.0, 0.0, 20.0),
-    "rtl_altitude": Definition("RTL_ALTITUDE", 100.0, -1.0, 9000.0, 1.0, ("ALT_HOLD_RTL", _PER_CENTI)),
+    "rtl_altitude": Definition("RTL_ALTITUDE", 100.0, -1.0, 9000.0, 1.0, ("ALT_HOLD_RTL", _CENTI)),
     "rtl_radius": Definition("RTL_RADIUS", 0.0, -32767.0, 32767.0),
     "rtl_climb_min": Definition("RTL_CLIMB_MIN", 0.0, 0.0, 9000.0),
     "flight_options": Definition("FLIGHT_OPTIONS", 0.0, 0.0, 2.0**31 - 1.0),
-    "level_roll_limit": Definition("LEVEL_ROLL_LIMIT", 5.0, 0.0, 45.0, _RAD_PER_DEG),
-    "rally_limit": Definition("RALLY_LIMIT_KM", 5.0, 0.0, 20_000.0, _M_PER_KM),
+    "level_roll_limit": Definition("LEVEL_ROLL_LIMIT", 5.0, 0.0, 45.0, _DEGREE),
+    "rally_limit": Definition("RALLY_LIMIT_KM", 5.0, 0.0, 20_000.0, _KILOMETRE),
     "rally_includes_home": Definition("RALLY_INCL_HOME", 0.0, 0.0, 1.0),
     "rtl_autoland": Definition("RTL_AUTOLAND", 0.0, 0.0, 4.0),
     "flare_time": Definition("LAND_FLARE_SEC", 2.0, 0.0, 60.0),
     "flare_height": Definition("LAND_FLARE_ALT", 3.0, 0.0, 1000.0),
-    "flare_weight": Definition("LAND_FLARE_AIM", 50.0, 0.0, 100.0, _PER_PERCENT),
+    "flare_weight": Definition("LAND_FLARE_AIM", 50.0, 0.0, 100.0, _PERCENT),
     "landing_sink": Definition("TECS_LAND_SINK", 0.25, 0.0, 100.0),
     "landing_airspeed": Definition("TECS_LAND_ARSPD", -1.0, -1.0, 500.0),
-    "landing_head_wind": Definition("LAND_WIND_COMP", 50.0, 0.0, 100.0, _PER_PERCENT),
+    "landing_head_wind": Definition("LAND_WIND_COMP", 50.0, 0.0, 100.0, _PERCENT),
     "takeoff_acceleration": Definition("TKOFF_THR_MINACC", 0.0, 0.0, 100.0),
     "takeoff_delay": Definition("TKOFF_THR_DELAY", 2.0, 0.0, 127.0, 0.1),
     "takeoff_ground_speed": Definition("TKOFF_THR_MINSPD", 0.0, 0.0, 100.0),
     "takeoff_rotation": Definition("TKOFF_ROTATE_SPD", 0.0, 0.0, 100.0),
-    "takeoff_ground_pitch": Definition("TKOFF_GND_PITCH", 5.0, -10.0, 20.0, _RAD_PER_DEG),
+    "takeoff_ground_pitch": Definition("TKOFF_GND_PITCH", 5.0, -10.0, 20.0, _DEGREE),
     "takeoff_level_height": Definition("TKOFF_LVL_ALT", 5.0, 0.0, 1000.0),
     "takeoff_leveling": Definition("TKOFF_PLIM_SEC", 2.0, 0.0, 100.0),
-    "takeoff_slew": Definition("TKOFF_THR_SLEW", 0.0, -1.0, 127.0, _PER_PERCENT),
-    "takeoff_throttle": Definition("TKOFF_THR_MAX", 0.0, 0.0, 100.0, _PER_PERCENT),
-    "landing_pitch": Definition("LAND_PITCH_DEG", 0.0, -20.0, 20.0, _RAD_PER_DEG, ("LAND_PITCH_CD", _PER_CENTI)),
-    "landing_pitch_max": Definition("TECS_LAND_PMAX", 10.0, -5.0, 45.0, _RAD_PER_DEG),
+    "takeoff_slew": Definition("TKOFF_THR_SLEW", 0.0, -1.0, 127.0, _PERCENT),
+    "takeoff_throttle": Definition("TKOFF_THR_MAX", 0.0, 0.0, 100.0, _PERCENT),
+    "landing_pitch": Definition("LAND_PITCH_DEG", 0.0, -20.0, 20.0, _DEGREE, ("LAND_PITCH_CD", _CENTI)),
+    "landing_pitch_max": Definition("TECS_LAND_PMAX", 10.0, -5.0, 45.0, _DEGREE),
     "landing_speed_weight": Definition("TECS_LAND_SPDWGT", -1.0, -1.0, 2.0),
     "landing_time": Definition("TECS_LAND_TCONST", 2.0, 0.1, 20.0),
     "landing_sink_change": Definition("TECS_LAND_SRC", 0.0, -2.0, 2.0),
@@ -147,75 +147,70 @@ DEFINITIONS = {
     "quadplane": Definition("Q_ENABLE", 0.0, 0.0, 2.0),
     "rudder_only": Definition("RUDDER_ONLY", 0.0, 0.0, 1.0),
 }
-# Bit of FLIGHT_OPTIONS: an RTL climbs to its altitude before it turns.
+# Bit of FLIGHT_OPTIONS that has a return climb to its height before it turns.
 CLIMB_BEFORE_TURN = 1 << 4
-# Bit of TERRAIN_FOLLOW: every mode.
-_FOLLOW_ALWAYS_BIT = 1 << 0
-# Bit of TERRAIN_FOLLOW: RTL.
-_FOLLOW_HOME_BIT = 1 << 4
-# Bits of FENCE_TYPE for ArduPlane's own limits, not the mission's fence: altitudes and a circle about home.
-_OWN_FENCE_BITS = 0b1011
-# Radius of a loiter whose radius is stated as 1 m or less, m (ArduPlane's `LOITER_RADIUS_DEFAULT`).
-_DEFAULT_LOITER_RADIUS_M = 60.0
-# Parameters that are read but not flown: an RTL is flown on a slope where this would make it follow the terrain.
+# Bits of TERRAIN_FOLLOW: every mode, and RTL.
+_FOLLOW_ALWAYS, _FOLLOW_HOME = 1 << 0, 1 << 4
+# Bits of FENCE_TYPE that are limits of its own, and not the mission's fence: altitudes and a circle about home.
+_OWN_FENCES = 0b1011
+# Of a loiter whose radius is stated as 1 m or less, m (ArduPlane's `LOITER_RADIUS_DEFAULT`).
+_USUAL_LOITER_RADIUS = 60.0
+# Read, and no flight of ours shows it: a return is on a slope where this would have it follow the terrain.
 NOT_FLOWN = ("TERRAIN_FOLLOW",)
 ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS)
 
 
 @dataclass(frozen=True, slots=True)
 class ArduPilotParameters:
-    """Parameters with which ArduPlane flies; all but the first three are computed from ``values``.
+    """What ArduPlane flies with; all but the first three are those of `DEFINITIONS`, made of ``values``.
 
-    values: every parameter that the law uses, in the order of `DEFINITIONS`.
-    unused: names in the file that the law does not use.
-    source: the user's file, "" if there is no file.
+    values: every parameter that the law knows, in the order of `DEFINITIONS`.
+    unused: names that the file states and the law has no use for.
+    source: the file that a person gave, "" for none.
     navl1_period: s.  navl1_xtrack_i: 1/s.
-    wp_radius: m, turns begin this far before a right angle.  wp_max_radius: m, 0 for no limit.
-    wp_loiter_rad: m, of a loiter that states no radius, negative to the left.
+    wp_radius: m, turns begin this far before a right angle.  wp_max_radius: m, 0 for none.
+    wp_loiter_rad: m, of a loiter that states none, negative to the left.
     roll_limit, pitch_limit_max, pitch_limit_min, pitch_trim: rad.
     roll_time, pitch_time: s, in which an attitude is to follow its demand.
     airspeed_cruise, airspeed_min, airspeed_max: m/s, equivalent airspeeds.
-    stall_prevention: 1 if bank is limited, and minimum airspeed raised, for the load factor; 0 if not.
+    stall_prevention: 1 where a bank is narrowed, and the minimum airspeed raised, for the load in it; 0 where not.
     throttle_min, throttle_max, throttle_cruise: 0..1.  throttle_slew: of the throttle's range, 1/s, 0 for no limit.
     glide_slope_min: m, a leg that climbs or sinks less is flown as a step.
-    glide_slope_threshold: m above a climbing slope at which the slope is redrawn, 0 for never.
+    glide_slope_threshold: m, so far above a climbing slope it is drawn anew, 0 for never.
     tecs_climb_max, tecs_sink_min, tecs_sink_max: m/s.
     tecs_time: s.  tecs_vertical_acceleration: m/s^2.  tecs_speed_frequency: rad/s.
-    tecs_roll_to_throttle: m/s of climb that a bank of 45 degrees costs.
+    tecs_roll_to_throttle: m/s climb that a bank of 45 degrees takes.
     tecs_pitch_max, tecs_pitch_min: rad, 0 for the pitch limits.
-    tecs_height_demand_time: s, lag of the altitude demand.
-    rtl_altitude: m over home, negative for the current altitude.  rtl_radius: m, 0 for wp_loiter_rad.
-    rtl_climb_min: m that an RTL climbs before it turns.  level_roll_limit: rad, its bank limit meanwhile.
-    flight_options: bits; with bit 4 an RTL climbs to its altitude before it turns.
-    rally_limit: m, the nearest rally point is not flown to if it is further away; 0 for no limit.
-    rally_includes_home: 1 if an RTL goes home when home is nearer than any rally point; 0 if not.
-    rtl_autoland: 0 if an RTL stays in its loiter; with 1 it continues to the mission's landing sequence, with 2 it goes
-        straight there; with 3 the sequence is for go-arounds only; with 4 it uses the mission's return path.
-    terrain_enable: 1 if it has terrain data.  terrain_lookahead: m, distance of the lookahead for rising ground on a
-        leg above terrain; terrain_spacing: m, between its samples.
+    tecs_height_demand_time: s, of the height demand's lag.
+    rtl_altitude: m over home, negative for the present height.  rtl_radius: m, 0 for that of a loiter.
+    rtl_climb_min: m that a return climbs before it turns.  level_roll_limit: rad, its bank meanwhile.
+    flight_options: bits; bit 4 has a return climb to its height before it turns.
+    rally_limit: m, a nearest rally point further away than this is not flown to; 0 for no limit.
+    rally_includes_home: 1 where a return goes home if that is nearer than any rally point; 0 where not.
+    rtl_autoland: 0 where a return stays in its circle; 1 has it go on from there to the mission's landing sequence, 2
+        straight to it, 3 says that sequence is for go-arounds only, 4 goes by the mission's return path.
+    terrain_enable: 1 if it has heights of the terrain.  terrain_lookahead: m, the farthest that it looks ahead for
+        rising ground on a leg above ground; terrain_spacing: m, between the places there.
     terrain_follow: bits of the modes that follow the terrain.
     low_voltage, critical_voltage: V.  low_charge, critical_charge: mAh; 0 or less triggers nothing.
-    flare_time: s before touchdown at which the glide aims to flare.  flare_height: m; half the maximum height of the
-        flare.  flare_weight: fraction of the flare that is flown with its final sink rate.
+    flare_time: s before the touch-down that the glide aims to flare at.  flare_height: m; half the most that the flare
+        begins at.  flare_weight: share of the flare that is flown with the sink of its end.
     landing_sink: m/s, at the flare's end.  landing_airspeed: m/s, negative for the mean of cruise and minimum.
-    landing_head_wind: fraction of the head wind that is added to that, up to the cruise airspeed.
-    takeoff_acceleration: m/s^2 along the nose that starts the motor; 0 if none is needed.
+    landing_head_wind: share of the head wind by which that is raised, up to the cruise airspeed.
+    takeoff_acceleration: m/s^2 along the nose that starts the motor; 0 where it needs none.
     takeoff_delay: s after that.
-    takeoff_ground_speed: m/s that is needed by then.  takeoff_rotation: m/s, up to which the nose is at
-        takeoff_ground_pitch (rad).  takeoff_level_height: m, up to which the bank of a take-off is level_roll_limit; it
-        is unrestricted at three times that.  takeoff_leveling: s before its end at which a take-off begins to level
-        off.
+    takeoff_ground_speed: m/s that it needs by then.  takeoff_rotation: m/s, until then the nose is at
+        takeoff_ground_pitch (rad).  takeoff_level_height: m, to which the bank of a take-off is level_roll_limit; it is
+        free at three times that.  takeoff_leveling: s before its end that a take-off begins to level off.
     takeoff_slew: of the throttle's range in a take-off, 1/s; 0 for throttle_slew, negative for no limit.
     takeoff_throttle: 0..1, 0 for throttle_max.
-    landing_pitch: rad, minimum in the flare.  landing_pitch_max: rad, maximum; 0 for pitch_limit_max.
-    landing_speed_weight: of TECS in a landing, negative for a weight that falls to 0 on the leg.
-    landing_time: s, of TECS.
-    landing_sink_change: m/s of sink rate for each metre beyond the landing point.  flare_holdoff: m, height at which
-        the final sink rate is reached.
+    landing_pitch: rad, least of the flare.  landing_pitch_max: rad, its largest; 0 for that of flight.
+    landing_speed_weight: of TECS in a landing, negative for one that falls to 0 on its way.  landing_time: s, of TECS.
+    landing_sink_change: m/s of sink a metre beyond the landing point.  flare_holdoff: m, at which the sink is the last.
     fence_type: bits of the limits that its fence has: 1 and 8 altitudes, 2 a circle about home, 4 the mission's fence.
-    altitude_offset: m, added to the altitudes of mission items.  soaring, quadplane, rudder_only: 1 if it soars, has
-        lift motors, or steers by the rudder alone; none of these four is flown.
-    throttle_failsafe to fence_auto_enable: causes to leave the mission, and the reactions; see
+    altitude_offset: m, added to the altitudes of mission items.  soaring, quadplane, rudder_only: 1 where it soars, has
+        lift motors, or steers by the rudder alone; no flight shows any of these four.
+    throttle_failsafe to fence_auto_enable: when it leaves its mission by itself, and what it does then; see
         `flight.autopilots.arduplane.failsafes`.
     """
 
@@ -315,26 +310,26 @@ class ArduPilotParameters:
     rudder_only: float = field(init=False)
 
     def __post_init__(self) -> None:
-        """Compute the fields in SI from the values."""
+        """Take the values to SI."""
         for (name, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=True):
             object.__setattr__(self, name, parameter.value * definition.to_si)
 
     @property
     def beyond(self) -> tuple[str, ...]:
-        """Empty: a value beyond its range is refused."""
+        """Nothing: a value beyond its range is refused."""
         return ()
 
     @property
     def misfits(self) -> tuple[str, ...]:
-        r"""Contradictory values of the file, in words; ArduPlane flies with them all the same.
+        r"""Values of the file that contradict another parameter, in words; ArduPlane flies with them all the same.
 
         >>> parameters_of("TRIM_THROTTLE 60\nTHR_MAX 50", "mine.param").misfits
         ('THR_MAX 50 of the file is below TRIM_THROTTLE 60 of the file',)
         """
-        return find_misfits(self.values, _EXPECTED_ORDERS)
+        return find_misfits(self.values, _ORDERS)
 
     def changed(self, **values: float) -> "ArduPilotParameters":
-        """Return a copy with other values for some parameters, by ArduPlane's names and in its units.
+        """The same parameters but for these, by ArduPlane's names and in its units.
 
         >>> default_parameters().changed(ROLL_LIMIT_DEG=30.0).roll_limit == math.radians(30.0)
         True
@@ -350,17 +345,17 @@ class ArduPilotParameters:
 
     @property
     def climbs_before_turn(self) -> bool:
-        """True if an RTL climbs to its altitude before it turns: bit 4 of FLIGHT_OPTIONS."""
+        """Whether a return climbs to its height before it turns: bit 4 of FLIGHT_OPTIONS."""
         return bool(int(self.flight_options) & CLIMB_BEFORE_TURN)
 
     @property
     def follows_terrain_home(self) -> bool:
-        """True if an RTL follows the terrain: bit 0 or 4 of TERRAIN_FOLLOW.
+        """Whether a return follows the terrain: bit 0 or 4 of TERRAIN_FOLLOW.
 
         >>> [default_parameters().changed(TERRAIN_FOLLOW=bits).follows_terrain_home for bits in (0, 1, 8, 16)]
         [False, True, False, True]
         """
-        return bool(int(self.terrain_follow) & (_FOLLOW_ALWAYS_BIT | _FOLLOW_HOME_BIT))
+        return bool(int(self.terrain_follow) & (_FOLLOW_ALWAYS | _FOLLOW_HOME))
 
     @property
     def has_fence_of_its_own(self) -> bool:
@@ -370,13 +365,13 @@ class ArduPilotParameters:
         [False, True]
         """
         enabled = self.fence_enable > 0.0 or self.fence_auto_enable > 0.0
-        return enabled and self.fence_action > 0.0 and bool(int(self.fence_type) & _OWN_FENCE_BITS)
+        return enabled and self.fence_action > 0.0 and bool(int(self.fence_type) & _OWN_FENCES)
 
     @property
     def return_radius(self) -> float:
-        """Radius of the RTL loiter, m at sea level, negative to the left.
+        """Radius of the circle that a return ends in, m at sea level, negative to the left.
 
-        RTL_RADIUS, or WP_LOITER_RAD if RTL_RADIUS is 1 m or less, or 60 m if both are; to the side of RTL_RADIUS if
+        RTL_RADIUS, or WP_LOITER_RAD where that is 1 m or less, or 60 m where both are; to the side of RTL_RADIUS if
         that is not 0 (`ModeRTL::navigate` in ArduPlane/mode_rtl.cpp, `Plane::update_loiter` in navigation.cpp).
 
         >>> made = default_parameters()
@@ -386,20 +381,20 @@ class ArduPilotParameters:
         (60.0, -60.0)
         """
         size = next((abs(radius) for radius in (self.rtl_radius, self.wp_loiter_rad) if abs(radius) > 1.0), None)
-        return math.copysign(size or _DEFAULT_LOITER_RADIUS_M, self.rtl_radius or self.wp_loiter_rad)
+        return math.copysign(size or _USUAL_LOITER_RADIUS, self.rtl_radius or self.wp_loiter_rad)
 
     @property
     def loiter_radius(self) -> float:
-        """Default loiter radius, m at sea level, negative to the left: WP_LOITER_RAD, or 60 m."""
+        """Radius of a loiter that states none, m at sea level, negative to the left: WP_LOITER_RAD, or 60 m."""
         size = abs(self.wp_loiter_rad)
-        return math.copysign(size if size > 1.0 else _DEFAULT_LOITER_RADIUS_M, self.wp_loiter_rad)
+        return math.copysign(size if size > 1.0 else _USUAL_LOITER_RADIUS, self.wp_loiter_rad)
 
     def by_origin(self, origin: Origin) -> dict[str, float]:
-        """Return the values (in ArduPlane's units) that one source states, by name."""
+        """The values (in ArduPlane's units) that one source states, by name."""
         return {name: value for name, value, stated in self.values if stated == origin}
 
     def record(self) -> Record:
-        """Return the parameters for compiled code, as a record of `ARDUPILOT_PARAMETERS`."""
+        """The parameters for compiled code, as a record of `ARDUPILOT_PARAMETERS`."""
         record: Record = np.zeros(1, ARDUPILOT_PARAMETERS)[0]
         for name in DEFINITIONS:
             setattr(record, name, getattr(self, name))
@@ -407,7 +402,7 @@ class ArduPilotParameters:
 
 
 def default_parameters() -> ArduPilotParameters:
-    """Return ArduPlane's default parameters, which do not depend on the aircraft.
+    """ArduPlane's own values, whatever it flies.
 
     >>> default_parameters().wp_radius, default_parameters().tecs_height_demand_time
     (90.0, 3.0)
@@ -416,9 +411,9 @@ def default_parameters() -> ArduPilotParameters:
 
 
 def load_parameters(aircraft: Aircraft, path: Path | str | None = None) -> ArduPilotParameters:
-    """Return the parameters for an aircraft: from a file, from the aircraft, and ArduPlane's defaults.
+    """The parameters that an aircraft is flown with: of a file, of the aircraft, and ArduPlane's defaults.
 
-    Raise ParameterError, in one line, for a file that cannot be read or states a value that is not allowed.
+    Raises ParameterError, in one line, for a file that cannot be read or states what is not allowed.
 
     >>> from aircraft.catalog import load_aircraft
     >>> load_parameters(load_aircraft("aerosonde")).wp_radius
@@ -428,31 +423,29 @@ def load_parameters(aircraft: Aircraft, path: Path | str | None = None) -> ArduP
     unused: tuple[str, ...] = ()
     if path is not None:
         entries = read_parameters_for(Path(path), ARDUPILOT)
-        values, unused = _split_known(entries)
+        values, unused = _known(entries)
         refuse_unknown(Path(path), ARDUPILOT, entries, values)
         stated.append(("file", values))
     own = aircraft.folder / AIRCRAFT_FILE
     if own.exists():
-        stated.append(("aircraft", _split_known(read_parameter_file(own))[0]))
+        stated.append(("aircraft", _known(read_parameter_file(own))[0]))
     return _parameters(stated, "" if path is None else str(path), unused)
 
 
 def parameters_of(text: str, source: str) -> ArduPilotParameters:
-    r"""Return the parameters of a file's text alone, with ArduPlane's defaults.
-
-    Raise ParameterError for a value that is not allowed.
+    r"""The parameters of a file's text alone, with ArduPlane's defaults.  Raises ParameterError.
 
     >>> parameters_of("LIM_ROLL_CD 3000\nFOO 1\n", "old.parm").unused
     ('FOO',)
     """
-    values, unused = _split_known(parse_parameters(text, source))
+    values, unused = _known(parse_parameters(text, source))
     return _parameters([("file", values)], source, unused)
 
 
 def stored_parameters(stored: StoredParameters) -> ArduPilotParameters:
-    """Return recorded parameters by their present names, with defaults for parameters unknown at the time.
+    """Parameters that were recorded, by their present names; those that were not yet known have their defaults.
 
-    Raise ParameterError for a value that is not allowed.
+    Raises ParameterError for a value that is not allowed.
 
     >>> stored_parameters(StoredParameters((ParameterValue("WP_RADIUS", 50.0, "file"),), (), "a.parm")).wp_radius
     50.0
@@ -462,27 +455,26 @@ def stored_parameters(stored: StoredParameters) -> ArduPilotParameters:
         if name in _BY_NAME:
             definition, _ = _BY_NAME[name]
             if not definition.low <= value <= definition.high:
-                raise _value_error(stored.source, name, value, f"allowed {definition.low:g}..{definition.high:g}")
+                raise _refused(stored.source, name, value, f"allowed {definition.low:g}..{definition.high:g}")
             origins[origin][name] = value
     return _parameters(list(origins.items()), stored.source, stored.unused)
 
 
-# Parameters that should be in ascending order, though ArduPlane does not compare them.
-_EXPECTED_ORDERS = (
+# What has to be in order, but that ArduPlane does not compare.
+_ORDERS = (
     ("THR_MIN", "TRIM_THROTTLE", "THR_MAX"),
     ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX"),
     ("PTCH_LIM_MIN_DEG", "PTCH_TRIM_DEG", "PTCH_LIM_MAX_DEG"),
     ("TECS_SINK_MIN", "TECS_SINK_MAX"),
 )
-# Parameters that must be in ascending order.
-_REQUIRED_ORDERS = (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX"))
+# What has to be in order.
+_PAIRS = (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX"))
 
 
 def logged_parameters(logged: Mapping[str, float], source: str) -> tuple[ArduPilotParameters, tuple[str, ...]]:
-    """Return the parameters of a flight log, and sentences about values that could not be used.
+    """The parameters of a flight log, by their names of any release, and what could not be used of them, in sentences.
 
-    Names of any release are read.  A log without parameters gets ArduPlane's defaults, with a sentence.
-    source: the log's file.
+    A log without parameters has ArduPlane's defaults, and says so.  source: the log's file.
 
     >>> made, notes = logged_parameters({"LIM_ROLL_CD": 4500.0, "WP_RADIUS": -5.0}, "a.BIN")
     >>> made.by_origin("file"), notes
@@ -502,7 +494,7 @@ def logged_parameters(logged: Mapping[str, float], source: str) -> tuple[ArduPil
             values[definition.name] = value
         else:
             notes.append(f"{definition.name} {value:g} of the log is not allowed: the default is taken")
-    for low, high in _REQUIRED_ORDERS:
+    for low, high in _PAIRS:
         if low in values and high in values and values[low] >= values[high]:
             notes.append(f"{low} {values[low]:g} and {high} {values[high]:g} of the log: the defaults are taken")
             del values[low], values[high]
@@ -518,7 +510,7 @@ def logged_parameters(logged: Mapping[str, float], source: str) -> tuple[ArduPil
 def _parameters(
     stated: list[tuple[Origin, dict[str, float]]], source: str, unused: tuple[str, ...]
 ) -> ArduPilotParameters:
-    """Return the parameters, each from the first source that states it, or ArduPlane's default."""
+    """Parameters of the first source that states each, and ArduPlane's default where none does."""
 
     def found(definition: Definition) -> ParameterValue:
         for origin, values in stated:
@@ -533,23 +525,23 @@ def _parameters(
 
 
 def _check_order(made: ArduPilotParameters, source: str) -> None:
-    """Raise ParameterError for a minimum that is not below its maximum."""
+    """Refuse a minimum that is not below its maximum."""
     values = {name: value for name, value, _ in made.values}
-    for low, high in _REQUIRED_ORDERS:
+    for low, high in _PAIRS:
         if values[low] >= values[high]:
             value, allowed = values[low], f"must be below {high} {values[high]:g}"
             message = f"{source}: {low} {value:g}: {allowed}"
             raise ParameterError(message, file=source, field=low, value=value, allowed=allowed)
 
 
-# Definition, and factor to its unit, by each name that a file may use.
+# Definition and factor to its unit, by each name that a file may have.
 _BY_NAME = {definition.name: (definition, 1.0) for definition in DEFINITIONS.values()} | {
     definition.old[0]: (definition, definition.old[1]) for definition in DEFINITIONS.values() if definition.old
 }
 
 
-def _split_known(entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return values by present name and in present units, and the names that the law does not use."""
+def _known(entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Values by their present names and in their present units, and the names that the law has no use for."""
     values: dict[str, float] = {}
     unused = []
     for name, entry in entries.items():
@@ -559,27 +551,22 @@ def _split_known(entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[
         definition, factor = _BY_NAME[name]
         value = entry.value * factor
         if not definition.low <= value <= definition.high:
-            raise _value_error(
+            raise _refused(
                 entry.where, name, entry.value, f"allowed {definition.low / factor:g}..{definition.high / factor:g}"
             )
         if values.setdefault(definition.name, value) != value:
-            raise _value_error(
-                entry.where, name, entry.value, "the same parameter has another value under its other name"
-            )
+            raise _refused(entry.where, name, entry.value, "the same parameter has another value under its other name")
     return values, tuple(unused)
 
 
-def _value_error(where: TextLine | str, name: str, value: float, allowed: str) -> ParameterError:
-    """Return the error for a value.
-
-    where: the line of the value; for a recorded value the source, which the message does not name.
-    """
+def _refused(where: TextLine | str, name: str, value: float, allowed: str) -> ParameterError:
+    """The error of a value.  where: its line; of one that was recorded, the source, which the message does not name."""
     at, file = (f"{where}: ", where.file) if isinstance(where, TextLine) else ("", where)
     return ParameterError(f"{at}{name}: {value:g}: {allowed}", file=file, field=name, value=value, allowed=allowed)
 
 
 # ----------------------------------------------------------------------
-# Parameters that may cause a flight to fail, with the steps and ranges of the parameter reference.
+# Parameters that may decide a flight that fails, with the steps and ranges of the parameter reference.
 
 HEIGHT_CANDIDATES = (
     Candidate("TECS_HDEM_TCONST", 0.2, 1.0, "s"),
@@ -596,14 +583,14 @@ SIDE_CANDIDATES = (
 
 
 # ----------------------------------------------------------------------
-# Airspeeds of a mission that ArduPlane accepts.
+# Which of a mission's airspeeds ArduPlane takes up.
 
 
 def takes_speed(airspeed: float, parameters: ArduPilotParameters) -> bool:
-    """Return True if ArduPlane accepts a commanded airspeed (m/s, equivalent).
+    """Whether ArduPlane takes a commanded airspeed (m/s, equivalent): from AIRSPEED_MIN to AIRSPEED_MAX.
 
-    It accepts AIRSPEED_MIN to AIRSPEED_MAX.  A command of another speed changes nothing: commanded to fly at 17 m/s
-    with AIRSPEED_MIN at 18, ArduPlane 4.6 flew on at its 25 m/s.
+    A command of another speed changes nothing: told to fly at 17 m/s with AIRSPEED_MIN at 18, ArduPlane 4.6 flew on at
+    its 25.
 
     >>> from flight.autopilots.arduplane.parameters import default_parameters
     >>> takes_speed(22.0, default_parameters()), takes_speed(22.1, default_parameters())
@@ -613,9 +600,9 @@ def takes_speed(airspeed: float, parameters: ArduPilotParameters) -> bool:
 
 
 def speeds_flown(commanded: Floats, cruise: float, parameters: ArduPilotParameters) -> Floats:
-    """Return the airspeeds (l,) that ArduPlane flies on each leg for commanded ones (l,); m/s, equivalent.
+    """Airspeeds (l,) that ArduPlane flies on each leg, of those commanded (l,); m/s, equivalent.
 
-    cruise: its airspeed until it accepts the first command.
+    cruise: its airspeed until it takes up the first.
 
     >>> from flight.autopilots.arduplane.parameters import default_parameters
     >>> speeds_flown(np.array([8.0, 15.0, 30.0, 10.0]), 12.0, default_parameters()).tolist()

@@ -1,11 +1,10 @@
-"""PX4's parameters for fixed-wing missions, in SI units and radians.
+"""PX4's parameters that decide how a fixed wing flies a mission, in SI units and radians.
 
-Names, units, ranges and defaults are from PX4's parameter reference (docs.px4.io, v1.16 and v1.17) and the `*_params.c`
-files next to the modules that read them.  PX4 itself enforces no range: a value outside the documented range is
-accepted and reported if it can be flown (FW_R_LIM is documented from 35 degrees, and 30 is flown).  A parameter is
-taken from the first source that states it: the user's file, the aircraft, PX4's defaults.  An aircraft's folder
-describes the aircraft once, in `ardupilot.parm`: `FROM_ARDUPILOT` lists which of those values are the same quantity in
-PX4.
+Names, units, ranges and defaults are those of PX4's parameter reference (docs.px4.io, v1.16 and v1.17), and of the
+`*_params.c` files beside the modules that read them.  PX4 itself enforces no range: what can be flown is taken, and
+said where it lies beyond the documented one (FW_R_LIM is documented from 35 degrees, and 30 is flown).  Of three
+sources the first that states a parameter counts: the file that a person gives, the aircraft, PX4.  What an aircraft is,
+its folder says once, in `ardupilot.parm`: `FROM_ARDUPILOT` lists which of those values are the same quantity in PX4.
 """
 
 import math
@@ -27,17 +26,17 @@ from world.scenario_tables import NEWEST_PX4, Px4Version
 
 _VERSIONS: tuple[Px4Version, ...] = get_args(Px4Version)
 
-_RAD_PER_DEG = math.pi / 180.0
+_DEGREE = math.pi / 180.0
 
 
 class Definition(NamedTuple):
     """One parameter.
 
-    name: in PX4.
-    default: in PX4, in its unit.
-    low, high: accepted range in that unit, which is what can be flown.
+    name: PX4's.
+    default: PX4's, in its unit.
+    low, high: what is taken, in that unit: what can be flown.
     to_si: factor to SI and radians.
-    documented: the range of PX4's reference, if that is narrower.
+    documented: the range of PX4's reference, where that is narrower.
     """
 
     name: str
@@ -48,7 +47,7 @@ class Definition(NamedTuple):
     documented: tuple[float, float] | None = None
 
 
-# By the field of `PX4_PARAMETERS`; parameters that are not flown stand at the end.
+# By the field of `PX4_PARAMETERS`; those that are not flown at the end.
 DEFINITIONS = {
     # Lateral guidance.
     "npfg_period": Definition("NPFG_PERIOD", 10.0, 0.5, 1000.0, documented=(1.0, 100.0)),
@@ -59,15 +58,15 @@ DEFINITIONS = {
     "npfg_switch_share": Definition("NPFG_SW_DST_MLT", 0.32, 0.0, 10.0, documented=(0.1, 1.0)),
     "npfg_period_safety": Definition("NPFG_PERIOD_SF", 1.5, 1.0, 10.0),
     "ground_speed_min": Definition("FW_GND_SPD_MIN", 5.0, 0.0, 40.0),
-    "roll_limit": Definition("FW_R_LIM", 50.0, 5.0, 85.0, _RAD_PER_DEG, (35.0, 75.0)),
-    "roll_slew": Definition("FW_PN_R_SLEW_MAX", 90.0, 0.0, 1000.0, _RAD_PER_DEG),
+    "roll_limit": Definition("FW_R_LIM", 50.0, 5.0, 85.0, _DEGREE, (35.0, 75.0)),
+    "roll_slew": Definition("FW_PN_R_SLEW_MAX", 90.0, 0.0, 1000.0, _DEGREE),
     "roll_time": Definition("FW_R_TC", 0.4, 0.02, 10.0, documented=(0.2, 1.0)),
-    "roll_rate_max": Definition("FW_R_RMAX", 70.0, 0.0, 720.0, _RAD_PER_DEG, (0.0, 180.0)),
-    # Changes of waypoint.
+    "roll_rate_max": Definition("FW_R_RMAX", 70.0, 0.0, 720.0, _DEGREE, (0.0, 180.0)),
+    # When it turns to the next waypoint.
     "acceptance": Definition("NAV_ACC_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
     "height_acceptance": Definition("NAV_FW_ALT_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
     "loiter_radius": Definition("NAV_LOITER_RAD", 80.0, -10_000.0, 10_000.0),
-    # Altitude and speed.
+    # Height and speed.
     "climb_reference": Definition("FW_T_CLMB_R_SP", 3.0, 0.1, 1000.0, documented=(0.5, 15.0)),
     "sink_reference": Definition("FW_T_SINK_R_SP", 2.0, 0.1, 1000.0, documented=(0.5, 15.0)),
     "climb_max": Definition("FW_T_CLMB_MAX", 5.0, 0.1, 100.0, documented=(1.0, 15.0)),
@@ -91,9 +90,9 @@ DEFINITIONS = {
     "airspeed_min": Definition("FW_AIRSPD_MIN", 10.0, 0.5, 500.0),
     "airspeed_trim": Definition("FW_AIRSPD_TRIM", 15.0, 0.5, 500.0),
     "airspeed_max": Definition("FW_AIRSPD_MAX", 20.0, 0.5, 500.0),
-    "pitch_limit_min": Definition("FW_P_LIM_MIN", -30.0, -80.0, 0.0, _RAD_PER_DEG, (-60.0, 0.0)),
-    "pitch_limit_max": Definition("FW_P_LIM_MAX", 30.0, 0.0, 80.0, _RAD_PER_DEG, (0.0, 60.0)),
-    "pitch_trim": Definition("FW_PSP_OFF", 0.0, -90.0, 90.0, _RAD_PER_DEG),
+    "pitch_limit_min": Definition("FW_P_LIM_MIN", -30.0, -80.0, 0.0, _DEGREE, (-60.0, 0.0)),
+    "pitch_limit_max": Definition("FW_P_LIM_MAX", 30.0, 0.0, 80.0, _DEGREE, (0.0, 60.0)),
+    "pitch_trim": Definition("FW_PSP_OFF", 0.0, -90.0, 90.0, _DEGREE),
     "pitch_time": Definition("FW_P_TC", 0.4, 0.02, 10.0, documented=(0.2, 1.0)),
     "throttle_trim": Definition("FW_THR_TRIM", 0.6, 0.0, 1.0),
     "throttle_min": Definition("FW_THR_MIN", 0.0, 0.0, 1.0),
@@ -103,9 +102,9 @@ DEFINITIONS = {
     "return_height": Definition("RTL_RETURN_ALT", 100.0, 0.0, 10_000.0),
     "return_radius": Definition("RTL_LOITER_RAD", 80.0, 1.0, 10_000.0),
     "return_type": Definition("RTL_TYPE", 1.0, 0.0, 5.0),
-    # Checks of a mission.
+    # What a mission is taken by.
     "mission_requires": Definition("MIS_TKO_LAND_REQ", 2.0, 0.0, 5.0),
-    "landing_angle": Definition("FW_LND_ANG", 5.0, 1.0, 45.0, _RAD_PER_DEG),
+    "landing_angle": Definition("FW_LND_ANG", 5.0, 1.0, 45.0, _DEGREE),
     # Not flown.
     "uses_airspeed": Definition("FW_USE_AIRSPD", 1.0, 0.0, 1.0),
     "keeps_ground_speed": Definition("NPFG_EN_MIN_GSP", 1.0, 0.0, 1.0),
@@ -127,14 +126,13 @@ DEFINITIONS = {
     "fence_height": Definition("GF_MAX_VER_DIST", 0.0, 0.0, 1e6),
     "longest_flight": Definition("COM_FLT_TIME_MAX", -1.0, -1.0, 1e6),
 }
-# Parameters that are read, but no flight shows the effect of a value other than PX4's default.
+# Read, and no flight of ours shows what another value than PX4's own would do.
 NOT_FLOWN = tuple(definition.name for definition in list(DEFINITIONS.values())[-19:])
 _BY_NAME = {definition.name: definition for definition in DEFINITIONS.values()}
-# From this number of parameters on, a file is a complete set: a ground station saves a thousand and more, a person
-# writes down only the ones of interest.
-_COMPLETE_SET_COUNT = 300
-# Parameters that should be in ascending order, though PX4 does not refuse another order.
-_EXPECTED_ORDERS = (
+# A station saves every parameter of the vehicle, a thousand and more; a person writes down what is of interest.
+_WHOLE_SET = 300
+# What has to be in order, but that PX4 does not refuse.
+_ORDERS = (
     ("FW_THR_MIN", "FW_THR_TRIM", "FW_THR_MAX"),
     ("FW_AIRSPD_MIN", "FW_AIRSPD_TRIM", "FW_AIRSPD_MAX"),
     ("FW_P_LIM_MIN", "FW_PSP_OFF", "FW_P_LIM_MAX"),
@@ -142,19 +140,19 @@ _EXPECTED_ORDERS = (
     ("FW_T_SINK_R_SP", "FW_T_SINK_MAX"),
     ("FW_T_CLMB_R_SP", "FW_T_CLMB_MAX"),
 )
-# Parameters that must be in ascending order.
-_REQUIRED_ORDERS = (("FW_THR_MIN", "FW_THR_MAX"), ("FW_AIRSPD_MIN", "FW_AIRSPD_MAX"))
+# What has to be in order.
+_PAIRS = (("FW_THR_MIN", "FW_THR_MAX"), ("FW_AIRSPD_MIN", "FW_AIRSPD_MAX"))
 
 PX4_PARAMETERS = record_dtype(
     *DEFINITIONS,
-    ("anticipates", np.bool_),  # True if the navigator uses guidance's own switch distance: up to 1.16
-    # Gains (1/s, 1/s, 1/s^2, 1/s) of the airspeed filter: of the speed and of its rate, by the error of each.
+    ("anticipates", np.bool_),  # whether guidance's own switch distance counts for the navigator: up to 1.16
+    # Gains (1/s, 1/s, 1/s^2, 1/s) of the airspeed filter: of its speed and of its rate, by what is amiss in each.
     "speed_by_speed",
     "speed_by_rate",
     "rate_by_speed",
     "rate_by_rate",
 )
-# ArduPlane's parameters of an aircraft that PX4 has under another name, with the factor to PX4's unit.
+# ArduPlane's parameters of an aircraft that are PX4's by another name, and the factor to PX4's unit.
 FROM_ARDUPILOT = {
     "AIRSPEED_CRUISE": ("FW_AIRSPD_TRIM", 1.0),
     "AIRSPEED_MIN": ("FW_AIRSPD_MIN", 1.0),
@@ -170,17 +168,17 @@ FROM_ARDUPILOT = {
     "TECS_SINK_MIN": ("FW_T_SINK_MIN", 1.0),
     "TECS_SINK_MAX": ("FW_T_SINK_MAX", 1.0),
 }
-# Parameter file in the aircraft's folder, next to its model.
+# Of an aircraft, beside its model.
 AIRCRAFT_FILE = "ardupilot.parm"
 
 
 @dataclass(frozen=True, slots=True)
 class Px4Parameters:
-    """Parameters with which PX4 flies.
+    """What PX4 flies with.
 
-    values: every parameter that the law uses, in the order of `DEFINITIONS`.
-    unused: names in the file that the law does not use.
-    source: the user's file, "" if there is no file.
+    values: every parameter that the law knows, in the order of `DEFINITIONS`.
+    unused: names that the file states and the law has no use for.
+    source: the file that a person gave, "" for none.
     version: of PX4.
     """
 
@@ -191,7 +189,7 @@ class Px4Parameters:
     version: Px4Version = NEWEST_PX4
 
     def __getitem__(self, name: str) -> float:
-        """Return a parameter's value by PX4's name, in SI and radians.
+        """A parameter's value by PX4's name, in SI and radians.
 
         >>> round(default_parameters()["FW_R_LIM"], 3), default_parameters()["NAV_ACC_RAD"]
         (0.873, 10.0)
@@ -199,7 +197,7 @@ class Px4Parameters:
         return next(value * _BY_NAME[name].to_si for known, value, _ in self.values if known == name)
 
     def changed(self, **values: float) -> "Px4Parameters":
-        """Return a copy with other values for some parameters, by PX4's names and in its units.
+        """The same parameters but for these, by PX4's names and in its units.
 
         >>> default_parameters().changed(NAV_ACC_RAD=56.0)["NAV_ACC_RAD"]
         56.0
@@ -213,12 +211,12 @@ class Px4Parameters:
         return Px4Parameters(made, self.unused, self.source, self.version)
 
     def by_origin(self, origin: Origin) -> dict[str, float]:
-        """Return the values (in PX4's units) that one source states, by name."""
+        """The values (in PX4's units) that one source states, by name."""
         return {name: value for name, value, stated in self.values if stated == origin}
 
     @property
     def beyond(self) -> tuple[str, ...]:
-        """Values of the file outside PX4's documented ranges, with the range; they are flown all the same.
+        """What the file states beyond PX4's documented ranges, which is flown all the same, with the range.
 
         >>> parameters_of("FW_R_LIM 30", "mine.params").beyond
         ('FW_R_LIM 30 (35..75)',)
@@ -232,28 +230,28 @@ class Px4Parameters:
 
     @property
     def misfits(self) -> tuple[str, ...]:
-        """Contradictory values of the file, in words; PX4 warns of some, and flies with them.
+        """Values of the file that contradict another parameter, in words; PX4 warns of some, and flies with them.
 
         >>> parameters_of("FW_AIRSPD_TRIM 25", "mine.params").misfits
         ('FW_AIRSPD_TRIM 25 of the file is above FW_AIRSPD_MAX 20 of the defaults',)
         """
-        return find_misfits(self.values, _EXPECTED_ORDERS)
+        return find_misfits(self.values, _ORDERS)
 
     @property
     def is_whole_set(self) -> bool:
-        """True if the file is a complete set: a parameter that it does not state has the release's default."""
-        return len(self.unused) + len(self.by_origin("file")) >= _COMPLETE_SET_COUNT
+        """Whether the file holds all parameters of a vehicle: one that it does not state is the release's own."""
+        return len(self.unused) + len(self.by_origin("file")) >= _WHOLE_SET
 
     @property
     def anticipates(self) -> bool:
-        """True if the navigator uses guidance's own switch distance.
+        """Whether guidance's own switch distance counts for the navigator.
 
-        Up to 1.16 the position controller published it; 1.17 split the controller into modules that do not publish it.
+        To 1.16 the position controller published it; 1.17 split that one into modules, and none of them does any more.
         """
         return self.version == "1.16"
 
     def record(self) -> Record:
-        """Return the parameters for compiled code, as a record of `PX4_PARAMETERS`."""
+        """The parameters for compiled code, as a record of `PX4_PARAMETERS`."""
         record: Record = np.zeros(1, PX4_PARAMETERS)[0]
         for (field, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=True):
             setattr(record, field, parameter.value * definition.to_si)
@@ -264,18 +262,17 @@ class Px4Parameters:
 
 
 def speed_filter_gains(speed: float, rate: float, process: float) -> tuple[float, float, float, float]:
-    """Return the gains of the airspeed filter: speed by errors of speed and rate, rate by the same.
+    """Gains of the airspeed filter: of the speed by an error of speed and of its rate, of the rate by the same.
 
-    speed, rate: standard deviations of the measured airspeed (m/s) and of its measured rate (m/s^2).  process: standard
-    deviation of the noise that drives the rate, m/s^2.  They are the steady gains of a Kalman-Bucy filter on an
-    integrator chain (Kalman and Bucy 1961, J. Basic Eng. 83, 95-108), as PX4's parameters FW_T_SPD_* are described.
+    speed, rate: standard deviations of the measured airspeed (m/s) and of its measured rate (m/s^2).  process: of the
+    noise that moves the rate, m/s^2.  They are the steady gains of a Kalman-Bucy filter on an integrator chain
+    (Kalman and Bucy 1961, J. Basic Eng. 83, 95-108), which is how PX4's parameters FW_T_SPD_* are described.
 
     >>> [round(gain, 2) for gain in speed_filter_gains(0.07, 0.2, 0.2)]
     [1.92, 0.26, 2.12, 0.67]
     """
     chain, precision = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([speed**-2.0, rate**-2.0])
-    # Solve the Riccati equation by the stable eigenvectors of its Hamiltonian (Potter 1966, SIAM J. Appl. Math. 14,
-    # 496-501).
+    # The Riccati equation by the stable eigenvectors of its Hamiltonian (Potter 1966, SIAM J. Appl. Math. 14, 496-501).
     hamiltonian = np.block([[chain.T, -precision], [-np.diag([0.0, process * process]), -chain]])
     roots, vectors = np.linalg.eig(hamiltonian)
     stable = vectors[:, roots.real < 0.0]
@@ -284,7 +281,7 @@ def speed_filter_gains(speed: float, rate: float, process: float) -> tuple[float
 
 
 def default_parameters(version: Px4Version = NEWEST_PX4) -> Px4Parameters:
-    """Return PX4's default parameters, which do not depend on the aircraft.
+    """PX4's own values, whatever it flies.
 
     >>> default_parameters()["FW_T_CLMB_R_SP"], default_parameters("1.16").anticipates
     (3.0, True)
@@ -295,9 +292,9 @@ def default_parameters(version: Px4Version = NEWEST_PX4) -> Px4Parameters:
 def load_parameters(
     aircraft: Aircraft, path: Path | str | None = None, version: Px4Version = NEWEST_PX4
 ) -> Px4Parameters:
-    """Return the parameters for an aircraft: from a file, from the aircraft, and PX4's defaults.
+    """The parameters that an aircraft is flown with: of a file, of the aircraft, and PX4's defaults.
 
-    Raise ParameterError, in one line, for a file that cannot be read or states a value that is not allowed.
+    Raises ParameterError, in one line, for a file that cannot be read or states what is not allowed.
 
     >>> from aircraft.catalog import load_aircraft
     >>> made = load_parameters(load_aircraft("aerosonde"))
@@ -308,29 +305,27 @@ def load_parameters(
     unused: tuple[str, ...] = ()
     if path is not None:
         entries = read_parameters_for(Path(path), PX4)
-        values, unused = _split_known(entries)
+        values, unused = _known(entries)
         refuse_unknown(Path(path), PX4, entries, values)
         stated.append(("file", values))
-    stated.append(("aircraft", _aircraft_values(aircraft)))
+    stated.append(("aircraft", _of_aircraft(aircraft)))
     return _parameters(stated, "" if path is None else str(path), unused, version)
 
 
 def parameters_of(text: str, source: str, version: Px4Version = NEWEST_PX4) -> Px4Parameters:
-    r"""Return the parameters of a file's text alone, with PX4's defaults.
-
-    Raise ParameterError for a value that is not allowed.
+    r"""The parameters of a file's text alone, with PX4's defaults.  Raises ParameterError.
 
     >>> parameters_of("1\t1\tNAV_ACC_RAD\t30.0\t9\n1\t1\tBAT1_N_CELLS\t3\t6\n", "mine.params").unused
     ('BAT1_N_CELLS',)
     """
-    values, unused = _split_known(parse_parameters(text, source))
+    values, unused = _known(parse_parameters(text, source))
     return _parameters([("file", values)], source, unused, version)
 
 
 def stored_parameters(stored: StoredParameters, version: str) -> Px4Parameters:
-    """Return recorded parameters; parameters that were not known at the time have their defaults.
+    """Parameters that were recorded; those that were not yet known have their defaults.
 
-    Raise ParameterError for a value or a version that is not allowed.
+    Raises ParameterError for a value or a version that is not allowed.
 
     >>> stored = StoredParameters((ParameterValue("NAV_ACC_RAD", 50.0, "file"),), (), "a.params")
     >>> stored_parameters(stored, "1.16")["NAV_ACC_RAD"]
@@ -344,7 +339,7 @@ def stored_parameters(stored: StoredParameters, version: str) -> Px4Parameters:
     origins: dict[Origin, dict[str, float]] = {"file": {}, "aircraft": {}, "default": {}}
     for name, value, origin in stored.values:
         if name in _BY_NAME:
-            _check_range(name, value, stored.source)
+            _check(name, value, stored.source)
             origins[origin][name] = value
     return _parameters(list(origins.items()), stored.source, stored.unused, known)
 
@@ -352,9 +347,9 @@ def stored_parameters(stored: StoredParameters, version: str) -> Px4Parameters:
 def logged_parameters(
     logged: Mapping[str, float], source: str, version: Px4Version
 ) -> tuple[Px4Parameters, tuple[str, ...]]:
-    """Return the parameters of a flight log, and sentences about values that could not be used.
+    """The parameters of a flight log, and what could not be used of them, in sentences.
 
-    A log without parameters gets PX4's defaults, with a sentence.  source: the log's file.
+    A log without parameters has PX4's defaults, and says so.  source: the log's file.
 
     >>> made, notes = logged_parameters({"NAV_ACC_RAD": -5.0, "FW_R_LIM": 45.0}, "a.ulg", "1.16")
     >>> made.by_origin("file"), notes
@@ -365,13 +360,13 @@ def logged_parameters(
     for name, definition in _BY_NAME.items():
         if name not in logged:
             continue
-        # Logs store single precision.
+        # Logs hold single precision.
         value = float(f"{logged[name]:.6g}")
         if definition.low <= value <= definition.high:
             values[name] = value
         else:
             notes.append(f"{name} {value:g} of the log is not allowed: the default is taken")
-    for low, high in _REQUIRED_ORDERS:
+    for low, high in _PAIRS:
         if low in values and high in values and values[low] >= values[high]:
             notes.append(f"{low} {values[low]:g} and {high} {values[high]:g} of the log: the defaults are taken")
             del values[low], values[high]
@@ -386,13 +381,12 @@ def logged_parameters(
 def _parameters(
     stated: list[tuple[Origin, dict[str, float]]], source: str, unused: tuple[str, ...], version: Px4Version
 ) -> Px4Parameters:
-    """Return the parameters, each from the first source that states it, or PX4's default."""
+    """Parameters of the first source that states each, and PX4's default where none does."""
 
     def found(definition: Definition) -> ParameterValue:
         for origin, values in stated:
             value = values.get(definition.name)
-            # A ground station saves every parameter: a parameter that is not flown is taken only if it differs from
-            # PX4's default.
+            # A station saves every parameter: one that is not flown counts where it is not PX4's own value.
             usual = definition.name in NOT_FLOWN and value == definition.default
             if value is not None and not usual:
                 return ParameterValue(definition.name, value, origin)
@@ -400,7 +394,7 @@ def _parameters(
 
     made = Px4Parameters(tuple(map(found, DEFINITIONS.values())), unused, source, version)
     values = {name: value for name, value, _ in made.values}
-    for low, high in _REQUIRED_ORDERS:
+    for low, high in _PAIRS:
         if values[low] >= values[high]:
             value, allowed = values[low], f"must be below {high} {values[high]:g}"
             where = source or AIRCRAFT_FILE
@@ -409,8 +403,8 @@ def _parameters(
     return made
 
 
-def _aircraft_values(aircraft: Aircraft) -> dict[str, float]:
-    """Return the values for ArduPlane in the aircraft's folder that PX4 has too, within PX4's ranges."""
+def _of_aircraft(aircraft: Aircraft) -> dict[str, float]:
+    """What the aircraft's folder states for ArduPlane that is PX4's too, within PX4's ranges."""
     file = aircraft.folder / AIRCRAFT_FILE
     if not file.exists():
         return {}
@@ -422,23 +416,23 @@ def _aircraft_values(aircraft: Aircraft) -> dict[str, float]:
     return values
 
 
-def _split_known(entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the values by name, and the names that the law does not use."""
+def _known(entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Values by their names, and the names that the law has no use for."""
     values: dict[str, float] = {}
     unused = []
     for name, entry in entries.items():
         if name not in _BY_NAME:
             unused.append(name)
             continue
-        _check_range(name, entry.value, entry.where)
+        _check(name, entry.value, entry.where)
         values[name] = entry.value
     return values, tuple(unused)
 
 
-def _check_range(name: str, value: float, where: TextLine | str) -> None:
-    """Raise ParameterError for a value out of its range.
+def _check(name: str, value: float, where: TextLine | str) -> None:
+    """Refuse a value out of its range.
 
-    where: the line of the value; for a recorded value the source, which the message does not name.
+    where: its line; of one that was recorded, the source, which the message does not name.
     """
     definition = _BY_NAME[name]
     if definition.low <= value <= definition.high:
@@ -449,7 +443,7 @@ def _check_range(name: str, value: float, where: TextLine | str) -> None:
 
 
 # ----------------------------------------------------------------------
-# Parameters that may cause a flight to fail, with the steps and ranges of the parameter reference.
+# Parameters that may decide a flight that fails, with the steps and ranges of the parameter reference.
 
 HEIGHT_CANDIDATES = (
     Candidate("FW_T_CLMB_R_SP", 0.5, 6.0, "m/s"),
