@@ -59,7 +59,7 @@ class ProgramAutopilot(Autopilot):
         """
 
     def described(self, aircraft: str) -> str:
-        """Describe the program and the parameters that a person changed; before the flight its law."""
+        """Describe the program and the parameters that the user changed; before the flight its law."""
         return super().described(aircraft) if self.program is None else describe_program(self.program, aircraft)
 
     @property

@@ -1,4 +1,4 @@
-"""Arming, modes and start: what a ground station may ask of the vehicle, as a state machine without a clock."""
+"""Arming, modes and start of the vehicle by ground stations, as a state machine without a clock."""
 
 from dataclasses import dataclass
 
@@ -19,15 +19,21 @@ from flight.live.telemetry import (
     RTL,
 )
 
-# param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces it: MAVLink's number, and the one that MAVProxy sends to arm.
-_FORCED = (21196, 2989)
-ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
-IN_PROGRESS, UNSUPPORTED = mavlink.MAV_RESULT_IN_PROGRESS, mavlink.MAV_RESULT_UNSUPPORTED
+# Values of param2 of MAV_CMD_COMPONENT_ARM_DISARM that force it: MAVLink's number, and MAVProxy's number for arming.
+_FORCE_VALUES = (21196, 2989)
+# Result of an accepted command.
+ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
+# Result of a denied command.
+DENIED = mavlink.MAV_RESULT_DENIED
+# Result of a command that is to be repeated.
+IN_PROGRESS = mavlink.MAV_RESULT_IN_PROGRESS
+# Result of an unknown command.
+UNSUPPORTED = mavlink.MAV_RESULT_UNSUPPORTED
 
 
 @dataclass(frozen=True, slots=True)
 class CommandResult:
-    """MAV_RESULT of a command, and a text for the stations ("" for none)."""
+    """MAV_RESULT of a command, and a text for the stations ("" for no text)."""
 
     result: int
     text: str = ""
@@ -35,14 +41,14 @@ class CommandResult:
 
 @dataclass(slots=True)
 class ArmingState:
-    """The vehicle's state as its commands see it.
+    """The vehicle's state for its commands.
 
     mode: ArduPlane's number.
-    judging: a verdict on the mission is on its way.
+    judging: True while a verdict on the mission is awaited.
     judged: the last verdict; None without a mission.
     force: PFLY_FORCE.
-    end_requested: the flight is to be ended.
-    place: where the flight that goes on is to be diverted to by its new mode; None for no such wish.
+    end_requested: True if the flight is to be ended.
+    place: target of the current flight's diversion in its new mode; None for no diversion.
     mission_state: MISSION_STATE of MISSION_CURRENT.
     """
 
@@ -58,17 +64,20 @@ class ArmingState:
 
     @property
     def armable(self) -> bool:
-        """Whether arming would be accepted now."""
+        """True if arming would be accepted now."""
         return not self.judging and not self._why_not_armed(False)
 
     @property
     def starts(self) -> bool:
-        """Whether the flight is to be started: armed, in AUTO, and judged."""
+        """True if the flight is to be started: armed, in AUTO, and judged."""
         return self.armed and self.mode == AUTO and not self.flying and not self.judging and self.judged is not None
 
     def arm(self, on: bool, param2: float) -> CommandResult:
-        """Arm or disarm (MAV_CMD_COMPONENT_ARM_DISARM).  IN_PROGRESS: ask again when the verdict is there."""
-        forced = param2 in _FORCED
+        """Arm or disarm (MAV_CMD_COMPONENT_ARM_DISARM).
+
+        IN_PROGRESS: repeat the command after the verdict.
+        """
+        forced = param2 in _FORCE_VALUES
         if not on:
             if self.flying and not forced:
                 return CommandResult(
@@ -105,19 +114,19 @@ class ArmingState:
         return CommandResult(ACCEPTED, "AUTO: arming starts the mission" if mode == AUTO and not self.armed else "")
 
     def start(self) -> CommandResult:
-        """MAV_CMD_MISSION_START."""
+        """Start the mission (MAV_CMD_MISSION_START)."""
         if not self.armed:
             return CommandResult(DENIED, "start denied: not armed")
         return self.set_mode(AUTO)
 
     def pause(self, goes_on: bool) -> CommandResult:
-        """MAV_CMD_DO_PAUSE_CONTINUE: circle where the aircraft is, or go on with the mission."""
+        """Loiter at the aircraft's position, or continue the mission (MAV_CMD_DO_PAUSE_CONTINUE)."""
         if self.flying:
             return self._divert(AUTO if goes_on else LOITER)
         return CommandResult(ACCEPTED) if goes_on else CommandResult(DENIED, "pause denied: not in flight")
 
     def go_to(self, place: Place) -> CommandResult:
-        """Fly to a place and circle there, in GUIDED."""
+        """Fly to a place and loiter there, in GUIDED."""
         if not self.flying:
             return CommandResult(DENIED, "go-to denied: not in flight")
         self.mode, self.place = GUIDED, place
@@ -125,16 +134,16 @@ class ArmingState:
         return CommandResult(ACCEPTED)
 
     def restart_mission(self) -> None:
-        """Fly the mission on from the item that was set in flight."""
+        """Continue the mission from the item that was set in flight."""
         self.place = Place()
 
     def diverted(self, mode: int) -> None:
-        """The flight is in this mode now."""
+        """Note that the flight is in this mode now."""
         self.mode = mode
         self.mission_state = ACTIVE if mode == AUTO else PAUSED
 
     def _divert(self, mode: int) -> CommandResult:
-        """Fly on in another mode; the one that is flown stays as it is."""
+        """Fly on in another mode; the current mode stays if it is the same."""
         if mode == MANUAL:
             return CommandResult(DENIED, "MANUAL denied: nobody has the sticks; a forced disarm ends the flight")
         if mode != self.mode:
@@ -143,11 +152,11 @@ class ArmingState:
         return CommandResult(ACCEPTED)
 
     def mission_uploaded(self) -> None:
-        """A mission has come and is being judged."""
+        """Note that a mission was uploaded and is being judged."""
         self.judging, self.mission_state = True, NOT_STARTED
 
     def mission_judged(self, judged: MissionJudged) -> str:
-        """Take a verdict; why the vehicle was disarmed, "" if it was not."""
+        """Note a verdict; return why the vehicle was disarmed, "" if it was not."""
         self.judging = False
         self.judged = judged
         self.mission_state = NOT_STARTED
@@ -158,17 +167,17 @@ class ArmingState:
         return ""
 
     def mission_cleared(self) -> None:
-        """The mission is gone."""
+        """Note that the mission was cleared."""
         self.judging, self.judged, self.mission_state = False, None, NO_MISSION
         if self.mode == AUTO:
             self.mode = MANUAL
 
     def flight_started(self) -> None:
-        """The flight has started."""
+        """Note that the flight has started."""
         self.flying, self.mission_state = True, ACTIVE
 
     def flight_ended(self, completed: bool) -> None:
-        """The flight is over: disarmed, ready to be flown again."""
+        """Note that the flight is over: disarmed, ready to fly again."""
         self.flying = self.armed = self.end_requested = False
         self.mission_state = COMPLETE if completed and self.mode == AUTO else NOT_STARTED
         self.mode, self.place = MANUAL, None

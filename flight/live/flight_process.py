@@ -1,16 +1,16 @@
-"""The process that flies: JSBSim holds the interpreter's lock while it steps, so the link lives in another one.
+"""Flight process of the live vehicle, apart from the link since JSBSim holds the interpreter's lock.
 
-Requests come in over a pipe and events go back: a state snapshot as packed bytes, everything else pickled.  Both ends
-are ours; nothing that a station sends is ever unpickled.
+Requests arrive over a pipe and events go back: a state snapshot as packed bytes, everything else pickled.  Both ends
+belong to planfly; nothing from a station is ever unpickled.
 
-| request | what it asks for |
+| request | meaning |
 |---|---|
-| `JudgeMission` | a verdict on a mission, without a flight |
-| `StartFlight` | the flight of the mission that was judged last |
-| `DivertFlight` | another way from where the aircraft is, in the flight that goes on |
-| `EndFlight` | the end of the flight, or of the process |
+| `JudgeMission` | return a verdict on a mission, without a flight |
+| `StartFlight` | fly the mission that was judged last |
+| `DivertFlight` | take another route from the aircraft's position, in the current flight |
+| `EndFlight` | end the flight, or the process |
 
-| event | when it is sent |
+| event | time |
 |---|---|
 | `ProcessReady` | once, before the first request is read |
 | `MissionJudged` | for each `JudgeMission` |
@@ -45,25 +45,33 @@ from world.errors import PlanflyError
 
 Floats = NDArray[np.float64]
 
-# Snapshots a second that are sent; the log is handed to the operating system this often, s.
+# Rate of the snapshots, 1/s.
 SNAPSHOT_RATE = 60.0
+# Interval at which the log is passed to the operating system, s.
 FLUSH_PERIOD = 0.2
-# A machine that falls this far behind the clock (s) lets the flight run late rather than in one leap.
-_BEHIND = 0.5
-# First byte of what is sent: what follows is packed, or pickled.
-_PACKED, _PICKLED = b"S", b"E"
-STOPPED, SHUT_DOWN = "stopped by the ground station", "stopped: the vehicle was shut down"
-# How a way ends that the aircraft was sent on from; the mode follows.  How a circle ends that is flown on.
-LEFT_FOR, HELD_ON = "left, as a ground station asked, for ", "logged until here, and circling on"
-# Circles without end are logged in pieces, and end after so many.
-_MAX_PIECES = 16
+# Beyond this delay behind the clock the flight runs late instead of in one leap, s.
+_MAX_DELAY_S = 0.5
+# First byte of a packed snapshot.
+_PACKED_MARK = b"S"
+# First byte of a pickled event.
+_PICKLED_MARK = b"E"
+# End of a flight that a station stopped.
+STOPPED = "stopped by the ground station"
+# End of a flight at the shutdown of the vehicle.
+SHUT_DOWN = "stopped: the vehicle was shut down"
+# End of a route that a diversion left; the new mode follows.
+LEFT_FOR = "left, as a ground station asked, for "
+# End of one log of a loiter that continues.
+HELD_ON = "logged until here, and circling on"
+# Loiters without end are logged in pieces, and end after this number.
+_MAX_LOITER_LOGS = 16
 
 
 @dataclass(frozen=True, slots=True)
 class JudgeMission:
     """Request: judge a mission in the vehicle's scenario.
 
-    number: comes back with the event.  parameters: of the law, by name, which stations have set.
+    number: repeated in the event.  parameters: of the law, by name, as set by stations.
     """
 
     mission: Mission
@@ -78,9 +86,9 @@ class StartFlight:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where to circle.
+    """Center of a loiter.
 
-    lat_deg, lon_deg: NaN for where the aircraft is.  alt: m in the frame, NaN for the height that it is at.
+    lat_deg, lon_deg: NaN for the aircraft's position.  alt: m in the frame, NaN for the aircraft's altitude.
     frame: MAV_FRAME.  radius: m, 0 for the autopilot's own.
     """
 
@@ -93,10 +101,10 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class DivertFlight:
-    """Request: leave the way that is flown for another, from where the aircraft is.
+    """Request: leave the current route for another, from the aircraft's position.
 
-    mode: ArduPlane's number: AUTO flies the mission's items, RTL returns, LOITER and GUIDED circle at the place.
-    mission: home, rally points and fence; in AUTO with the items that are left.
+    mode: ArduPlane's number: AUTO flies the mission's items, RTL returns, LOITER and GUIDED loiter at the place.
+    mission: home, rally points and fence; in AUTO with the remaining items.
     """
 
     mode: int
@@ -121,11 +129,11 @@ class MissionJudged:
     """Event: a mission has been judged.
 
     number: of the request.
-    possible: whether the mission can be started at all.
+    possible: True if the mission can be started at all.
     flyable: False if a finding of its geometry failed.
-    texts: what stations are sent about it.
+    texts: texts about it for stations.
     home: the mission's, or the ground at its start; None if it is not possible.
-    items: seq of the item at each waypoint, -1 for none.
+    items: seq of the item at each waypoint, -1 for no item.
     start: the aircraft where the flight starts; None if it is not possible.
     """
 
@@ -140,10 +148,10 @@ class MissionJudged:
 
 @dataclass(frozen=True, slots=True)
 class FlightDiverted:
-    """Event: the aircraft is on another way, or cannot be and flies on.
+    """Event: the aircraft is on another route, or cannot be and flies on.
 
-    mode: that it is flown in now.  problem: why it cannot, "" if it is on its way.
-    items: seq of the item at each waypoint, -1 for none.
+    mode: of the flight now.  problem: reason why it cannot, "" if it is diverted.
+    items: seq of the item at each waypoint, -1 for no item.
     """
 
     mode: int
@@ -153,14 +161,20 @@ class FlightDiverted:
 
 @dataclass(frozen=True, slots=True)
 class FlightEnded:
-    """Event: the flight is over.  ended: "completed" or why not."""
+    """Event: the flight is over.
+
+    ended: "completed" or the reason.
+    """
 
     ended: str
 
 
 @dataclass(frozen=True, slots=True)
 class FlightJudged:
-    """Event: the flight has been judged and its log closed.  texts: what stations are sent about it."""
+    """Event: the flight has been judged and its log closed.
+
+    texts: texts about it for stations.
+    """
 
     flyable: bool
     texts: tuple[StatusText, ...]
@@ -171,13 +185,16 @@ Event = ProcessReady | MissionJudged | FlightDiverted | FlightEnded | FlightJudg
 
 
 class LogSink(Protocol):
-    """Where a flight is recorded."""
+    """Recorder of a flight."""
 
     def write(self, block: Track) -> None:
         """Append rows and hand them to the operating system."""
 
     def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
-        """Judge the flight and close the log; hurry: whether the process is to end, asked wherever it takes long."""
+        """Judge the flight and close the log.
+
+        hurry: returns True if the process is to end; called during long work.
+        """
 
     def abandon(self) -> None:
         """Close the log of a flight that could not go on."""
@@ -192,26 +209,35 @@ class PreparedFlight:
 
 
 class FlightFactory(Protocol):
-    """What the application gives the process that flies.  speed: times real time."""
+    """Application's part of the flight process.
+
+    speed: times real time.
+    """
 
     aircraft: Aircraft
     speed: float
 
     def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
-        """Judge a mission; None in place of the flight where it cannot be flown."""
+        """Judge a mission; return None for the flight if it cannot be flown."""
 
     def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:
-        """The way that is asked for, from a position (3,) on the map.  Raises PlanflyError where there is none."""
+        """Return the requested route from a position (3,) on the map.
+
+        Raise PlanflyError if there is none.
+        """
 
     def open_log(self, setup: FlightSetup, mode: int) -> LogSink:
-        """Open the log of the next flight.  mode: as of `DivertFlight`."""
+        """Open the log of the next flight.
+
+        mode: as in `DivertFlight`.
+        """
 
 
 def serve_flights(connection: Connection, factory: FlightFactory) -> None:
-    """Judge and fly as asked, until the other end closes or asks the process to end.
+    """Serve requests until the other end closes or asks the process to end.
 
-    connection: the flying end of a `multiprocessing.Pipe`; requests are pickled into the other end, and `read_event`
-    reads what comes out of it.
+    connection: this end of a `multiprocessing.Pipe`; requests are pickled into the other end, and `read_event` reads
+    its output.
 
     >>> from multiprocessing import Pipe
     >>> link_end, flying_end = Pipe()
@@ -219,7 +245,7 @@ def serve_flights(connection: Connection, factory: FlightFactory) -> None:
     >>> serve_flights(flying_end, factory=None)  # a request to quit asks nothing of the factory
     """
     prepared: PreparedFlight | None = None
-    requests = _Requests(connection)
+    requests = _RequestQueue(connection)
     try:
         while True:
             request = requests.next()
@@ -227,12 +253,12 @@ def serve_flights(connection: Connection, factory: FlightFactory) -> None:
                 prepared, judged = factory.prepare(request)
                 send_event(connection, judged)
             elif isinstance(request, StartFlight) and prepared is not None:
-                if not _fly(connection, requests, prepared, factory):
+                if not _run_flight(connection, requests, prepared, factory):
                     return
             elif isinstance(request, EndFlight) and request.quit:
                 return
     except (EOFError, BrokenPipeError, ConnectionResetError):
-        # The link is gone, and with it all who watched; the log is closed on the way here.
+        # The link is gone, and the stations with it; the log is already closed.
         return
 
 
@@ -245,18 +271,18 @@ def send_event(connection: Connection, event: Event) -> None:
     >>> read_event(link_end.recv_bytes())
     FlightEnded(ended='completed')
     """
-    connection.send_bytes(_PICKLED + pickle.dumps(event))
+    connection.send_bytes(_PICKLED_MARK + pickle.dumps(event))
 
 
 def read_event(data: bytes) -> Snapshot | Event:
-    """Read what the flying process sent."""
-    if data[:1] == _PACKED:
+    """Read an event from the flight process."""
+    if data[:1] == _PACKED_MARK:
         return Snapshot.unpack(data[1:])
     found: Event = pickle.loads(data[1:])
     return found
 
 
-class _Requests:
+class _RequestQueue:
     """Requests in the order in which they came."""
 
     def __init__(self, connection: Connection) -> None:
@@ -264,11 +290,14 @@ class _Requests:
         self._early: deque[object] = deque()
 
     def next(self) -> object:
-        """The next request, waited for.  Raises EOFError where the link is gone."""
+        """Return the next request, waiting for it.
+
+        Raise EOFError if the link is gone.
+        """
         return self._early.popleft() if self._early else self._connection.recv()
 
     def waiting(self) -> object:
-        """The next request if one is there; None where none is."""
+        """Return the next request, or None if there is none."""
         if not self._early and not self._connection.poll():
             return None
         try:
@@ -277,7 +306,7 @@ class _Requests:
             return EndFlight(quit=True)
 
     def ending(self) -> bool:
-        """Whether the process is to end, by a request that has come or because the link is gone; none is taken out."""
+        """Return True if the process is to end, by a request or because the link is gone; none is removed."""
         try:
             while self._connection.poll():
                 self._early.append(self._connection.recv())
@@ -286,8 +315,10 @@ class _Requests:
         return any(isinstance(request, EndFlight) and request.quit for request in self._early)
 
 
-def _fly(connection: Connection, requests: _Requests, prepared: PreparedFlight, factory: FlightFactory) -> bool:
-    """Fly in step with the clock; False when the process is to end."""
+def _run_flight(
+    connection: Connection, requests: _RequestQueue, prepared: PreparedFlight, factory: FlightFactory
+) -> bool:
+    """Fly in real time; return False when the process is to end."""
     try:
         flight = Flight(prepared.setup, factory.aircraft, local_map=prepared.local_map)
         log = factory.open_log(prepared.setup, AUTO)
@@ -295,9 +326,9 @@ def _fly(connection: Connection, requests: _Requests, prepared: PreparedFlight, 
         send_event(connection, FlightEnded(f"not started: {error}"))
         send_event(connection, FlightJudged(False, (StatusText(f"flight not started: {error}", CRITICAL),)))
         return True
-    flown = _Flown(connection, requests, factory, flight, log)
+    flown = _LoggedFlight(connection, requests, factory, flight, log)
     try:
-        ended, go_on = flown.in_step()
+        ended, go_on = flown.run_in_real_time()
         if go_on:
             send_event(connection, FlightEnded(ended))
         judged = flown.finish(ended, requests.ending if go_on else lambda: True)
@@ -315,24 +346,24 @@ def _fly(connection: Connection, requests: _Requests, prepared: PreparedFlight, 
     return go_on
 
 
-class _Flown:
-    """An aircraft in the air, and the log of each way that it has been sent on."""
+class _LoggedFlight:
+    """An aircraft in the air, and the log of each of its routes."""
 
     def __init__(
-        self, connection: Connection, requests: _Requests, factory: FlightFactory, flight: Flight, log: LogSink
+        self, connection: Connection, requests: _RequestQueue, factory: FlightFactory, flight: Flight, log: LogSink
     ) -> None:
         self._connection, self._requests, self._factory = connection, requests, factory
         self._flight, self._mode = flight, AUTO
         self._snapshots = SnapshotMaker(flight.setup, flight.map)
-        # The last is written; the others wait to be judged until nothing flies, and how each ended stands beside them.
-        self._logs, self._left = [log], list[str]()
+        # The last log is written; the others are judged after the flight, with their ends in `_ends`.
+        self._logs, self._ends = [log], list[str]()
         self._pending: list[Rows] = []
-        # The circle that is flown, None for none, and how often it was begun.
-        self._circled: DivertFlight | None = None
-        self._pieces = 0
+        # The current loiter, or None, and the number of its logs.
+        self._loiter: DivertFlight | None = None
+        self._loiter_logs = 0
 
-    def in_step(self) -> tuple[str, bool]:
-        """Step the flight by the clock: how it ended, and whether the process goes on."""
+    def run_in_real_time(self) -> tuple[str, bool]:
+        """Step the flight by the clock; return how it ended, and True if the process continues."""
         clock, speed = time.monotonic, self._factory.speed
         started = begun = clock()
         ticks, flushed, beat = 0, started, 0
@@ -340,7 +371,7 @@ class _Flown:
         while not ended:
             now = clock()
             due = int((now - started) * speed / TICK) - ticks
-            max_due = max(1, int(_BEHIND * speed / TICK))
+            max_due = max(1, int(_MAX_DELAY_S * speed / TICK))
             if due > max_due:
                 started += (due - max_due) * TICK / speed
                 due = max_due
@@ -349,10 +380,10 @@ class _Flown:
                 ticks += due
                 if len(rows):
                     self._pending.append(rows)
-                    self._connection.send_bytes(_PACKED + self._snapshots.snapshot(rows[-1]).pack())
-            if ended == "completed" and self._circled is not None and self._pieces < _MAX_PIECES:
-                self._pieces += 1
-                ended = "" if self._lay_out(self._circled, HELD_ON) else ended
+                    self._connection.send_bytes(_PACKED_MARK + self._snapshots.snapshot(rows[-1]).pack())
+            if ended == "completed" and self._loiter is not None and self._loiter_logs < _MAX_LOITER_LOGS:
+                self._loiter_logs += 1
+                ended = "" if self._begin_route(self._loiter, HELD_ON) else ended
             request = self._requests.waiting()
             if isinstance(request, EndFlight):
                 ended = ended or (SHUT_DOWN if request.quit else STOPPED)
@@ -369,8 +400,8 @@ class _Flown:
         return ended, go_on
 
     def finish(self, ended: str, hurry: Callable[[], bool]) -> list[FlightJudged]:
-        """Judge each way, and close its log; hurry: as of `LogSink.finish`."""
-        endings = (*self._left, ended)
+        """Judge each route, and close its log; hurry: as in `LogSink.finish`."""
+        endings = (*self._ends, ended)
         return [log.finish(how, hurry) for log, how in zip(self._logs, endings, strict=True)]
 
     def abandon(self) -> None:
@@ -383,18 +414,21 @@ class _Flown:
         self._pending.clear()
 
     def _divert(self, request: DivertFlight) -> None:
-        if not self._lay_out(request, LEFT_FOR + MODE_NAMES[request.mode]):
+        if not self._begin_route(request, LEFT_FOR + MODE_NAMES[request.mode]):
             return
         route = self._flight.setup.route
-        self._mode, self._circled, self._pieces = request.mode, None, 1
+        self._mode, self._loiter, self._loiter_logs = request.mode, None, 1
         if request.mode in (LOITER, GUIDED):
             item = self._flight.setup.mission.items[-1]
             place = Place(item.lat_deg, item.lon_deg, item.alt, item.frame, item.params[2])
-            self._circled = replace(request, place=place)
+            self._loiter = replace(request, place=place)
         send_event(self._connection, FlightDiverted(request.mode, "", tuple(int(item) for item in route.items)))
 
-    def _lay_out(self, request: DivertFlight, left: str) -> bool:
-        """Begin a way where the aircraft is, with a log of its own; left: how the present one ends."""
+    def _begin_route(self, request: DivertFlight, left: str) -> bool:
+        """Begin a route at the aircraft's position, with its own log.
+
+        left: end of the current route.  Return False if there is no such route.
+        """
         try:
             prepared = self._factory.divert(request, self._flight.position)
         except PlanflyError as error:
@@ -406,5 +440,5 @@ class _Flown:
         self._flight.divert(prepared.setup, prepared.local_map)
         self._snapshots = SnapshotMaker(prepared.setup, prepared.local_map)
         self._logs.append(log)
-        self._left.append(left)
+        self._ends.append(left)
         return True

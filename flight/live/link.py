@@ -1,8 +1,8 @@
-"""The vehicle's link: one UDP socket, and the stations that it talks to.
+"""The vehicle's link: one UDP socket, and the stations that it serves.
 
-A station gets more than heartbeats only after it has sent a valid HEARTBEAT, or on this machine whatever is addressed
-to the vehicle, from an address that is allowed, and signed where a key is set.  The table of stations is bounded; one
-that falls silent leaves it.
+A station gets more than heartbeats only after it has sent a valid HEARTBEAT, or, on this machine, any message addressed
+to the vehicle, from an address that is allowed, and signed if a key is set.  The table of stations is bounded; a silent
+station is removed from it.
 """
 
 import hashlib
@@ -29,20 +29,26 @@ from world.errors import FlightError
 from world.running_clock import RunningClock
 
 # ----------------------------------------------------------------------
-# MAVLink frames in datagrams: found, checked and decoded, whatever the bytes are.
+# MAVLink frames in datagrams: found, checked and decoded, for arbitrary bytes.
 
-MAGIC_V1, MAGIC_V2 = 0xFE, 0xFD
+# First byte of a MAVLink 1 frame.
+MAGIC_V1 = 0xFE
+# First byte of a MAVLink 2 frame.
+MAGIC_V2 = 0xFD
 SIGNED = 0x01
 SIGNATURE = 13
-_CRC = struct.Struct("<H")
-# Largest datagram that is looked at, and most frames in it.
+_CRC_FORMAT = struct.Struct("<H")
+# Largest datagram that is read, bytes.
 LARGEST = 4096
 MAX_FRAMES = 64
 
 
 @dataclass(frozen=True, slots=True)
 class MavlinkFrame:
-    """One frame with a good checksum.  raw: all of it.  signed: whether a signature is attached, good or not."""
+    """One frame with a good checksum.
+
+    raw: the whole frame.  signed: True if a signature is attached, good or not.
+    """
 
     raw: bytes
     number: int
@@ -52,13 +58,13 @@ class MavlinkFrame:
 
 
 class Decoder:
-    """Decodes frames of the dialect.  Bytes that are no frame, or a damaged one, give nothing."""
+    """Decodes frames of the dialect; bytes that are not a frame, or a damaged frame, give nothing."""
 
     def __init__(self) -> None:
         self._mav = mavlink.MAVLink(None)
 
     def message(self, frame: MavlinkFrame) -> Any | None:
-        """Message of a frame, None where it cannot be read."""
+        """Return the message of a frame, or None if it cannot be read."""
         try:
             return self._mav.decode(bytearray(frame.raw))
         except (mavlink.MAVError, struct.error, ValueError, IndexError, TypeError, OverflowError):
@@ -66,7 +72,7 @@ class Decoder:
 
 
 def split_frames(data: bytes) -> list[MavlinkFrame]:
-    """Whole frames in a datagram, in order; a damaged one is skipped to the next that is whole."""
+    """Return the whole frames in a datagram, in order; damaged ones are skipped."""
     found: list[MavlinkFrame] = []
     data = data[:LARGEST]
     at = 0
@@ -81,56 +87,61 @@ def split_frames(data: bytes) -> list[MavlinkFrame]:
 
 
 def _frame_at(data: bytes, at: int) -> MavlinkFrame | None:
-    """Frame that starts at an offset, None where none does."""
-    modern = data[at] == MAGIC_V2
-    head = 10 if modern else 6
+    """Return the frame that starts at an offset, or None if there is none."""
+    is_v2 = data[at] == MAGIC_V2
+    head = 10 if is_v2 else 6
     if len(data) - at < head + 2:
         return None
-    flags = data[at + 2] if modern else 0
-    # Any flag but "signed" changes the frame in a way that is not known here, and the standard says to drop it.
+    flags = data[at + 2] if is_v2 else 0
+    # Any other flag changes the frame in a way that is not known here, and the standard says to drop it.
     if flags & ~SIGNED:
         return None
     end = at + head + data[at + 1] + 2
     size = end + (SIGNATURE if flags else 0)
     if size > len(data):
         return None
-    if modern:
+    if is_v2:
         system, component = data[at + 5], data[at + 6]
         number = data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16
     else:
         system, component, number = data[at + 3], data[at + 4], data[at + 5]
-    kind = mavlink.mavlink_map.get(number)
-    if kind is None:
+    message_class = mavlink.mavlink_map.get(number)
+    if message_class is None:
         return None
     crc = x25crc(data[at + 1 : end - 2])
-    crc.accumulate(bytes([kind.crc_extra]))
-    if crc.crc != _CRC.unpack_from(data, end - 2)[0]:
+    crc.accumulate(bytes([message_class.crc_extra]))
+    if crc.crc != _CRC_FORMAT.unpack_from(data, end - 2)[0]:
         return None
     return MavlinkFrame(data[at:size], number, system, component, bool(flags))
 
 
 # ----------------------------------------------------------------------
-# MAVLink 2 message signing: a signature is verified before anything about its packet is believed or kept.
+# MAVLink 2 message signing: a signature is verified before anything in its packet is trusted or stored.
 #
-# (mavlink.io, "Message Signing".)  pymavlink keeps a packet's timestamp before it checks the signature: one forged
+# (mavlink.io, "Message Signing".)  pymavlink stores a packet's timestamp before it checks the signature: one forged
 # packet from the future then locks the real station out.
 
-# Timestamps count 10 us from 2015-01-01 in six bytes; a stream that is new may lag by a minute, and any stream may lead
-# by a day.
+# Unix time of 2015-01-01, from which timestamps are measured, s.
 EPOCH = 1_420_070_400.0
-_UNITS = 100_000
-_LATEST = 2**48 - 1
-_MAX_LAG = 60 * _UNITS
-_MAX_LEAD = 86_400 * _UNITS
+# Timestamp units per second: 10 us each.
+_UNITS_PER_S = 100_000
+# Largest timestamp: six bytes.
+_MAX_TIMESTAMP = 2**48 - 1
+# Maximum lag of a new stream's timestamp: a minute.
+_MAX_LAG_UNITS = 60 * _UNITS_PER_S
+# Maximum lead of any stream's timestamp: a day.
+_MAX_LEAD_UNITS = 86_400 * _UNITS_PER_S
+# Number of streams that are stored.
 _MAX_STREAMS = 64
-_LARGEST_KEY = 1024
+# Largest key, bytes.
+_MAX_KEY_BYTES = 1024
 
 
 def read_key(path: Path) -> bytes:
     """Read a signing key of 32 bytes: 64 hexadecimal digits, or a passphrase that is hashed with SHA-256.
 
-    The hash is what MAVProxy's "signing setup" and Mission Planner make of a passphrase.  Raises FlightError for a file
-    that another user could read, that cannot be read, or that holds fewer than 8 or more than 1024 bytes.
+    MAVProxy's "signing setup" and Mission Planner hash a passphrase in the same way.  Raise FlightError for a file that
+    another user could read, that cannot be read, or that holds fewer than 8 or more than 1024 bytes.
 
     >>> import tempfile
     >>> with tempfile.NamedTemporaryFile() as file:  # made for its owner alone
@@ -141,22 +152,22 @@ def read_key(path: Path) -> bytes:
     ('9028ea0d15decaa3', 32)
     """
     try:
-        # A named pipe that nobody writes into is not waited for.
+        # Do not wait for a named pipe without a writer.
         with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise FlightError(f"{path}: not a plain file: a signing key is expected", file=path)
             own = getattr(os, "getuid", None)
-            # Where users have no numbers, modes do not say who reads a file.
+            # Where users have no numbers, modes do not show who can read a file.
             if own is not None and (status.st_uid != own() or stat.S_IMODE(status.st_mode) & 0o077):
                 mode = stat.S_IMODE(status.st_mode)
                 allowed = "a signing key is its owner's alone to read (chmod 600)"
                 message = f"{path}: mode {mode:03o}: {allowed}"
                 raise FlightError(message, file=path, field="mode", value=f"{mode:03o}", allowed=allowed)
-            data = file.read(_LARGEST_KEY + 1).strip()
+            data = file.read(_MAX_KEY_BYTES + 1).strip()
     except OSError as error:
         raise FlightError(f"{path}: cannot be read: {error.strerror}", file=path) from error
-    if not 8 <= len(data) <= _LARGEST_KEY:
+    if not 8 <= len(data) <= _MAX_KEY_BYTES:
         allowed = "a key of 64 hexadecimal digits or a passphrase of 8..1024"
         raise FlightError(f"{path}: {len(data)} bytes: {allowed}", file=path, value=len(data), allowed=allowed)
     if re.fullmatch(rb"[0-9a-fA-F]{64}", data):
@@ -165,7 +176,7 @@ def read_key(path: Path) -> bytes:
 
 
 class Refused(Enum):
-    """Why a frame is not believed; `Dropped` counts them."""
+    """Reason to distrust a frame; `Dropped` has their numbers."""
 
     UNSIGNED = auto()
     FORGED = auto()
@@ -177,10 +188,10 @@ class Refused(Enum):
 
 @dataclass(slots=True)
 class Signing:
-    """Signs what goes out and checks what comes in.
+    """Signs outgoing frames and checks incoming ones.
 
-    key: 32 bytes.  link: our link id.  newest: the largest timestamp sent or believed.  clock: the largest timestamp
-    that our own clock has had, which a clock that is set back does not lower.
+    key: 32 bytes.  link: the link id of this end.  newest: the largest timestamp sent or trusted.  clock: the largest
+    timestamp of this machine's clock, which setting the clock back does not lower.
     """
 
     key: bytes
@@ -190,7 +201,7 @@ class Signing:
     _streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
 
     def refuses(self, frame: MavlinkFrame, wall: float) -> Refused | None:
-        """Why a frame is not believed; None for one that is signed with our key and newer than all before it.
+        """Return the reason to distrust a frame; None if it is signed with the key and newer than its stream.
 
         A stream is a system, its component and its link id.  wall: s since 1970.  A frame with a bad signature leaves
         no trace.
@@ -204,20 +215,22 @@ class Signing:
         stamp = int.from_bytes(frame.raw[-12:-6], "little")
         stream = (frame.system, frame.component, link)
         last = self._streams.get(stream)
-        # By our own clock, not by what was believed before: no row of frames can lead step by step into the future.
-        self.clock = max(self.clock, _stamp(wall))
-        if stamp > self.clock + _MAX_LEAD:
+        # Compared with this machine's clock, not with trusted timestamps: a series of frames cannot lead into the
+        # future.
+        self.clock = max(self.clock, _timestamp(wall))
+        if stamp > self.clock + _MAX_LEAD_UNITS:
             return Refused.FUTURE
         if last is None:
-            # By our clock, not by others' timestamps: a station whose clock runs ahead locks nobody out.
-            if stamp + _MAX_LAG < _stamp(wall):
+            # Compared with this machine's clock, not with others' timestamps: a station whose clock is ahead locks no
+            # other out.
+            if stamp + _MAX_LAG_UNITS < _timestamp(wall):
                 return Refused.OLD
             if len(self._streams) >= _MAX_STREAMS:
                 return Refused.STREAMS
         elif stamp <= last:
             return Refused.REPLAYED
         self._streams[stream] = stamp
-        # A clock that was set back before we started: stations that run on expect us to be later than we were.
+        # The clock may have been set back before the start: running stations expect timestamps later than their last.
         self.newest = max(self.newest, stamp)
         return None
 
@@ -226,8 +239,8 @@ class Signing:
 
         Beyond the year 2104 timestamps stay at the largest that six bytes hold, and stations drop them as replayed.
         """
-        self.clock = max(self.clock, _stamp(wall))
-        self.newest = min(max(self.newest + 1, _stamp(wall)), _LATEST)
+        self.clock = max(self.clock, _timestamp(wall))
+        self.newest = min(max(self.newest + 1, _timestamp(wall)), _MAX_TIMESTAMP)
         number = packed[7] | packed[8] << 8 | packed[9] << 16
         body = bytearray(packed[:-2])
         body[2] |= SIGNED
@@ -237,28 +250,32 @@ class Signing:
         return signed + hashlib.sha256(self.key + signed).digest()[:6]
 
 
-def _stamp(wall: float) -> int:
-    return min(max(0, int((wall - EPOCH) * _UNITS)), _LATEST)
+def _timestamp(wall: float) -> int:
+    return min(max(0, int((wall - EPOCH) * _UNITS_PER_S)), _MAX_TIMESTAMP)
 
 
 Address = tuple[str, int]
 
-SYSTEM, COMPONENT = 1, mavlink.MAV_COMP_ID_AUTOPILOT1
+# MAVLink system id of the vehicle.
+SYSTEM = 1
+# MAVLink component id of the vehicle.
+COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
+# Largest number of stations.
 MAX_PEERS = 16
-# A station that has sent no heartbeat for so long is gone, s.
+# A station that has sent no heartbeat for this time is removed, s.
 SILENCE = 15.0
-# Strangers that the log names.
-_MAX_NAMED = 16
-# Datagrams handled before telemetry has its turn again.
-_MAX_AT_ONCE = 200
+# Number of unknown senders that the log names.
+_MAX_NAMED_STRANGERS = 16
+# Number of datagrams that are handled before telemetry is due again.
+_MAX_DATAGRAMS_PER_POLL = 200
 
 
 @dataclass(slots=True)
 class Peer:
-    """A station that has made itself known.
+    """A station that has identified itself.
 
-    periods: s between messages, None for none at all.  due: when each is to be sent next.  parameter: the next one to
-    send of all that it asked for.
+    periods: s between messages, None for a message that is off.  due: next time of each.
+    parameter: the next one to send, if it asked for all.
     """
 
     address: Address
@@ -278,13 +295,16 @@ class Peer:
 
 @dataclass(slots=True)
 class Dropped:
-    """Frames that were not taken, by the reason.
+    """Numbers of dropped frames, by reason.
 
-    address: from an address that is not allowed, datagrams.  unsigned, forged: without a signature, and with one that
-    the key did not make.  replayed: signed by the key, and no newer than one before it in its stream.  old: the first
-    of a stream, and from more than a minute ago.  future: signed by the key, and more than a day ahead of our clock.
-    streams: of more streams than are kept.  stranger: from another machine, and nobody that has sent a HEARTBEAT.
-    others: to another system, or from ours.
+    address: datagrams from an address that is not allowed.
+    unsigned, forged: without a signature, and with a signature that does not match the key.
+    replayed: signed by the key, and no newer than an earlier frame of its stream.
+    old: the first of a stream, and from more than a minute ago.
+    future: signed by the key, and more than a day ahead of this machine's clock.
+    streams: of more streams than are stored.
+    stranger: from another machine that has sent no HEARTBEAT.
+    others: to another system, or from the vehicle itself.
     """
 
     address: int = 0
@@ -300,7 +320,7 @@ class Dropped:
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """Who may talk to the vehicle: anyone on this machine; beyond it a key, or addresses, must be given."""
+    """Access to the vehicle: open on this machine; from other machines a key or addresses are required."""
 
     bind: Address
     to: tuple[Address, ...]
@@ -309,10 +329,10 @@ class Access:
 
 
 def check_access(access: Access) -> None:
-    """Check that whoever can reach the vehicle from another machine is protected against.
+    """Check that access to the vehicle from other machines is protected.
 
-    Beyond loopback, an address to listen at needs a key or a list of allowed addresses, and one to send to needs a key
-    or must be on that list.  Raises FlightError, which names the argument to give.
+    Beyond loopback, an address to listen at needs a key or a list of allowed addresses, and an address to send to needs
+    a key or must be on that list.  Raise FlightError, which names the argument to give.
 
     >>> check_access(Access(("127.0.0.1", 14551), (("127.0.0.1", 14550),)))
     >>> check_access(Access(("0.0.0.0", 14551), ()))
@@ -335,21 +355,24 @@ def check_access(access: Access) -> None:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether an IP address is this machine's own."""
+    """Return True if an IP address is this machine's own."""
     return ipaddress.ip_address(host).is_loopback
 
 
 class Link:
     """The socket and its peers.
 
-    clock: by which peers fall silent and messages are due, also for whoever uses the link; it never goes back, and
-    stands still while the process does.  wall: s since 1970, of signatures.
+    clock: for the silence of peers and the times of messages, also for users of the link; it never goes back, and
+    stands still while the process does.  wall: s since 1970, for signatures.
     """
 
     def __init__(
         self, access: Access, clock: Callable[[], float] | None = None, wall: Callable[[], float] = time.time
     ) -> None:
-        """Open the socket.  Raises FlightError where that is not possible."""
+        """Open the socket.
+
+        Raise FlightError if that is not possible.
+        """
         check_access(access)
         self.access = access
         self.peers: dict[Address, Peer] = {}
@@ -357,7 +380,7 @@ class Link:
         self.clock, self._wall = clock or RunningClock(), wall
         self._signing = Signing(access.key) if access.key is not None else None
         self._decoder = Decoder()
-        # Addresses that a notice names already: strangers, and those whose clock is ahead.
+        # Addresses already named in a notice: unknown senders, and senders whose clock is ahead.
         self._strangers: set[str] = set()
         self._ahead: set[str] = set()
         self._notices: list[str] = []
@@ -377,19 +400,19 @@ class Link:
         self._socket.close()
 
     def fileno(self) -> int:
-        """For `multiprocessing.connection.wait`, which waits for sockets and pipes on any system."""
+        """Return the descriptor for `multiprocessing.connection.wait`, which accepts sockets on any system."""
         return self._socket.fileno()
 
     @property
     def address(self) -> Address:
-        """Where the vehicle listens."""
+        """Address at which the vehicle listens."""
         host, port = self._socket.getsockname()[:2]
         return str(host), int(port)
 
     def receive(self) -> list[tuple[Any, Peer]]:
-        """Messages that have come from stations, each with its sender; everything else has vanished."""
+        """Return the received messages of stations, each with its sender; everything else is dropped."""
         found: list[tuple[Any, Peer]] = []
-        for _ in range(_MAX_AT_ONCE):
+        for _ in range(_MAX_DATAGRAMS_PER_POLL):
             try:
                 data, source = self._socket.recvfrom(LARGEST)
             except BlockingIOError:
@@ -401,7 +424,7 @@ class Link:
         return found
 
     def take(self, data: bytes, source: Address) -> list[tuple[Any, Peer]]:
-        """Messages of one datagram; makes the sender a peer if there is a HEARTBEAT among them."""
+        """Return the messages of one datagram; a HEARTBEAT among them makes the sender a peer."""
         if self.access.allowed and not is_loopback(source[0]) and source[0] not in self.access.allowed:
             self.dropped.address += 1
             return []
@@ -411,41 +434,43 @@ class Link:
                 self.dropped.others += 1
                 continue
             if self._signing is not None and (reason := self._signing.refuses(frame, self._wall())):
-                self._count(reason)
+                self._count_dropped(reason)
                 if reason is Refused.FUTURE:
-                    self._name_ahead(source[0])
+                    self._notice_clock_ahead(source[0])
                 continue
             message = self._decoder.message(frame)
             if message is None:
                 continue
             peer = self.peers.get(source)
-            if frame.number == mavlink.MAVLINK_MSG_ID_HEARTBEAT or self._is_asked_here(message, source):
-                peer = self._heard(source, frame.system, frame.component)
+            if frame.number == mavlink.MAVLINK_MSG_ID_HEARTBEAT or self._is_local_request(message, source):
+                peer = self._register_peer(source, frame.system, frame.component)
             if peer is None:
                 self.dropped.stranger += 1
-                self._name_stranger(message, source[0])
-            elif not self._for_us(message):
+                self._notice_stranger(message, source[0])
+            elif not self._is_for_vehicle(message):
                 self.dropped.others += 1
             else:
                 peer.system, peer.component = frame.system, frame.component
                 found.append((message, peer))
         return found
 
-    def _is_asked_here(self, message: Any, source: Address) -> bool:
-        """Whether somebody on this machine, who need not send heartbeats, addresses the vehicle."""
-        return is_loopback(source[0]) and getattr(message, "target_system", 0) == SYSTEM and self._for_us(message)
+    def _is_local_request(self, message: Any, source: Address) -> bool:
+        """Return True if a message from this machine, where heartbeats are optional, addresses the vehicle."""
+        return (
+            is_loopback(source[0]) and getattr(message, "target_system", 0) == SYSTEM and self._is_for_vehicle(message)
+        )
 
-    def _name_stranger(self, message: Any, host: str) -> None:
-        """Have it said once that an address is not answered, and why."""
-        if host in self._strangers or len(self._strangers) >= _MAX_NAMED or not self._for_us(message):
+    def _notice_stranger(self, message: Any, host: str) -> None:
+        """Add a notice, once for each address, that it gets no answer, and why."""
+        if host in self._strangers or len(self._strangers) >= _MAX_NAMED_STRANGERS or not self._is_for_vehicle(message):
             return
         self._strangers.add(host)
         full = "" if len(self.peers) < MAX_PEERS else f", and {MAX_PEERS} stations are served already"
         self._notices.append(f"{host} sends {message.get_type()} and no HEARTBEAT{full}: it is not answered")
 
-    def _name_ahead(self, host: str) -> None:
-        """Have it said once that an address with the key is not answered, as its clock or ours is wrong."""
-        if host in self._ahead or len(self._ahead) >= _MAX_NAMED:
+    def _notice_clock_ahead(self, host: str) -> None:
+        """Add a notice, once for each address with the key, that its clock or this machine's is wrong."""
+        if host in self._ahead or len(self._ahead) >= _MAX_NAMED_STRANGERS:
             return
         self._ahead.add(host)
         self._notices.append(
@@ -453,11 +478,11 @@ class Link:
         )
 
     def notices(self) -> list[str]:
-        """What is to be said, since the last call, of who is not answered."""
+        """Return the notices since the last call about senders without an answer."""
         found, self._notices = self._notices, []
         return found
 
-    def _count(self, reason: Refused) -> None:
+    def _count_dropped(self, reason: Refused) -> None:
         dropped = self.dropped
         dropped.unsigned += reason is Refused.UNSIGNED
         dropped.forged += reason is Refused.FORGED
@@ -466,26 +491,26 @@ class Link:
         dropped.future += reason is Refused.FUTURE
         dropped.streams += reason is Refused.STREAMS
 
-    def _heard(self, source: Address, system: int, component: int) -> Peer | None:
+    def _register_peer(self, source: Address, system: int, component: int) -> Peer | None:
         now = self.clock()
         self.peers = {key: peer for key, peer in self.peers.items() if now - peer.heard < SILENCE}
         peer = self.peers.get(source)
         if peer is None:
             if len(self.peers) >= MAX_PEERS:
                 return None
-            # One count of frames a station: a second one reads as lost packets there.
-            peer = Peer(source, system, component, now, self._counter(source))
-            # Spread over the first tenth of a second, so that not all is sent at once.
+            # One sequence of frames per station: a station takes a second one for lost packets.
+            peer = Peer(source, system, component, now, self._frame_sequence(source))
+            # Spread over the first tenth of a second, so that not everything is sent at once.
             peer.due = {name: now + 0.1 * k / len(PERIODS) for k, name in enumerate(PERIODS)}
             self.peers[source] = peer
         peer.heard = now
         return peer
 
-    def _counter(self, address: Address) -> Any:
+    def _frame_sequence(self, address: Address) -> Any:
         return self._hello.get(address) or mavlink.MAVLink(None, SYSTEM, COMPONENT)
 
     @staticmethod
-    def _for_us(message: Any) -> bool:
+    def _is_for_vehicle(message: Any) -> bool:
         system = getattr(message, "target_system", 0)
         component = getattr(message, "target_component", 0)
         return system in (0, SYSTEM) and component in (0, COMPONENT)
@@ -497,11 +522,11 @@ class Link:
             del self.peers[key]
 
     def send(self, message: Any, peer: Peer) -> None:
-        """Send a message to a peer.  What the network does not take is lost, as on any radio."""
+        """Send a message to a peer; it is lost if the network does not accept it, as on any radio."""
         self._transmit(message.pack(peer.mav), peer.mav, peer.address)
 
     def send_heartbeat(self, message: Any) -> None:
-        """Send a HEARTBEAT to where stations are expected, and to every peer."""
+        """Send a HEARTBEAT to the expected addresses of stations, and to every peer."""
         for address, mav in self._hello.items():
             if address not in self.peers:
                 self._transmit(message.pack(mav), mav, address)
@@ -515,5 +540,5 @@ class Link:
         try:
             self._socket.sendto(packed, address)
         except OSError:
-            # Nobody listens there, or a buffer is full.
+            # No socket listens there, or a buffer is full.
             return

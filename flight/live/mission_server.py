@@ -1,9 +1,9 @@
-"""The vehicle's side of the MAVLink mission protocol, as a state machine: no socket, no clock of its own.
+"""The vehicle's side of the MAVLink mission protocol, as a state machine without socket and clock.
 
-A mission, a fence and rally points are each taken whole or not at all: an upload is collected beside the list that is
-there and replaces it only when its last item is in and every item is valid.  One station uploads at a time; another is
-denied until the first has been silent for `LOCK` seconds.  (mavlink.io, "Mission Protocol".)  pymavlink has the
-messages and a station's lists (`mavwp`), and nothing of the vehicle's side.
+A mission, a fence and rally points are each accepted whole or not at all: an upload is collected next to the current
+list and replaces it only when its last item has arrived and every item is valid.  One station uploads at a time;
+another is denied until the first has been silent for `LOCK` seconds.  (mavlink.io, "Mission Protocol".)  pymavlink has
+the messages and a station's lists (`mavwp`), but not the vehicle's side.
 """
 
 import math
@@ -31,16 +31,16 @@ from flight.mission.items import (
 from world.errors import MissionError
 
 # ----------------------------------------------------------------------
-# Mission items on the wire: MISSION_ITEM_INT made and parsed, MISSION_ITEM parsed (MAVLink mission protocol).
+# Mission items as messages: MISSION_ITEM_INT made and parsed, MISSION_ITEM parsed (MAVLink mission protocol).
 #
-# Made in the INT form alone: the float MISSION_ITEM moves a waypoint by up to 0.5 m.  pymavlink is imported when a
+# Only the INT form is made: the float MISSION_ITEM moves a waypoint by up to 0.5 m.  pymavlink is imported when a
 # message is made, so that reading files does not wait for it.
 
 _INT32_MAX = 2**31 - 1
 
 
 class MissionType(IntEnum):
-    """MAV_MISSION_TYPE: which of a vehicle's three lists an item belongs to."""
+    """MAV_MISSION_TYPE: the list, of a vehicle's three, to which an item belongs."""
 
     MISSION = 0
     FENCE = 1
@@ -48,7 +48,7 @@ class MissionType(IntEnum):
 
 
 def item_type(item: MissionItem) -> MissionType:
-    """List that an item belongs to, by its command."""
+    """Return the list to which an item belongs, by its command."""
     if item.command in FENCES:
         return MissionType.FENCE
     return MissionType.RALLY if item.command == Command.NAV_RALLY_POINT else MissionType.MISSION
@@ -63,9 +63,9 @@ def to_message(
     seq: int | None = None,
     mission_type: MissionType | None = None,
 ) -> Any:
-    """MISSION_ITEM_INT of an item: x and y are rounded to 1e-7 degrees, never truncated.
+    """Return MISSION_ITEM_INT of an item: x and y are rounded to 1e-7 degrees, never truncated.
 
-    seq: None keeps the item's own number.  mission_type: None takes the one of its command.
+    seq: None keeps the item's own number.  mission_type: None takes the type of its command.
 
     >>> message = to_message(MissionItem(3, 16, 0, (0.0,) * 4, 46.0, 8.0, 500.0))
     >>> message.get_type(), message.seq, message.x
@@ -90,10 +90,12 @@ def to_message(
 
 
 def from_message(message: Any, source: str) -> MissionItem:
-    """Item of a MISSION_ITEM_INT or MISSION_ITEM message; ``source`` names the sender in messages.
+    """Return the item of a MISSION_ITEM_INT or MISSION_ITEM message.
 
-    INT32_MAX in an integer x or y is NaN (MAVLink's "unset").  A float's latitude and longitude go to the nearest
-    1e-7 degrees.  Raises MissionError, one line: item, field, value, what is allowed.
+    ``source`` names the sender in error messages.
+
+    INT32_MAX in an integer x or y is NaN (MAVLink's "unset").  A float's latitude and longitude are rounded to the
+    nearest 1e-7 degrees.  Raise MissionError, one line: item, field, value, what is allowed.
     """
     command, frame = int(message.command), int(message.frame)
     located = is_located(command, frame)
@@ -118,15 +120,15 @@ def from_message(message: Any, source: str) -> MissionItem:
 
 
 # ----------------------------------------------------------------------
-# Missions as stations number them, and as they are flown: home, seq and jumps from one to the other.
+# Missions as numbered by stations, and as flown: home, seq and jumps converted between both.
 
 
 def uploaded(lists: dict[MissionType, tuple[MissionItem, ...]], own: Home) -> tuple[Mission, int]:
-    """Mission of the lists, and what to add to its items' seq for the numbers that stations know.
+    """Return the mission of the lists, and the offset from its items' seq to the stations' numbers.
 
-    Item 0 is home, as ArduPilot has it, if it is a waypoint above mean sea level, or one with no parameter set:
-    MAVSDK's `mission` plugin sends no home, and its waypoints are relative and have a radius.
-    ``own``: the vehicle's home, for a mission that brings none.
+    Item 0 is home, as in ArduPilot, if it is a waypoint above mean sea level, or one with no parameter set: MAVSDK's
+    `mission` plugin sends no home, and its waypoints are relative and have a radius.
+    ``own``: the vehicle's home, for a mission without home.
     """
     items = lists[MissionType.MISSION]
     home = own
@@ -154,7 +156,7 @@ def _is_home(item: MissionItem) -> bool:
 
 
 def listed(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
-    """Lists of a mission as stations see them: home first, seq without gaps, jumps moved with their targets.
+    """Return the lists of a mission for stations: home first, seq without gaps, jumps to the new numbers.
 
     >>> place = MissionItem(4, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> items, fences, rally = listed(Mission(Home(46.0, 8.0, 0.0), (place, replace(place, seq=7))))
@@ -180,9 +182,9 @@ def listed(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
 
 
 def start_problem(mission: Mission, first: int, *, in_flight: bool = False) -> str:
-    """Why a mission cannot be flown from the item of this seq on; "" if it can.
+    """Return why a mission cannot be flown from the item with this seq on; "" if it can.
 
-    in_flight: whether the way there from where the aircraft is will be its first leg.
+    in_flight: True if the leg from the aircraft to the item will be its first leg.
 
     >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> way = Mission(None, (place, replace(place, seq=2), replace(place, seq=3)))
@@ -197,7 +199,7 @@ def start_problem(mission: Mission, first: int, *, in_flight: bool = False) -> s
 
 
 def flown_from(mission: Mission, first: int) -> Mission:
-    """Mission from the item of this seq on, at the speed that the items before it have set; its numbers are kept.
+    """Return the mission from the item with this seq on, with the last speed before it and its numbers.
 
     >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> speed = MissionItem(2, 178, 2, (0.0, 22.0, -1.0, 0.0), 0.0, 0.0, 0.0)
@@ -210,28 +212,41 @@ def flown_from(mission: Mission, first: int) -> Mission:
     return replace(mission, items=(*speeds, *(item for item in mission.items if item.seq >= first)))
 
 
-# Most items that an upload may announce: bounds what a station can make the vehicle hold (some 2 MB a list).
+# Maximum number of items of an upload: bounds the memory that a station can use (some 2 MB a list).
 MAX_UPLOADED = 5_000
-# A request is sent again after `RETRY` s, or half as long again as the item before took, then after twice as long each
-# time, up to `SLOWEST_RETRY`.  A station that is only slow counts them: MAVSDK gives up at the sixth for an item.
-RETRY, SLOWEST_RETRY = 0.05, 0.4
-# An upload's last ACK may be lost, and the station wait for it in silence, as MAVSDK does for five times 0.5 s.  Where
-# other messages of the upload were lost, its last item is asked for again so often, this long apart (s), until it says
-# something else.  Not on a good link: who has the ACK has no use for it, and MAVSDK takes it for its next upload's.
-CONFIRMATIONS, CONFIRM = 4, 0.4
-# A last item that comes twice within this time is a duplicate and gets no ACK again: that would end the next upload, s.
+# Minimum time before a request is repeated, s.  The first repetition comes after 1.5 times the time that the last item
+# took, the next after twice as long each time, up to `SLOWEST_RETRY`.  A slow station counts the repetitions: MAVSDK
+# gives up at the sixth for an item.
+RETRY = 0.05
+# Maximum time before a request is repeated, s.
+SLOWEST_RETRY = 0.4
+# Number of extra requests for an upload's last item.  The last ACK may be lost, while the station waits for it in
+# silence, as MAVSDK does for five times 0.5 s.  If other messages of the upload were lost, its last item is requested
+# again, until the station sends something else.  Not on a good link: a station with the ACK does not need it, and
+# MAVSDK takes it for the ACK of its next upload.
+CONFIRMATIONS = 4
+# Interval of these requests, s.
+CONFIRM = 0.4
+# A last item that arrives twice within this time is a duplicate and gets no second ACK, which would end the next
+# upload, s.
 ACK_AGAIN = 0.3
-# So many requests for a first item that nobody answers are followed by those of before MISSION_REQUEST_INT.
-_OLD_REQUESTS = 4
-# After this silence another station may take over; after the longer one the upload is given up, s.
-LOCK, UPLOAD_TIMEOUT = 1.0, 8.0
+# After this number of unanswered requests for a first item, requests without MISSION_REQUEST_INT are sent.
+_INT_REQUEST_ATTEMPTS = 4
+# Silence after which another station may take over, s.
+LOCK = 1.0
+# Silence after which the upload is given up, s.
+UPLOAD_TIMEOUT = 8.0
 
-# `current` of an item that is no mission's but a place to fly to now, or a height to take.
-_PLACE, _HEIGHT = 2, 3
-_GUIDED = (_PLACE, _HEIGHT)
-_FLOATS = "the upload came as MISSION_ITEM, whose positions are floats: up to 0.5 m off; MISSION_ITEM_INT is exact"
+# `current` of an item that is a place to fly to now.
+_GO_TO_PLACE = 2
+# `current` of an item that is an altitude to fly at now.
+_GO_TO_ALTITUDE = 3
+_GUIDED = (_GO_TO_PLACE, _GO_TO_ALTITUDE)
+_FLOAT_WARNING = (
+    "the upload came as MISSION_ITEM, whose positions are floats: up to 0.5 m off; MISSION_ITEM_INT is exact"
+)
 _FENCE_RETURN = 5000
-_ALLOWED = {
+_ALLOWED_COMMANDS = {
     MissionType.FENCE: FENCES | {_FENCE_RETURN},
     MissionType.RALLY: frozenset({int(Command.NAV_RALLY_POINT)}),
 }
@@ -240,7 +255,7 @@ _NAMES = {MissionType.MISSION: "mission", MissionType.FENCE: "fence", MissionTyp
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """Who sent a message: where it came from, and the system and component that it names."""
+    """Sender of a message: its address, and the system and component in the message."""
 
     address: Hashable
     system: int
@@ -249,7 +264,7 @@ class Station:
 
 @dataclass(frozen=True, slots=True)
 class MissionReply:
-    """A message of the mission protocol for one station; text: for all of them as well, "" for none."""
+    """A message of the mission protocol for one station; text: for all stations, "" for no text."""
 
     station: Station
     message: Any
@@ -260,9 +275,10 @@ class MissionReply:
 class _Upload:
     """An upload in progress.
 
-    heard: when it last sent something; first_asked, asked: when the item that is due was first and last asked for, s of
-    the caller's clock.  wait: how long to wait for it, s.  repeated: whether any request had to be sent again.
-    asked_in_vain: how often the first item was, before any came.  floats: whether items come as MISSION_ITEM.
+    heard: time of its last message; first_asked, asked: first and last request for the current item, s of the caller's
+    clock.  wait: time until the next request, s.  repeated: True if any request was repeated.
+    asked_in_vain: number of requests for the first item before it arrived.  floats: True if items arrive as
+    MISSION_ITEM.
     """
 
     station: Station
@@ -281,8 +297,7 @@ class _Upload:
 class _Finished:
     """An upload that was accepted.
 
-    asked, acknowledged: when its last item was last asked for, and its ACK last sent, s.  left: how often the item may
-    still be asked for.
+    asked, acknowledged: last request for its last item, and its last ACK, s.  left: remaining requests for that item.
     """
 
     station: Station
@@ -292,7 +307,7 @@ class _Finished:
     left: int
 
 
-def _nowhere(_item: MissionItem) -> str:
+def _refuse_go_to(_receive_item: MissionItem) -> str:
     return "go-to denied: not in flight"
 
 
@@ -300,24 +315,27 @@ def _nowhere(_item: MissionItem) -> str:
 class MissionServer:
     """Three lists of items and their transfers.
 
-    lists: what the vehicle holds, seq from 0 on; item 0 of a mission may be home.  changed: the lists that an upload
-    replaced since the caller last cleared it.  locked: a reason why the mission may not change now, "" if it may.
-    go_to: flies to an item's place, at its height, and circles there; latitude and longitude are NaN for where the
-    aircraft is.  Returns why it does not, "" if it does.
+    lists: the vehicle's items, seq from 0 on; item 0 of a mission may be home.  changed: the lists that an upload
+    replaced since the caller last cleared it.  locked: reason why the mission may not change now, "" if it may.
+    go_to: flies to an item's place, at its altitude, and loiters there; latitude and longitude are NaN for the
+    aircraft's position.  Returns why it does not, "" if it does.
     """
 
     lists: dict[MissionType, tuple[MissionItem, ...]] = field(default_factory=lambda: dict.fromkeys(MissionType, ()))
     changed: set[MissionType] = field(default_factory=set)
     locked: str = ""
-    go_to: Callable[[MissionItem], str] = _nowhere
+    go_to: Callable[[MissionItem], str] = _refuse_go_to
     _uploads: dict[MissionType, _Upload] = field(default_factory=dict)
-    # Who finished which list last: its final ACK is repeated if its last item comes again.
+    # Station of the last finished upload of each list: its final ACK is repeated if its last item arrives again.
     _finished: dict[MissionType, _Finished] = field(default_factory=dict)
 
     def handle(self, message: Any, station: Station, now: float) -> list[MissionReply]:
-        """Answer a message of the protocol; any other gets nothing.  ``now``: s, any clock that never goes back."""
+        """Answer a message of the protocol; any other gets no answer.
+
+        ``now``: s, any clock that never goes back.
+        """
         if message.get_type() in _HANDLERS and message.get_type() not in _ITEMS:
-            self._moved_on(station)
+            self._stop_confirmations(station)
         try:
             kind = MissionType(getattr(message, "mission_type", 0))
         except ValueError:
@@ -330,7 +348,7 @@ class MissionServer:
         return handler(self, message, station, kind, now) if handler else []
 
     def tick(self, now: float) -> list[MissionReply]:
-        """Ask again for what did not come, or may not have arrived; give up uploads that have gone silent."""
+        """Repeat requests for missing items, or for the last item, and give up silent uploads."""
         replies = []
         for kind, upload in list(self._uploads.items()):
             if now - upload.heard > UPLOAD_TIMEOUT:
@@ -351,9 +369,9 @@ class MissionServer:
                 replies.append(_request(done.station, done.count - 1, kind))
         return replies
 
-    def _count(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+    def _begin_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         count = int(message.count)
-        refusal = self._refusal(station, kind, now)
+        refusal = self._upload_refusal(station, kind, now)
         if refusal:
             return [self._ack(station, mavlink.MAV_MISSION_DENIED, kind, refusal)]
         if count > MAX_UPLOADED:
@@ -362,26 +380,26 @@ class MissionServer:
         self._drop_other_uploads(station)
         if count == 0:
             return self._clear(station, (kind,), kind, now)
-        # A count always starts anew: a station that starts over with as many items must not have them mixed.
+        # A count always begins a new upload: items of a station that starts over with the same count must not be mixed.
         upload = self._uploads[kind] = _Upload(station, count, now, now, now)
         self._finished.pop(kind, None)
         return [self._request(upload, kind, now)]
 
-    def _guided(self, message: Any, station: Station, kind: MissionType) -> MissionReply:
+    def _handle_go_to(self, message: Any, station: Station, kind: MissionType) -> MissionReply:
         try:
             item = from_message(message, "go-to")
         except MissionError as error:
             return self._ack(station, mavlink.MAV_MISSION_INVALID, kind, str(error))
-        if message.current != _PLACE:
+        if message.current != _GO_TO_PLACE:
             item = replace(item, lat_deg=math.nan, lon_deg=math.nan)
         problem = self.go_to(item)
         result = mavlink.MAV_MISSION_DENIED if problem else mavlink.MAV_MISSION_ACCEPTED
         return self._ack(station, result, kind, problem)
 
-    def _item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+    def _receive_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         upload = self._uploads.get(kind)
         if message.current in _GUIDED and (upload is None or upload.station != station):
-            return [self._guided(message, station, kind)]
+            return [self._handle_go_to(message, station, kind)]
         if upload is None or upload.station != station:
             done = self._finished.get(kind)
             known = done is not None and (done.station, done.count) == (station, message.seq + 1)
@@ -392,15 +410,15 @@ class MissionServer:
             return []
         upload.heard = now
         if message.seq != len(upload.items):
-            # A duplicate, or one that was overtaken; what is missing is asked for again in time.
+            # A duplicate, or an item out of order; the missing one is requested again in time.
             return []
         try:
             item = from_message(message, _NAMES[kind])
         except MissionError as error:
-            return [self._fail(upload, kind, _result_of(message), str(error))]
-        wrong = _misplaced(item, kind)
+            return [self._reject_upload(upload, kind, _refusal_result(message), str(error))]
+        wrong = _placement_problem(item, kind)
         if wrong:
-            return [self._fail(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, wrong)]
+            return [self._reject_upload(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, wrong)]
         upload.items.append(item)
         upload.floats = message.get_type() == "MISSION_ITEM"
         upload.wait = min(max(RETRY, 1.5 * (now - upload.first_asked)), SLOWEST_RETRY)
@@ -412,9 +430,9 @@ class MissionServer:
         self.changed.add(kind)
         self._finished[kind] = _Finished(station, upload.count, now, now, CONFIRMATIONS if upload.repeated else 0)
         floats = message.get_type() == "MISSION_ITEM"
-        return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind, _FLOATS if floats else "")]
+        return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind, _FLOAT_WARNING if floats else "")]
 
-    def _list(self, _message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
+    def _send_count(self, _message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
         count = len(self.lists[kind])
         return [
             MissionReply(
@@ -422,7 +440,7 @@ class MissionServer:
             )
         ]
 
-    def _wanted(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
+    def _send_item(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
         items = self.lists[kind]
         if not message.seq < len(items):
             return [self._ack(station, mavlink.MAV_MISSION_INVALID_SEQUENCE, kind)]
@@ -435,12 +453,12 @@ class MissionServer:
         )
         return [MissionReply(station, item)]
 
-    def _clear_one(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+    def _clear_list(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         return self._clear(station, (kind,), kind, now)
 
     def _clear(self, station: Station, kinds: tuple[MissionType, ...], named: int, now: float) -> list[MissionReply]:
         for kind in kinds:
-            refusal = self._refusal(station, kind, now)
+            refusal = self._upload_refusal(station, kind, now)
             if refusal:
                 return [self._ack(station, mavlink.MAV_MISSION_DENIED, named, refusal)]
         for kind in kinds:
@@ -451,25 +469,25 @@ class MissionServer:
                 self.changed.add(kind)
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, named)]
 
-    def _stopped(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
-        """Let a station that gives up (MISSION_ACK with an error) free the lock."""
+    def _cancel_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+        """Free the lock of a station that gives up (MISSION_ACK with an error)."""
         upload = self._uploads.get(kind)
         if upload is None or upload.station != station or message.type == mavlink.MAV_MISSION_ACCEPTED:
             return []
-        if message.type == mavlink.MAV_MISSION_UNSUPPORTED and upload.asked_in_vain >= _OLD_REQUESTS:
-            # It knows MISSION_REQUEST_INT alone, and did not get those.
+        if message.type == mavlink.MAV_MISSION_UNSUPPORTED and upload.asked_in_vain >= _INT_REQUEST_ATTEMPTS:
+            # It accepts only MISSION_REQUEST_INT, and did not get those.
             upload.asked_in_vain = 0
             return [self._request(upload, kind, now)]
         del self._uploads[kind]
         return []
 
-    def _moved_on(self, station: Station) -> None:
-        """Ask a station that speaks of something else for nothing that is finished."""
+    def _stop_confirmations(self, station: Station) -> None:
+        """Stop requests to a station for its finished uploads: it sends other messages now."""
         for done in self._finished.values():
             if done.station == station:
                 done.left = 0
 
-    def _refusal(self, station: Station, kind: MissionType, now: float) -> str:
+    def _upload_refusal(self, station: Station, kind: MissionType, now: float) -> str:
         if self.locked and kind == MissionType.MISSION:
             return self.locked
         for upload in self._uploads.values():
@@ -478,16 +496,16 @@ class MissionServer:
         return ""
 
     def _drop_other_uploads(self, station: Station) -> None:
-        """Forget the uploads of other stations, which have gone silent, when one takes the lock."""
+        """Drop the uploads of other stations, which have gone silent, when a station takes the lock."""
         self._uploads = {kind: upload for kind, upload in self._uploads.items() if upload.station == station}
 
     def _request(self, upload: _Upload, kind: MissionType, now: float) -> MissionReply:
         upload.asked = now
-        if upload.asked_in_vain >= _OLD_REQUESTS or upload.floats:
+        if upload.asked_in_vain >= _INT_REQUEST_ATTEMPTS or upload.floats:
             return _request(upload.station, len(upload.items), kind, mavlink.MAVLink_mission_request_message)
         return _request(upload.station, len(upload.items), kind)
 
-    def _fail(self, upload: _Upload, kind: MissionType, result: int, text: str) -> MissionReply:
+    def _reject_upload(self, upload: _Upload, kind: MissionType, result: int, text: str) -> MissionReply:
         del self._uploads[kind]
         return self._ack(upload.station, result, kind, f"{text}; nothing changed")
 
@@ -502,14 +520,18 @@ def _request(
     return MissionReply(station, form(station.system, station.component, seq, int(kind)))
 
 
-def _misplaced(item: MissionItem, kind: MissionType) -> str:
-    """Why an item does not belong into a list; "" if it does."""
-    fits = item.command in _ALLOWED[kind] if kind in _ALLOWED else item.command not in _ALLOWED[MissionType.FENCE]
+def _placement_problem(item: MissionItem, kind: MissionType) -> str:
+    """Return why an item does not belong into a list; "" if it does."""
+    fits = (
+        item.command in _ALLOWED_COMMANDS[kind]
+        if kind in _ALLOWED_COMMANDS
+        else item.command not in _ALLOWED_COMMANDS[MissionType.FENCE]
+    )
     return "" if fits else f"{_NAMES[kind]}: item {item.seq}: command {item.command} does not belong there"
 
 
-def _result_of(message: Any) -> int:
-    """MAV_MISSION_RESULT for an item that `from_message` refused: which number it was about."""
+def _refusal_result(message: Any) -> int:
+    """Return MAV_MISSION_RESULT for an item that `from_message` refused, by the invalid number."""
     degree = 1.0 if message.get_type() == "MISSION_ITEM" else 1e7
     if abs(message.x) > 90.0 * degree:
         return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
@@ -520,12 +542,12 @@ def _result_of(message: Any) -> int:
 
 _ITEMS = ("MISSION_ITEM_INT", "MISSION_ITEM")
 _HANDLERS = {
-    "MISSION_COUNT": MissionServer._count,
-    "MISSION_ITEM_INT": MissionServer._item,
-    "MISSION_ITEM": MissionServer._item,
-    "MISSION_REQUEST_LIST": MissionServer._list,
-    "MISSION_REQUEST_INT": MissionServer._wanted,
-    "MISSION_REQUEST": MissionServer._wanted,
-    "MISSION_CLEAR_ALL": MissionServer._clear_one,
-    "MISSION_ACK": MissionServer._stopped,
+    "MISSION_COUNT": MissionServer._begin_upload,
+    "MISSION_ITEM_INT": MissionServer._receive_item,
+    "MISSION_ITEM": MissionServer._receive_item,
+    "MISSION_REQUEST_LIST": MissionServer._send_count,
+    "MISSION_REQUEST_INT": MissionServer._send_item,
+    "MISSION_REQUEST": MissionServer._send_item,
+    "MISSION_CLEAR_ALL": MissionServer._clear_list,
+    "MISSION_ACK": MissionServer._cancel_upload,
 }

@@ -1,4 +1,4 @@
-"""What a station may ask of the vehicle beside missions: commands, modes, parameters, messages and their rates."""
+"""Requests of a station other than missions: commands, modes, parameters, messages and their rates."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -26,46 +26,46 @@ from flight.mission.items import Command, Frame, MissionItem, is_located, item_p
 from world.errors import PlanflyError
 
 # ----------------------------------------------------------------------
-# The vehicle's parameters: what a ground station reads, and those that it may set.
+# The vehicle's parameters: readable by ground stations, and partly settable.
 
 FORCE = "PFLY_FORCE"
-# Parameters sent a second to a station that asked for all.
+# Number of parameters sent per second to a station that asked for all.
 PARAMETERS_PER_SECOND = 200.0
-_FIXED = "is fixed by the aircraft or the scenario"
+_FIXED_REASON = "is fixed by the aircraft or the scenario"
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """One parameter; values travel as float32.
 
-    low, high: what a station may set; high is None where it may not.
-    fixed: why it may not.
-    flies: whether it belongs to the law that flies: it is set on the ground, and the mission is judged anew.
+    low, high: range that a station may set; high is None for a fixed parameter.
+    fixed: reason why it is fixed.
+    flies: True for a parameter of the law that flies: it is set on the ground, and the mission is judged again.
     """
 
     name: str
     value: float
     low: float = 0.0
     high: float | None = None
-    fixed: str = _FIXED
+    fixed: str = _FIXED_REASON
     flies: bool = False
 
 
-def _nothing_flies(_stated: Mapping[str, float]) -> Mapping[str, float]:
+def _no_flown_parameters(_stated: Mapping[str, float]) -> Mapping[str, float]:
     return {}
 
 
 @dataclass(slots=True)
 class Parameters:
-    """Parameters by number and by name; names as the autopilot's, where it has one for the same thing.
+    """Parameters by number and by name, with the autopilot's name if it has the same parameter.
 
-    flown: what the law flies with, by name, where a station has stated some of it.  Raises PlanflyError for values that
-    are not allowed.
-    stated: what stations have set of the law's.
+    flown: returns the law's parameters by name, for the values that stations have stated.  Raises PlanflyError for
+    values that are not allowed.
+    stated: values of the law's parameters that stations have set.
     """
 
     entries: list[Parameter]
-    flown: Callable[[Mapping[str, float]], Mapping[str, float]] = _nothing_flies
+    flown: Callable[[Mapping[str, float]], Mapping[str, float]] = _no_flown_parameters
     stated: dict[str, float] = field(default_factory=dict)
     _numbers: dict[str, int] = field(init=False)
 
@@ -74,38 +74,50 @@ class Parameters:
         self._numbers = {entry.name: k for k, entry in enumerate(self.entries)}
 
     def __getitem__(self, name: str) -> float:
-        """Value of a parameter.  Raises KeyError."""
+        """Return the value of a parameter.
+
+        Raise KeyError for an unknown name.
+        """
         return self.entries[self._numbers[name]].value
 
     def put(self, name: str, value: float) -> None:
-        """Change a value from within.  Raises KeyError."""
+        """Change a value from within planfly.
+
+        Raise KeyError for an unknown name.
+        """
         k = self._numbers[name]
         self.entries[k] = replace(self.entries[k], value=value)
 
     def message(self, number: int) -> Any:
-        """PARAM_VALUE of a parameter, by number."""
+        """Return PARAM_VALUE of a parameter, by number."""
         entry = self.entries[number]
         return mavlink.MAVLink_param_value_message(
             entry.name.encode(), entry.value, mavlink.MAV_PARAM_TYPE_REAL32, len(self.entries), number
         )
 
     def find(self, name: bytes, number: int) -> int | None:
-        """Number of the parameter that a PARAM_REQUEST_READ or PARAM_SET names (number -1: by name), None if none."""
+        """Return the number of the parameter in a PARAM_REQUEST_READ or PARAM_SET, or None if it is unknown.
+
+        number: -1 to find it by name.
+        """
         if number >= 0:
             return number if number < len(self.entries) else None
-        return self._numbers.get(_text(name))
+        return self._numbers.get(_decode_name(name))
 
     def set(self, name: bytes, value: float, *, in_flight: bool = False) -> tuple[int | None, str]:
-        """Set a parameter as a station asks: its number (None: no such one), and why it was refused ("" if set)."""
-        number = self._numbers.get(_text(name))
+        """Set a parameter for a station.
+
+        Return its number (None if it is unknown), and why it was refused ("" if it was set).
+        """
+        number = self._numbers.get(_decode_name(name))
         if number is None:
-            return None, f"{_text(name)}: no such parameter"
+            return None, f"{_decode_name(name)}: no such parameter"
         entry = self.entries[number]
         kept = f"{entry.value:g} kept"
         if entry.flies:
             if in_flight:
                 return number, f"{entry.name} {value:g} refused in flight, which is logged with one set; {kept}"
-            return number, self._state(entry, value)
+            return number, self._set_law_parameter(entry, value)
         if entry.high is None:
             return number, f"{entry.name} {entry.fixed}: {kept}"
         if not (math.isfinite(value) and entry.low <= value <= entry.high):
@@ -113,18 +125,18 @@ class Parameters:
         self.put(entry.name, value)
         return number, ""
 
-    def _state(self, entry: Parameter, value: float) -> str:
-        """Have the law fly with a value; why it does not, "" if it does."""
+    def _set_law_parameter(self, entry: Parameter, value: float) -> str:
+        """Change a parameter of the law; return why it was refused, "" if it was changed."""
         if not math.isfinite(value):
             return f"{entry.name} {value:g}: a finite number is expected; {entry.value:g} kept"
-        # 0.7 travels as 0.699999988: the number that a person typed is the shortest of those that travel so.
+        # 0.7 travels as 0.699999988: the number that was typed is the shortest one with the same float32.
         stated = self.stated | {entry.name: float(str(np.float32(value)))}
         try:
             values = self.flown(stated)
         except PlanflyError as error:
             return f"{error}; {entry.value:g} kept"
         if values[entry.name] != stated[entry.name]:
-            return f"{entry.name} {_FIXED}: {entry.value:g} kept"
+            return f"{entry.name} {_FIXED_REASON}: {entry.value:g} kept"
         self.stated = stated
         for name, flown in values.items():
             self.put(name, flown)
@@ -139,17 +151,17 @@ def vehicle_parameters(
     max_bank_deg: float,
     system: int,
     speed: float,
-    flown: Callable[[Mapping[str, float]], Mapping[str, float]] = _nothing_flies,
+    flown: Callable[[Mapping[str, float]], Mapping[str, float]] = _no_flown_parameters,
     not_flown: Iterable[str] = (),
 ) -> Parameters:
-    """Parameters of a vehicle and of the law that flies it, by the autopilot's names, in the order of the alphabet.
+    """Return the parameters of a vehicle and of its law, by the autopilot's names, in alphabetical order.
 
     airspeed, slowest, fastest: m/s.
     max_bank_deg: degrees.
     system: the vehicle's MAVLink system id.
     speed: times real time.
-    flown: as of `Parameters`; what it has takes the place of the vehicle's own of the same name.
-    not_flown: of the law's parameters, those that no flight shows, which cannot be set.
+    flown: as in `Parameters`; its names replace the vehicle's own.
+    not_flown: parameters of the law that are not flown, which cannot be set.
 
     >>> parameters = vehicle_parameters(
     ...     airspeed=25.0, slowest=18.0, fastest=31.0, max_bank_deg=30.0, system=1, speed=1.0,
@@ -185,17 +197,18 @@ def vehicle_parameters(
     return Parameters([entries[name] for name in sorted(entries)], flown)
 
 
-def _text(name: bytes | str) -> str:
+def _decode_name(name: bytes | str) -> str:
     data = name.encode("latin-1", "replace") if isinstance(name, str) else name
     return data.split(b"\0")[0].decode("ascii", "replace")[:16]
 
 
 # INT32_MAX in a latitude or longitude: not set.
-_UNSET = 2**31 - 1
-# No message is sent more often than this, s.
-_SHORTEST = 0.02
-_LONGEST = 3600.0
-# Arm commands that wait for a verdict.
+_UNSET_COORDINATE = 2**31 - 1
+# Minimum interval between two messages of a kind, s.
+_MIN_PERIOD_S = 0.02
+# Maximum interval between two messages of a kind, s.
+_MAX_PERIOD_S = 3600.0
+# Number of arm commands that may wait for a verdict.
 _MAX_WAITING = 16
 
 
@@ -206,12 +219,12 @@ class PeerMessage(NamedTuple):
     message: Any
 
 
-# What a request brings about; a text is for all stations.
+# Response to a request; a text is for all stations.
 Response = PeerMessage | StatusText
 
 
 @dataclass(frozen=True, slots=True)
-class _Waiting:
+class _WaitingArmCommand:
     """An arm command that waits for the verdict; param1, param2: of MAV_CMD_COMPONENT_ARM_DISARM."""
 
     peer: Peer
@@ -225,72 +238,75 @@ class _Waiting:
 class Requests:
     """Answers requests with messages for the station, and texts for all of them.
 
-    start_at: has the next flight start at an item, by the station's number.
+    start_at: sets the start of the next flight to an item, by the station's number.
     """
 
     arming: ArmingState
     parameters: Parameters
     status: Status
     start_at: Callable[[int], CommandResult]
-    _waiting: list[_Waiting] = field(default_factory=list)
+    _waiting: list[_WaitingArmCommand] = field(default_factory=list)
 
     def handle(self, message: Any, peer: Peer, now: float) -> list[Response]:
-        """Answer a message; one that is no request of these gets nothing."""
+        """Answer a message; a message that is not one of these requests gets no answer."""
         handler = _HANDLERS.get(message.get_type())
         return handler(self, message, peer, now) if handler else []
 
     def verdict_came(self) -> list[Response]:
-        """Answer the arm commands that waited for it."""
+        """Answer the arm commands that waited for the verdict."""
         waiting, self._waiting = self._waiting, []
         replies: list[Response] = []
         for item in waiting:
             reply = self.arming.arm(item.param1 == 1.0, item.param2)
-            replies += self._answered(item.peer, item.system, item.component, _ARM, reply)
+            replies += self._acknowledge(item.peer, item.system, item.component, _ARM_COMMAND, reply)
         return replies
 
     def _command(self, message: Any, peer: Peer, now: float) -> list[Response]:
         system, component = message.get_srcSystem(), message.get_srcComponent()
         number = int(message.command)
-        if number == _ARM:
+        if number == _ARM_COMMAND:
             reply = self.arming.arm(message.param1 == 1.0, message.param2)
             if reply.result == IN_PROGRESS:
                 if len(self._waiting) < _MAX_WAITING:
-                    self._waiting.append(_Waiting(peer, system, component, message.param1, message.param2))
+                    self._waiting.append(_WaitingArmCommand(peer, system, component, message.param1, message.param2))
                 else:
                     reply = CommandResult(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
-            return self._answered(peer, system, component, number, reply)
+            return self._acknowledge(peer, system, component, number, reply)
         if number in _MESSAGE_COMMANDS:
             reply, extra = self._message_command(number, message, peer, now)
         else:
             reply, extra = self._flight_command(number, message), []
-        return [*self._answered(peer, system, component, number, reply), *(PeerMessage(peer, item) for item in extra)]
+        return [
+            *self._acknowledge(peer, system, component, number, reply),
+            *(PeerMessage(peer, item) for item in extra),
+        ]
 
     def _flight_command(self, number: int, message: Any) -> CommandResult:
         if number == mavlink.MAV_CMD_DO_SET_MODE:
-            return self.arming.set_mode(_whole(message.param2))
+            return self.arming.set_mode(_to_integer(message.param2))
         if number == mavlink.MAV_CMD_MISSION_START:
             return self.arming.start()
         if number == mavlink.MAV_CMD_DO_PAUSE_CONTINUE:
             return self.arming.pause(message.param1 == 1)
-        if number in _MODES:
-            return self.arming.set_mode(_MODES[number])
+        if number in _MODE_COMMANDS:
+            return self.arming.set_mode(_MODE_COMMANDS[number])
         if number == mavlink.MAV_CMD_DO_REPOSITION:
-            place = _place(message)
+            place = _parse_place(message)
             return CommandResult(DENIED, _NO_PLACE) if place is None else self.arming.go_to(place)
         if number == mavlink.MAV_CMD_DO_SET_MISSION_CURRENT:
-            return self.start_at(_whole(message.param1))
+            return self.start_at(_to_integer(message.param1))
         return CommandResult(UNSUPPORTED, _NOT_FLOWN.get(number, ""))
 
     def _message_command(self, number: int, message: Any, peer: Peer, now: float) -> tuple[CommandResult, list[Any]]:
         named = _MESSAGE_COMMANDS[number]
-        wanted = _whole(message.param1) if named is None else named
+        wanted = _to_integer(message.param1) if named is None else named
         kind = mavlink.mavlink_map.get(wanted)
         name = kind.msgname if kind is not None else ""
         if number == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
-            kind = mavlink.mavlink_map.get(_whole(message.param1))
+            kind = mavlink.mavlink_map.get(_to_integer(message.param1))
             return self._set_interval(kind.msgname if kind else "", message.param2, peer, now), []
         if number == mavlink.MAV_CMD_GET_MESSAGE_INTERVAL:
-            wanted = _whole(message.param1)
+            wanted = _to_integer(message.param1)
             kind = mavlink.mavlink_map.get(wanted)
             period = peer.periods.get(kind.msgname) if kind is not None else None
             interval = -1 if period is None else round(period * 1e6)
@@ -306,14 +322,14 @@ class Requests:
         if interval < 0:
             peer.periods[name] = None
         else:
-            peer.periods[name] = min(_LONGEST, max(_SHORTEST, interval / 1e6)) if interval else PERIODS[name]
+            peer.periods[name] = min(_MAX_PERIOD_S, max(_MIN_PERIOD_S, interval / 1e6)) if interval else PERIODS[name]
             peer.due[name] = now
         return CommandResult(ACCEPTED)
 
-    def _streams(self, message: Any, peer: Peer, now: float) -> list[Response]:
+    def _set_streams(self, message: Any, peer: Peer, now: float) -> list[Response]:
         for name in STREAMS.get(int(message.req_stream_id), ()):
             rate = int(message.req_message_rate)
-            period = min(_LONGEST, max(_SHORTEST, 1.0 / rate)) if message.start_stop and rate else None
+            period = min(_MAX_PERIOD_S, max(_MIN_PERIOD_S, 1.0 / rate)) if message.start_stop and rate else None
             peer.periods[name] = period
             peer.due[name] = now
         return []
@@ -322,15 +338,15 @@ class Requests:
         reply = self.arming.set_mode(int(message.custom_mode))
         # SET_MODE is a message; ArduPilot acknowledges it as the command of its number.
         number = mavlink.MAVLINK_MSG_ID_SET_MODE
-        return self._answered(peer, message.get_srcSystem(), message.get_srcComponent(), number, reply)
+        return self._acknowledge(peer, message.get_srcSystem(), message.get_srcComponent(), number, reply)
 
     def _mission_set_current(self, message: Any, peer: Peer, now: float) -> list[Response]:
         reply = self.start_at(int(message.seq))
         if reply.result == ACCEPTED:
             return [PeerMessage(peer, telemetry_message("MISSION_CURRENT", self.status))]
-        # The message has no refusal, and MAVSDK asks again, without end, at each MISSION_CURRENT of another item: it
-        # gives up when it gets none for as long as it tries.  One that was on its way already still traps it.
-        peer.due["MISSION_CURRENT"] = now + _QUIET
+        # The message has no refusal, and MAVSDK repeats it without end, at each MISSION_CURRENT of another item; it
+        # gives up if it gets none during its timeout.  One that was on its way already still traps it.
+        peer.due["MISSION_CURRENT"] = now + _MISSION_CURRENT_PAUSE_S
         return [StatusText(reply.text, WARNING)]
 
     def _go_to(self, _message: Any, _peer: Peer, _now: float) -> list[Response]:
@@ -368,7 +384,7 @@ class Requests:
         return [PeerMessage(peer, mavlink.MAVLink_timesync_message(int(self.status.wall * 1e9), message.ts1))]
 
     @staticmethod
-    def _answered(peer: Peer, system: int, component: int, number: int, reply: CommandResult) -> list[Response]:
+    def _acknowledge(peer: Peer, system: int, component: int, number: int, reply: CommandResult) -> list[Response]:
         ack = mavlink.MAVLink_command_ack_message(number, reply.result, 0, 0, system, component)
         replies: list[Response] = [PeerMessage(peer, ack)]
         if reply.text:
@@ -376,16 +392,16 @@ class Requests:
         return replies
 
 
-def _place(message: Any) -> Place | None:
-    """The place that MAV_CMD_DO_REPOSITION names; None for one that is no place."""
+def _parse_place(message: Any) -> Place | None:
+    """Return the place in MAV_CMD_DO_REPOSITION, or None if it is invalid."""
     if message.get_type() == "COMMAND_INT":
-        lat, lon = (math.nan if value == _UNSET else value / 1e7 for value in (message.x, message.y))
+        lat, lon = (math.nan if value == _UNSET_COORDINATE else value / 1e7 for value in (message.x, message.y))
         alt, frame = float(message.z), int(message.frame)
     else:
         lat, lon, alt = float(message.param5), float(message.param6), float(message.param7)
         frame = int(Frame.GLOBAL)
     radius = float(message.param3) if math.isfinite(message.param3) else 0.0
-    # What is not a number stands for where the aircraft is.
+    # NaN stands for the aircraft's position.
     north, east, up = (0.0 if math.isnan(value) else value for value in (lat, lon, alt))
     item = MissionItem(0, int(Command.NAV_LOITER_TIME), frame, (0.0, 0.0, radius, 0.0), north, east, up)
     if not is_located(item.command, frame) or item_problem(item) is not None:
@@ -393,20 +409,20 @@ def _place(message: Any) -> Place | None:
     return Place(lat, lon, alt, frame, radius)
 
 
-def _whole(value: float) -> int:
-    """Whole number that a command's float parameter stands for, -1 for none."""
+def _to_integer(value: float) -> int:
+    """Return the integer in a command's float parameter, or -1 if it is not one."""
     return int(value) if math.isfinite(value) and 0 <= value < 2**24 else -1
 
 
-# After a refused MISSION_SET_CURRENT a station gets no MISSION_CURRENT for this time, s.
-_QUIET = 3.0
-# MAV_CMD_DO_ORBIT, a name that pymavlink 2.4.41 has not.
+# Time without MISSION_CURRENT after a refused MISSION_SET_CURRENT, s.
+_MISSION_CURRENT_PAUSE_S = 3.0
+# MAV_CMD_DO_ORBIT, which pymavlink 2.4.41 does not have.
 _DO_ORBIT = 34
 _NO_GUIDED = "target refused: MAV_CMD_DO_REPOSITION, or a MISSION_ITEM_INT with current 2, sends it to a place"
 _NO_PLACE = "go-to denied: a latitude of -90..90, a longitude of -180..180 and a finite height are expected"
-# Commands that are modes by another name.
-_MODES = {mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: RTL, mavlink.MAV_CMD_NAV_LOITER_UNLIM: LOITER}
-# Commands that this aircraft is not flown by; and what to do.
+# Commands that are equivalent to a mode.
+_MODE_COMMANDS = {mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: RTL, mavlink.MAV_CMD_NAV_LOITER_UNLIM: LOITER}
+# Commands that do not control this aircraft, with an alternative.
 _NOT_FLOWN: dict[int, str] = {
     mavlink.MAV_CMD_DO_CHANGE_SPEED: "speed change refused: put DO_CHANGE_SPEED into the mission",
     _DO_ORBIT: "orbit refused: put a loiter into the mission",
@@ -415,8 +431,8 @@ _NOT_FLOWN: dict[int, str] = {
     mavlink.MAV_CMD_NAV_LAND: "landing refused: put NAV_LAND into the mission and start it",
     mavlink.MAV_CMD_DO_SET_HOME: "home refused: it is item 0 of the mission",
 }
-_ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
-# Commands about messages; those that ask for one message by their own number name it.
+_ARM_COMMAND = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+# Commands about messages, with the number of the message if the command implies it.
 _MESSAGE_COMMANDS: dict[int, int | None] = {
     mavlink.MAV_CMD_REQUEST_MESSAGE: None,
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: None,
@@ -431,7 +447,7 @@ _HANDLERS: dict[str, Callable[[Requests, Any, Peer, float], list[Response]]] = {
     "MISSION_SET_CURRENT": Requests._mission_set_current,
     "SET_POSITION_TARGET_GLOBAL_INT": Requests._go_to,
     "SET_POSITION_TARGET_LOCAL_NED": Requests._go_to,
-    "REQUEST_DATA_STREAM": Requests._streams,
+    "REQUEST_DATA_STREAM": Requests._set_streams,
     "PARAM_REQUEST_LIST": Requests._list_parameters,
     "PARAM_REQUEST_READ": Requests._read_parameter,
     "PARAM_SET": Requests._write_parameter,

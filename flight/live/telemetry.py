@@ -1,4 +1,4 @@
-"""Telemetry: MAVLink messages of a state snapshot, and how often each is sent."""
+"""Telemetry: MAVLink messages of a state snapshot, and their rates."""
 
 import math
 import struct
@@ -25,11 +25,11 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """Where the aircraft is and what it does at one time; SI and radians, north and east true, heights AMSL.
+    """State of the aircraft at one time; SI and radians, north and east true, altitudes AMSL.
 
-    height: above ground, NaN where unknown.  v_north, v_east, v_down: over the ground.  p, q, r: body rates.
-    throttle: 0..1.  wind_north, wind_east: the way the air moves.  current: A.  energy: Wh used.  leg: the active one,
-    -1 before the start.
+    height: above ground, NaN if unknown.  v_north, v_east, v_down: over the ground.  p, q, r: body rates.
+    throttle: 0..1.  wind_north, wind_east: velocity of the air.  current: A.  energy: Wh used.  leg: the active one, -1
+    before the start.
     """
 
     time: float
@@ -55,26 +55,29 @@ class Snapshot:
     leg: float = -1.0
 
     def pack(self) -> bytes:
-        """Bytes of the snapshot, always as many.
+        """Return the bytes of the snapshot, a fixed number.
 
         >>> parked = Snapshot(time=0.0, lat_deg=46.0, lon_deg=8.0, amsl=500.0, height=100.0)
         >>> Snapshot.unpack(parked.pack()) == parked
         True
         """
-        return _FORM.pack(*astuple(self))
+        return _SNAPSHOT_FORMAT.pack(*astuple(self))
 
     @staticmethod
     def unpack(data: bytes) -> "Snapshot":
-        """Snapshot of the bytes that `pack` gave.  Raises struct.error for another number of bytes."""
-        return Snapshot(*_FORM.unpack(data))
+        """Return the snapshot from the bytes of `pack`.
+
+        Raise struct.error for another number of bytes.
+        """
+        return Snapshot(*_SNAPSHOT_FORMAT.unpack(data))
 
     @property
     def finite(self) -> bool:
-        """Whether it can be sent to a station: a flight may end in numbers that are none."""
+        """True if it can be sent to a station: a flight may end with values that are not finite."""
         return all(math.isfinite(value) for value in astuple(replace(self, height=0.0)))
 
 
-_FORM = struct.Struct(f"<{len(fields(Snapshot))}d")
+_SNAPSHOT_FORMAT = struct.Struct(f"<{len(fields(Snapshot))}d")
 
 
 class SnapshotMaker:
@@ -90,7 +93,7 @@ class SnapshotMaker:
         self._map = local_map
 
     def before_start(self, setup: FlightSetup) -> Snapshot:
-        """Snapshot of an aircraft that waits at the route's start, on the course of its first leg."""
+        """Return the snapshot of an aircraft that waits at the route's start, on the course of its first leg."""
         points = setup.route.waypoints
         step = points[1] - points[0]
         terrain = setup.scenario.terrain
@@ -103,13 +106,13 @@ class SnapshotMaker:
         return self.snapshot(row)
 
     def snapshot(self, row: Record) -> Snapshot:
-        """Snapshot of a flown row, a record of `flight.simulation.track.TRACK_ROW`."""
+        """Return the snapshot of a flown row, a record of `flight.simulation.track.TRACK_ROW`."""
         east, north, amsl = (float(value) for value in row.position)
         lat, lon = (float(value) for value in to_geo(self._origin, east, north))
-        # A map course is the true course and this.
+        # A map course is the true course plus this angle.
         turn = self._map.convergence(lat, lon) if math.isfinite(lat) and math.isfinite(lon) else 0.0
-        v_east, v_north, v_up = _turned(row.velocity, turn)
-        wind_east, wind_north, _ = _turned(row.wind, turn)
+        v_east, v_north, v_up = _to_true(row.velocity, turn)
+        wind_east, wind_north, _ = _to_true(row.wind, turn)
         roll, pitch, yaw = (float(value) for value in row.attitude)
         p, q, r = (float(value) for value in row.rates)
         return Snapshot(
@@ -123,7 +126,7 @@ class SnapshotMaker:
             v_down=-v_up,
             roll=roll,
             pitch=pitch,
-            yaw=_wrapped(yaw - turn),
+            yaw=_wrap(yaw - turn),
             p=p,
             q=q,
             r=r,
@@ -137,24 +140,32 @@ class SnapshotMaker:
         )
 
 
-def _turned(vector: Floats, turn: float) -> tuple[float, float, float]:
-    """East, north and up on the map as true east, north and up."""
+def _to_true(vector: Floats, turn: float) -> tuple[float, float, float]:
+    """Return a vector east, north and up on the map as true east, north and up."""
     east, north, up = (float(value) for value in vector)
     cos, sin = math.cos(turn), math.sin(turn)
     return east * cos - north * sin, north * cos + east * sin, up
 
 
-def _wrapped(angle: float) -> float:
+def _wrap(angle: float) -> float:
     return math.remainder(angle, 2.0 * math.pi)
 
 
 # ----------------------------------------------------------------------
 # Texts for ground stations: one line with a MAV_SEVERITY, and the STATUSTEXT messages that carry it.
 
-# MAV_SEVERITY.
-INFO, NOTICE, WARNING, CRITICAL = 6, 5, 4, 2
-# Bytes of one STATUSTEXT, and of a whole text.
-_PIECE, _LONGEST = 50, 400
+# MAV_SEVERITY of information.
+INFO = 6
+# MAV_SEVERITY of a notice.
+NOTICE = 5
+# MAV_SEVERITY of a warning.
+WARNING = 4
+# MAV_SEVERITY of a critical condition.
+CRITICAL = 2
+# Bytes of one STATUSTEXT.
+_CHUNK_BYTES = 50
+# Maximum bytes of a whole text.
+_MAX_TEXT_BYTES = 400
 
 
 class StatusText(NamedTuple):
@@ -165,32 +176,48 @@ class StatusText(NamedTuple):
 
 
 def status_texts(text: str, severity: int, number: int) -> list[Any]:
-    """STATUSTEXT messages of any text, in pieces of 50 bytes that stations join again.
+    """Return the STATUSTEXT messages of a text, in pieces of 50 bytes that stations join again.
 
     number: 1..65535, new for each text.  Ground stations show ASCII: any other character becomes "?", a degree sign
-    " deg", and what is beyond 400 bytes is left out.
+    " deg", and bytes beyond 400 are omitted.
 
     >>> [message.text for message in status_texts("climb of 9° at leg 3", 4, 1)]
     ['climb of 9 deg at leg 3']
     >>> [(message.id, message.chunk_seq, len(message.text)) for message in status_texts("x" * 120, 6, 7)]
     [(7, 0, 50), (7, 1, 50), (7, 2, 20)]
     """
-    data = text.replace("°", " deg").encode("ascii", "replace")[:_LONGEST]
-    pieces = [data[at : at + _PIECE] for at in range(0, len(data), _PIECE)]
+    data = text.replace("°", " deg").encode("ascii", "replace")[:_MAX_TEXT_BYTES]
+    pieces = [data[at : at + _CHUNK_BYTES] for at in range(0, len(data), _CHUNK_BYTES)]
     if len(pieces) <= 1:
         return [mavlink.MAVLink_statustext_message(severity, data)]
     # A text ends with the first piece that is not full.
-    if len(pieces[-1]) == _PIECE:
+    if len(pieces[-1]) == _CHUNK_BYTES:
         pieces.append(b"")
     return [mavlink.MAVLink_statustext_message(severity, piece, number, k) for k, piece in enumerate(pieces)]
 
 
-# ArduPlane's numbers for its modes (custom_mode of HEARTBEAT).
-MANUAL, AUTO, RTL, LOITER, GUIDED = 0, 10, 11, 12, 15
+# ArduPlane's number for MANUAL (custom_mode of HEARTBEAT).
+MANUAL = 0
+# ArduPlane's number for AUTO.
+AUTO = 10
+# ArduPlane's number for RTL.
+RTL = 11
+# ArduPlane's number for LOITER.
+LOITER = 12
+# ArduPlane's number for GUIDED.
+GUIDED = 15
 MODE_NAMES = {MANUAL: "MANUAL", AUTO: "AUTO", RTL: "RTL", LOITER: "LOITER", GUIDED: "GUIDED"}
 
-# MISSION_STATE of MISSION_CURRENT.
-NO_MISSION, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 1, 2, 3, 4, 5
+# MISSION_STATE of MISSION_CURRENT: no mission.
+NO_MISSION = 1
+# MISSION_STATE: a mission that was not started.
+NOT_STARTED = 2
+# MISSION_STATE: the mission is flown.
+ACTIVE = 3
+# MISSION_STATE: the mission is interrupted.
+PAUSED = 4
+# MISSION_STATE: the mission was completed.
+COMPLETE = 5
 
 _SENSORS = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
@@ -213,10 +240,10 @@ _CAPABILITIES = (
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
 )
-# Version that ground stations get: of ArduPlane, whose conventions (modes, home as item 0) the vehicle follows.
+# Version for ground stations: ArduPlane's, as the vehicle follows its conventions (modes, home as item 0).
 _VERSION = (4 << 24) | (5 << 16) | (0 << 8) | 255
 
-# Seconds between two messages of a kind, unless a station asks otherwise; HEARTBEAT is not theirs to change.
+# Intervals between two messages of a kind, s, unless a station sets another; HEARTBEAT cannot be changed.
 PERIODS: dict[str, float] = {
     "ATTITUDE": 1 / 30,
     "GLOBAL_POSITION_INT": 0.1,
@@ -229,7 +256,7 @@ PERIODS: dict[str, float] = {
     "EXTENDED_SYS_STATE": 1.0,
     "HOME_POSITION": 2.0,
 }
-# Which of them each MAV_DATA_STREAM of REQUEST_DATA_STREAM means (as ArduPilot groups them).
+# Messages of each MAV_DATA_STREAM of REQUEST_DATA_STREAM (as in ArduPilot).
 STREAMS: dict[int, tuple[str, ...]] = {
     mavlink.MAV_DATA_STREAM_ALL: tuple(PERIODS),
     mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: ("SYS_STATUS", "MISSION_CURRENT", "GPS_RAW_INT"),
@@ -242,17 +269,17 @@ STREAMS: dict[int, tuple[str, ...]] = {
 
 @dataclass(slots=True)
 class Status:
-    """What the vehicle is doing, as `telemetry_message` sends it.
+    """State of the vehicle for `telemetry_message`.
 
     snapshot: the aircraft.
-    home: heights over home count from it.
-    boot, wall: s since the vehicle came up, and since 1970.
+    home: origin of heights over home.
+    boot, wall: s since the vehicle started, and since 1970.
     mode: ArduPlane's number.
-    ready: whether arming would be accepted, or has been.
+    ready: True if arming would be accepted, or has been.
     battery: Wh when full.
-    load: share of time that the event loop is busy.
+    load: fraction of time that the event loop is busy.
     current: the mission item that is flown to.
-    total: how many items a mission has beside home.
+    total: number of mission items without home.
     mission_state: MISSION_STATE of MISSION_CURRENT.
     """
 
@@ -272,7 +299,7 @@ class Status:
 
 
 def heartbeat(status: Status) -> Any:
-    """HEARTBEAT of a fixed wing that follows ArduPilot's conventions.
+    """Return HEARTBEAT of a fixed wing that follows ArduPilot's conventions.
 
     >>> parked = Snapshot(time=0.0, lat_deg=46.0, lon_deg=8.0, amsl=500.0, height=100.0)
     >>> message = heartbeat(Status(parked, Home(46.0, 8.0, 400.0), mode=AUTO, armed=True))
@@ -297,7 +324,7 @@ def heartbeat(status: Status) -> Any:
 
 
 def telemetry_message(name: str, status: Status) -> Any:
-    """MAVLink message of this name about a status; None for one that the vehicle does not send.
+    """Return the MAVLink message of this name for a status, or None if the vehicle does not send it.
 
     name: one of `PERIODS`, HEARTBEAT, AUTOPILOT_VERSION or SYSTEM_TIME.
 
@@ -327,9 +354,9 @@ def _position(status: Status) -> Any:
         round(now.lon_deg * 1e7),
         round(now.amsl * 1e3),
         round((now.amsl - status.home.alt) * 1e3),
-        _short(now.v_north * 100),
-        _short(now.v_east * 100),
-        _short(now.v_down * 100),
+        _to_int16(now.v_north * 100),
+        _to_int16(now.v_east * 100),
+        _to_int16(now.v_down * 100),
         round(_degrees(now.yaw) * 100) % 36000,
     )
 
@@ -356,7 +383,7 @@ def _sys_status(status: Status) -> Any:
     present = _SENSORS | _PREARM
     return mavlink.MAVLink_sys_status_message(
         present, present, health, min(1000, round(status.load * 1000)), 44_400,
-        _short(status.snapshot.current * 100), round(share * 100), 0, 0, 0, 0, 0, 0,
+        _to_int16(status.snapshot.current * 100), round(share * 100), 0, 0, 0, 0, 0, 0,
     )  # fmt: skip
 
 
@@ -372,7 +399,7 @@ def _gps(status: Status) -> Any:
 
 def _wind(status: Status) -> Any:
     now = status.snapshot
-    # The way it comes from.
+    # Direction from which the wind blows.
     source = math.degrees(math.atan2(-now.wind_east, -now.wind_north))
     return mavlink.MAVLink_wind_message(source, math.hypot(now.wind_east, now.wind_north), 0.0)
 
@@ -385,7 +412,7 @@ def _wind_cov(status: Status) -> Any:
     )
 
 
-def _extended(status: Status) -> Any:
+def _extended_state(status: Status) -> Any:
     landed = mavlink.MAV_LANDED_STATE_IN_AIR if status.flying else mavlink.MAV_LANDED_STATE_ON_GROUND
     return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, landed)
 
@@ -408,7 +435,7 @@ def _system_time(status: Status) -> Any:
     return mavlink.MAVLink_system_time_message(int(status.wall * 1e6), _ms(status))
 
 
-def _short(value: float) -> int:
+def _to_int16(value: float) -> int:
     return max(-32767, min(32767, round(value)))
 
 
@@ -426,7 +453,7 @@ _MAKERS = {
     "GPS_RAW_INT": _gps,
     "WIND": _wind,
     "WIND_COV": _wind_cov,
-    "EXTENDED_SYS_STATE": _extended,
+    "EXTENDED_SYS_STATE": _extended_state,
     "HOME_POSITION": _home,
     "AUTOPILOT_VERSION": _autopilot_version,
     "SYSTEM_TIME": _system_time,

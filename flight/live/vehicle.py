@@ -1,4 +1,4 @@
-"""The live vehicle: stations on one side, the process that flies on the other, and the state between them."""
+"""The live vehicle: the stations' link, the flight process, and the state between them."""
 
 import contextlib
 import errno
@@ -48,21 +48,21 @@ from flight.live.telemetry import (
 from flight.mission.items import Home, Mission, MissionItem
 
 # ----------------------------------------------------------------------
-# What a live vehicle sends without being asked: heartbeats, telemetry, texts, parameters that stream.
+# Messages that a live vehicle sends unasked: heartbeats, telemetry, texts, parameter streams.
 
-# A message that is late by more than this (s) is not made up for.
-_LATE = 0.5
-# Between heartbeats, and between checks of a message that a station has switched off, s.
-_SECOND = 1.0
+# Beyond this delay a message is skipped instead of sent late, s.
+_MAX_DELAY_S = 0.5
+# Interval of heartbeats, and of checks of a message that a station has switched off, s.
+_HEARTBEAT_PERIOD_S = 1.0
 
-# Shows a text to a person at the terminal.
+# Function that shows a text at the terminal.
 ShowText = Callable[[str], None]
 
 
 class Downlink:
     """Sends to every station that has sent a heartbeat.
 
-    show: gets each text too.  pause: how long the caller sleeps at most, s.
+    show: also gets each text.  pause: longest sleep of the caller, s.
     """
 
     def __init__(self, link: Link, status: Status, parameters: Parameters, show: ShowText, pause: float) -> None:
@@ -101,7 +101,9 @@ class Downlink:
         """Send what is due."""
         if now >= self._next_heartbeat:
             self._next_heartbeat = (
-                now + _SECOND if now - self._next_heartbeat > _LATE else self._next_heartbeat + _SECOND
+                now + _HEARTBEAT_PERIOD_S
+                if now - self._next_heartbeat > _MAX_DELAY_S
+                else self._next_heartbeat + _HEARTBEAT_PERIOD_S
             )
             self._link.forget_silent()
             self._link.send_heartbeat(heartbeat(self._status))
@@ -115,10 +117,10 @@ class Downlink:
                 continue
             period = peer.periods[name]
             if period is None:
-                peer.due[name] = now + _SECOND
+                peer.due[name] = now + _HEARTBEAT_PERIOD_S
                 continue
             self._link.send(telemetry_message(name, self._status), peer)
-            peer.due[name] = due + period if now - due < _LATE else now + period
+            peer.due[name] = due + period if now - due < _MAX_DELAY_S else now + period
 
     def _stream_parameters(self, peer: Peer) -> None:
         if peer.parameter is None:
@@ -132,14 +134,14 @@ class Downlink:
 
 
 # ----------------------------------------------------------------------
-# How far a flight is along its mission, in the numbers that stations have for its items.
+# Progress of a flight along its mission, in the stations' numbers of its items.
 
 
 class MissionProgress:
-    """Tells stations which item is flown to and which were reached.
+    """Reports to stations the current item and the items that were reached.
 
-    shift: what to add to an item's seq for the station's number.
-    first: the station's number of the item that the next flight starts at; 0 for the whole mission.
+    shift: offset from an item's seq to the station's number.
+    first: the station's number of the item at which the next flight starts; 0 for the whole mission.
     """
 
     def __init__(self, server: MissionServer, arming: ArmingState, status: Status, down: Downlink) -> None:
@@ -149,25 +151,28 @@ class MissionProgress:
         self._status = status
         self._down = down
         self._leg = -1
-        # Of the way that is flown where it is not the judged mission's, seq of the item at each waypoint.
+        # Seq of the item at each waypoint of a diverted route, or None on the judged mission.
         self._way: tuple[int, ...] | None = None
         self.shift = 0
         self.first = 0
 
     def started(self) -> None:
-        """A flight begins."""
+        """Note that a flight begins."""
         self._leg, self._way = -1, None
 
     def diverted(self, items: tuple[int, ...]) -> None:
-        """Another way begins.  items: seq of the mission's item at each waypoint, none beside the mission."""
+        """Note that another route begins.
+
+        items: seq of the mission's item at each waypoint; empty for a route outside the mission.
+        """
         self._leg, self._way = -1, items
 
     def at_start(self) -> None:
-        """The item that a mission that is not being flown starts with."""
-        self._status.current = self.first or (self._item(0) if self._arming.judged is not None else 0)
+        """Set the current item of a mission that is not being flown: its start."""
+        self._status.current = self.first or (self._station_number(0) if self._arming.judged is not None else 0)
 
     def refresh(self) -> None:
-        """Bring what the status says of the mission up to date."""
+        """Update the mission fields of the status."""
         items = self._server.lists[MissionType.MISSION]
         self._status.total = max(0, len(items) - 1) if items else 0
         if self._arming.mission_state not in (ACTIVE, PAUSED, COMPLETE):
@@ -175,48 +180,49 @@ class MissionProgress:
 
     def on_leg(self, leg: int) -> None:
         """Send the waypoints that were reached since the last snapshot."""
-        if leg == self._leg or leg < 0 or not self._items():
+        if leg == self._leg or leg < 0 or not self._waypoint_items():
             return
         for waypoint in range(max(0, self._leg + 1), leg + 1):
-            self._reached(waypoint)
+            self._report_reached(waypoint)
         self._leg = leg
-        self._status.current = self._item(leg + 1)
+        self._status.current = self._station_number(leg + 1)
         self.send_current()
 
     def completed(self) -> None:
-        """The last waypoint is reached."""
-        self._reached(len(self._items()) - 1)
+        """Report the last waypoint as reached."""
+        self._report_reached(len(self._waypoint_items()) - 1)
 
     def send_current(self) -> None:
-        """Send the item that is flown to."""
+        """Send the current item."""
         message: Any = telemetry_message("MISSION_CURRENT", self._status)
         self._down.send_to_all(message)
 
-    def _reached(self, waypoint: int) -> None:
-        items = self._items()
+    def _report_reached(self, waypoint: int) -> None:
+        items = self._waypoint_items()
         if 0 <= waypoint < len(items) and items[waypoint] >= 0:
-            self._down.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._item(waypoint)))
+            self._down.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._station_number(waypoint)))
 
-    def _items(self) -> tuple[int, ...]:
-        """Seq of the item at each waypoint of the mission as it is flown, -1 for none."""
+    def _waypoint_items(self) -> tuple[int, ...]:
+        """Return the seq of the item at each waypoint of the flown mission, -1 for no item."""
         if self._way is not None:
             return self._way
         return () if self._arming.judged is None else self._arming.judged.items
 
-    def _item(self, waypoint: int) -> int:
-        """Station's number of the item at a waypoint, or of the next that is one."""
-        items = self._items()
+    def _station_number(self, waypoint: int) -> int:
+        """Return the station's number of the item at a waypoint, or of the next waypoint with an item."""
+        items = self._waypoint_items()
         following = [item for item in items[waypoint:] if item >= 0] or [item for item in items if item >= 0][-1:]
         return following[0] + self.shift if following else 0
 
 
 # Longest wait for the network or the flight, s.
-_NAP = 0.02
-# Time that the process that flies has to close its log when the vehicle is shut down, s.
+_MAX_WAIT_S = 0.02
+# Time for the flight process to close its log when the vehicle is shut down, s.
 CLOSING = 0.8
+# Number of crashes in a row after which the vehicle gives up.
 _MAX_CRASHES = 3
-# Within this time (s) the same text is sent once.
-_SAME_TEXT = 3.0
+# Within this time the same text is sent once, s.
+_REPEATED_TEXT_TIME_S = 3.0
 
 
 class Standby(NamedTuple):
@@ -227,7 +233,7 @@ class Standby(NamedTuple):
 
 
 class Vehicle:
-    """A vehicle that stands ready, takes missions, and flies them on a station's command."""
+    """A vehicle that stands ready, accepts missions, and flies them on a station's command."""
 
     def __init__(
         self,
@@ -238,24 +244,24 @@ class Vehicle:
         battery: float,
         show: ShowText,
     ) -> None:
-        """Start the process that flies.
+        """Start the flight process.
 
         link: the stations.
-        spawn: starts a process that flies, and returns the link's end of its pipe.
-        parameters: what stations may read and set.
+        spawn: starts a flight process, and returns the link's end of its pipe.
+        parameters: parameters that stations may read, and partly set.
         standby: the aircraft before it has a mission.
         battery: Wh when full.
-        show: gets what a person at the terminal should read.
+        show: shows a text at the terminal.
         """
         self.link = link
         self.arming = ArmingState()
         self.server = MissionServer(go_to=self._go_to)
         self.status = Status(standby.snapshot, standby.home, battery=battery)
-        self.down = Downlink(link, self.status, parameters, show, _NAP)
-        self.requests = Requests(self.arming, parameters, self.status, self._start_at)
+        self.down = Downlink(link, self.status, parameters, show, _MAX_WAIT_S)
+        self.requests = Requests(self.arming, parameters, self.status, self._set_start_item)
         self._standby = standby
         self._spawn = spawn
-        # In a row, without being ready in between.
+        # Crashes in a row, without becoming ready in between.
         self._deaths = 0
         self._flight = spawn()
         self._ready = False
@@ -263,34 +269,34 @@ class Vehicle:
         self._show = show
         self._clock = link.clock
         self._born = self._clock()
-        # Which mission is judged or flown.
+        # Number of the mission that is judged or flown.
         self._number = 0
         self._outstanding = self._brief = False
-        # The upload in which the item that the next flight starts at was chosen.
+        # Upload in which the start item of the next flight was chosen.
         self._chosen_in: tuple[MissionItem, ...] = ()
-        # Parameters of the law that the mission is judged and flown with.
+        # Parameters of the law with which the mission is judged and flown.
         self._flown_with: tuple[tuple[str, float], ...] = ()
         self._last_text, self._last_text_at = "", 0.0
         self._progress = MissionProgress(self.server, self.arming, self.status, self.down)
 
     def load(self, mission: Mission) -> None:
-        """Take a mission from a file, as if a station had uploaded it."""
+        """Load a mission from a file, as if a station had uploaded it."""
         for kind, items in zip(MissionType, listed(mission), strict=True):
             self.server.lists[kind] = items
         self.server.changed.add(MissionType.MISSION)
 
     def load_fence(self, fences: Sequence[MissionItem]) -> None:
-        """Take a fence from a file, as if a station had uploaded it; missions that follow are judged by it."""
+        """Load a fence from a file, as if a station had uploaded it; later missions are judged with it."""
         self.server.lists[MissionType.FENCE] = tuple(fences)
         self.server.changed.add(MissionType.FENCE)
 
     def run(self, stop: Callable[[], bool]) -> None:
-        """Serve until ``stop`` says so, then end the flight and its process."""
+        """Serve until ``stop`` returns True, then end the flight and its process."""
         while not stop():
-            self.step(_NAP)
+            self.step(_MAX_WAIT_S)
 
     def close(self) -> None:
-        """Have the process that flies end its flight, if it has begun to serve; its last texts go to the terminal."""
+        """Make the flight process end its flight, if it is ready; its last texts go to the terminal."""
         until = self._clock() + CLOSING
         with contextlib.suppress(OSError, EOFError):
             if self._ready:
@@ -302,45 +308,45 @@ class Vehicle:
         self._flight.close()
 
     def step(self, patience: float) -> None:
-        """Wait for something to do, at most ``patience`` s, and do it."""
+        """Wait for an event, at most ``patience`` s, and handle it."""
         watched: list[Any] = [self.link, self._flight]
         readable: list[Any] = wait(watched, self.down.wait(self._clock(), patience))
         now = self._clock()
         self.status.boot, self.status.wall = now - self._born, time.time()
         if self._flight in readable:
-            self._from_flight()
+            self._receive_events()
         if self.link in readable:
             for message, peer in self.link.receive():
-                self._from_station(message, peer, now)
+                self._handle_message(message, peer, now)
             for notice in self.link.notices():
                 self._show(notice)
         for reply in self.server.tick(now):
             self._send_reply(reply.station, reply.message, reply.text)
-        self._changes()
+        self._judge_changes()
         self.down.tick(now)
         used = self._clock() - now
         self.status.load += 0.01 * (used / max(used, patience) - self.status.load)
 
-    def _from_station(self, message: Any, peer: Peer, now: float) -> None:
+    def _handle_message(self, message: Any, peer: Peer, now: float) -> None:
         self.server.locked = "in flight: the mission cannot change" if self.arming.flying else ""
         station = Station(peer.address, message.get_srcSystem(), message.get_srcComponent())
         for reply in self.server.handle(message, station, now):
             self._send_reply(reply.station, reply.message, reply.text)
-        self._changes()
-        self._pass_on(self.requests.handle(message, peer, now))
+        self._judge_changes()
+        self._send_responses(self.requests.handle(message, peer, now))
         if self._flown_with != tuple(self._parameters.stated.items()) and self.server.lists[MissionType.MISSION]:
             self.server.changed.add(MissionType.MISSION)
-            self._changes()
-        self._after_command()
+            self._judge_changes()
+        self._apply_state()
 
-    def _pass_on(self, responses: list[Response]) -> None:
+    def _send_responses(self, responses: list[Response]) -> None:
         for response in responses:
             if not isinstance(response, StatusText):
                 self.link.send(response.message, response.peer)
                 continue
             now = self._clock()
-            # A station that tries again soon gets the text once.
-            if self._last_text != response.text or now - self._last_text_at > _SAME_TEXT:
+            # A station that repeats a request soon gets the text once.
+            if self._last_text != response.text or now - self._last_text_at > _REPEATED_TEXT_TIME_S:
                 self.down.send_text(*response)
             self._last_text, self._last_text_at = response.text, now
 
@@ -355,10 +361,10 @@ class Vehicle:
         if text:
             self.down.send_text(text, WARNING)
 
-    def _after_command(self) -> None:
+    def _apply_state(self) -> None:
         if self.arming.end_requested:
             self.arming.end_requested = False
-            self._ask(EndFlight())
+            self._send_request(EndFlight())
         if self.arming.place is not None:
             self._divert(self.arming.place)
             self.arming.place = None
@@ -366,11 +372,11 @@ class Vehicle:
             self.arming.flight_started()
             self._progress.started()
             self.down.send_text("mission started")
-            self._ask(StartFlight())
+            self._send_request(StartFlight())
         self._refresh()
 
-    def _changes(self) -> None:
-        """Have a changed mission judged; a fence or rally points that change belong to it."""
+    def _judge_changes(self) -> None:
+        """Request a verdict on a changed mission; a fence or rally points that change belong to it."""
         # One request at a time: stations that upload faster than missions are judged must not fill the pipe.
         if not self.server.changed or self.arming.flying or self._outstanding:
             return
@@ -383,34 +389,34 @@ class Vehicle:
         if not self.server.lists[MissionType.MISSION]:
             self.arming.mission_cleared()
             self.status.snapshot, self.status.home = self._standby
-            self._pass_on(self.requests.verdict_came())
+            self._send_responses(self.requests.verdict_came())
             self._refresh()
             return
         if self.server.lists[MissionType.MISSION] is not self._chosen_in:
             self._progress.first = 0
         mission, self._progress.shift = uploaded(self.server.lists, self._standby.home)
         mission = flown_from(mission, self._progress.first - self._progress.shift)
-        # A fence or rally points that are changed need not repeat the texts about the mission.
+        # A changed fence or changed rally points need not repeat the texts about the mission.
         self._brief = MissionType.MISSION not in changed and (self._brief or not self.arming.judging)
         self.arming.mission_uploaded()
         self._outstanding = True
         self._flown_with = tuple(self._parameters.stated.items())
-        self._ask(JudgeMission(mission, self._number, self._flown_with))
+        self._send_request(JudgeMission(mission, self._number, self._flown_with))
         self._refresh()
 
     def _divert(self, place: Place) -> None:
-        """Send the aircraft another way: on with the mission at the present item, home, or to circle at a place."""
+        """Divert the aircraft: to the mission's current item, home, or to a loiter at a place."""
         mission, shift = uploaded(self.server.lists, self._standby.home)
         mission = replace(mission, home=self.status.home)
         if self.arming.mode == AUTO:
             mission = flown_from(mission, self.status.current - shift)
-        self._ask(DivertFlight(self.arming.mode, mission, place))
+        self._send_request(DivertFlight(self.arming.mode, mission, place))
 
     def _go_to(self, item: MissionItem) -> str:
-        """Fly to an item's place; why not, "" if it does."""
+        """Fly to an item's place; return why not, "" if it does."""
         return self.arming.go_to(Place(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
 
-    def _diverted(self, event: FlightDiverted) -> None:
+    def _handle_diversion(self, event: FlightDiverted) -> None:
         if event.problem:
             wanted, self.arming.mode = self.arming.mode, event.mode
             self.arming.diverted(event.mode)
@@ -420,10 +426,12 @@ class Vehicle:
             self.down.send_text(f"flying in {MODE_NAMES[event.mode]}")
         self._refresh()
 
-    def _start_at(self, seq: int) -> CommandResult:
-        """Have the next flight start at an item, by the station's number, or the present one go on there.
+    def _set_start_item(self, seq: int) -> CommandResult:
+        """Set the start item of the next flight, or continue the current flight at it.
 
-        What starts there is judged as what is flown.
+        seq: the station's number of the item.
+
+        A new start is judged as it will be flown.
         """
         mission, shift = uploaded(self.server.lists, self._standby.home)
         problem = start_problem(mission, seq - shift, in_flight=self.arming.flying)
@@ -438,24 +446,24 @@ class Vehicle:
         if first != self._progress.first:
             self._progress.first, self._chosen_in = first, self.server.lists[MissionType.MISSION]
             self.server.changed.add(MissionType.MISSION)
-            self._changes()
+            self._judge_changes()
         return CommandResult(ACCEPTED)
 
-    def _ask(self, request: FlightRequest) -> None:
+    def _send_request(self, request: FlightRequest) -> None:
         try:
             self._flight.send(request)
         except (BrokenPipeError, ConnectionResetError):
-            self._lost()
+            self._restart_process()
 
-    def _from_flight(self) -> None:
+    def _receive_events(self) -> None:
         try:
             while self._flight.poll():
-                self._take(read_event(self._flight.recv_bytes()))
+                self._handle_event(read_event(self._flight.recv_bytes()))
         except (EOFError, BrokenPipeError, ConnectionResetError):
-            self._lost()
+            self._restart_process()
 
-    def _lost(self) -> None:
-        """Start another process in place of one that has died: JSBSim can abort, and that must not end the vehicle."""
+    def _restart_process(self) -> None:
+        """Start another flight process after a crash: JSBSim can abort, and that must not end the vehicle."""
         self._flight.close()
         self._deaths += 1
         if self._deaths >= _MAX_CRASHES:
@@ -463,22 +471,22 @@ class Vehicle:
         self._flight = self._spawn()
         self._ready = False
         if self.arming.flying:
-            self._ended("lost: the process that flew it has died")
+            self._handle_flight_end("lost: the process that flew it has died")
         if self.server.lists[MissionType.MISSION]:
             text = StatusText("the process that flies has died; upload the mission again", CRITICAL)
-            self._judged(MissionJudged(self._number, False, False, (text,)))
+            self._handle_verdict(MissionJudged(self._number, False, False, (text,)))
 
-    def _take(self, event: Snapshot | Event) -> None:
+    def _handle_event(self, event: Snapshot | Event) -> None:
         if isinstance(event, Snapshot):
             if event.finite:
                 self.status.snapshot = event
                 self._progress.on_leg(int(event.leg))
         elif isinstance(event, MissionJudged):
-            self._judged(event)
+            self._handle_verdict(event)
         elif isinstance(event, FlightDiverted):
-            self._diverted(event)
+            self._handle_diversion(event)
         elif isinstance(event, FlightEnded):
-            self._ended(event.ended)
+            self._handle_flight_end(event.ended)
         elif isinstance(event, ProcessReady):
             self._deaths = 0
             self._ready = True
@@ -486,13 +494,13 @@ class Vehicle:
         else:
             self._send_texts(event.texts)
 
-    def _judged(self, judged: MissionJudged) -> None:
+    def _handle_verdict(self, judged: MissionJudged) -> None:
         if judged.number != self._number:
             return
         self._outstanding = False
         if self.server.changed:
-            # It is about a mission that is no longer here.
-            self._changes()
+            # The verdict is about a mission that was replaced.
+            self._judge_changes()
             return
         before = self.arming.judged
         if not self._brief or before is None or before.texts != judged.texts:
@@ -503,10 +511,10 @@ class Vehicle:
         if judged.start is not None and judged.home is not None:
             self.status.snapshot, self.status.home = judged.start, judged.home
         self._progress.at_start()
-        self._pass_on(self.requests.verdict_came())
-        self._after_command()
+        self._send_responses(self.requests.verdict_came())
+        self._apply_state()
 
-    def _ended(self, ended: str) -> None:
+    def _handle_flight_end(self, ended: str) -> None:
         completed = ended == "completed"
         if completed and self.arming.mode == AUTO:
             self._progress.completed()
@@ -515,7 +523,7 @@ class Vehicle:
         self.down.send_text(f"flight {ended}; disarmed", INFO if completed else CRITICAL)
         self._progress.send_current()
         if self._progress.first:
-            # The next flight is of the whole mission again.
+            # The next flight is the whole mission again.
             self._progress.first = 0
             self.server.changed.add(MissionType.MISSION)
 

@@ -1,1 +1,1 @@
-"""ArduPlane by its law: parameters, one compiled tick, and how far it strays from a plan."""
+"""ArduPlane by its control law: parameters, one compiled tick, and its deviations from a plan."""

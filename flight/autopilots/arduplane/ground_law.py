@@ -89,8 +89,8 @@ GROUND_STATE = record_dtype(
     "motor",  # s, time of the motor start
     "slew",  # fraction of the throttle range, 1/s
     "full",  # 0..1, throttle
-    "base",  # m AMSL, of home; below: where the take-off ends
-    "top",
+    "base",  # m AMSL, of home
+    "top",  # m AMSL, end of the take-off
     "low",  # m AMSL, of the launch
     "pitch",  # rad, minimum of the climb
     ("leg", np.int64),  # leg after the take-off
@@ -108,15 +108,13 @@ GROUND_STATE = record_dtype(
     "home",  # m AMSL, of home
     "begin",  # m AMSL, of the waypoint before
     "slope",
-    "flare_height",  # m above the landing point; below: m before it
-    "flare_distance",
+    "flare_height",  # m above the landing point, start of the flare
+    "flare_distance",  # m before the landing point, start of the flare
     "airspeed",  # m/s, equivalent
-    "entry_sink",  # m/s, sink rate at the start of the flare; below: height there, m
-    "entry_height",
-    # Altitude demands of the flare, m: above home, continued from the glide; above the landing point, from its own
-    # height.
-    "flare_adjusted",
-    "flare_ideal",
+    "entry_sink",  # m/s, sink rate at the start of the flare
+    "entry_height",  # m above the landing point, at the start of the flare
+    "flare_adjusted",  # m above home, altitude demand of the flare that continues the glide's demand
+    "flare_ideal",  # m above the landing point, altitude demand of the flare that continues the actual height
 )
 ARDUPLANE_GROUND = record_dtype(
     ("memory", ARDUPILOT_MEMORY),

@@ -119,7 +119,7 @@ def fly_go_arounds(
     climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
 
     def fly(k: int, landing: LandingStart) -> Floats:
-        ends = np.concatenate([straight_on(starts[k]), _stages((landing, *landing.onward), parameters)])
+        ends = np.concatenate([straight_on(starts[k]), _make_stages((landing, *landing.onward), parameters)])
         ends["airspeed"] = aircraft.record.airspeed
         most = most_seconds(starts[k], ends[1:], aircraft) + max(0.0, top - float(starts[k]["up"]))
         way = np.zeros((int(most) + 2, 3))
@@ -151,7 +151,7 @@ def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
     return staged
 
 
-def _stages(sequence: Sequence[LandingStart], parameters: ArduPilotParameters) -> Records:
+def _make_stages(sequence: Sequence[LandingStart], parameters: ArduPilotParameters) -> Records:
     """Return (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: the places up to the first loiter."""
     flown = until_circle(sequence)
     stages: Records = np.zeros(len(flown), WAYPOINT)

@@ -199,7 +199,7 @@ def fly_returns(
     (True, True)
     """
     stages = [
-        _stages(target, landing, parameters, aircraft)
+        _make_stages(target, landing, parameters, aircraft)
         for target, landing in zip(targets, landings or [None] * len(targets), strict=True)
     ]
     if engine_out:
@@ -220,7 +220,7 @@ def fly_returns(
     return SwiftReturns(flown, tuple(ways))
 
 
-def _stages(
+def _make_stages(
     target: ReturnCircle | None, landing: LandingStart | None, parameters: ArduPilotParameters, aircraft: PointMass
 ) -> Records:
     """Return (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: the successive targets of an RTL.

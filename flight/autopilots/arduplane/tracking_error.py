@@ -110,7 +110,7 @@ def _corners(parameters: ArduPilotParameters, airspeed: float, fly_over: bool) -
     """Tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
     record, speeds = parameters.record(), SPEED_SHARES * airspeed
-    _fill_corners(record, airspeed, TURNS, speeds, fly_over, corners, waypoint_column(3))
+    _fill(record, airspeed, TURNS, speeds, fly_over, corners, waypoint_column(3))
     share, more = WIND_SPREAD
     corners["excursion"] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
     # Rounded because plans must be the same on every machine, and sines differ between libraries.
@@ -121,7 +121,7 @@ def _corners(parameters: ArduPilotParameters, airspeed: float, fly_over: bool) -
 
 
 @compiled
-def _fill_corners(
+def _fill(
     parameters: Record,
     airspeed: float,
     turns: Floats,

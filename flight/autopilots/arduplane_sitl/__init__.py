@@ -1,1 +1,1 @@
-"""ArduPlane itself: its program in lockstep with our physics."""
+"""ArduPlane itself: its program in lockstep with planfly's physics."""

@@ -103,7 +103,7 @@ class PhysicsPort:
         # The kernel's own timeout: one system call a frame.
         look = struct.pack("@ll", int(_CHECK_INTERVAL_S), int(_CHECK_INTERVAL_S % 1.0 * 1e6))
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, look)
-        self.watch: Callable[[], None] = _nothing
+        self.watch: Callable[[], None] = _do_nothing
         self._frame = -1
         self._last = b""
         self._answered = 0.0
@@ -174,7 +174,7 @@ class PhysicsPort:
             return
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     """Do nothing: the default of `watch`."""
 
 

@@ -1,1 +1,1 @@
-"""Planfly's own guidance: its lateral laws, its height law, and the autopilot that they make."""
+"""Planfly's own guidance: its lateral laws, its altitude law, and the autopilot."""

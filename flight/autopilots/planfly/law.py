@@ -33,8 +33,12 @@ from world.terrain import Heights
 
 Floats = NDArray[np.float64]
 
-# Lateral laws, as in `memory.law`.
-CROSS_TRACK, L1, VECTOR_FIELD = range(3)
+# Value of `memory.law` for planfly's own law.
+CROSS_TRACK = 0
+# Value of `memory.law` for L1.
+L1 = 1
+# Value of `memory.law` for the vector field.
+VECTOR_FIELD = 2
 # Lateral laws by their names in a scenario's `[flight] guidance`.
 LAWS: dict[Guidance, int] = {"path": CROSS_TRACK, "l1": L1, "vector-field": VECTOR_FIELD}
 # Time constant of the energy rate, s.
@@ -376,7 +380,7 @@ def _set_throttle(
     along: float,
     dt: float,
 ) -> None:  # pragma: no cover - compiled
-    """Set the throttle: for level flight, for the slope relative to the air ahead, and for the airspeed error."""
+    """Set throttle for level flight, for the slope relative to the air, and for the airspeed error."""
     slow = memory.speed_command - airspeed
     if memory.arc_speed > 0.0:
         # In an arc and before it the ground speed matters too, as far as the air allows.

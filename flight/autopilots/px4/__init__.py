@@ -1,1 +1,1 @@
-"""PX4's law for fixed wing."""
+"""PX4's control law for fixed wing."""

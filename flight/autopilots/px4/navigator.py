@@ -186,7 +186,7 @@ def is_last(waypoints: Records, own: Record) -> bool:  # pragma: no cover - comp
 
 
 @inner
-def _target(b: Record) -> tuple[float, float]:  # pragma: no cover - compiled
+def _setpoint_position(b: Record) -> tuple[float, float]:  # pragma: no cover - compiled
     """Return east and north (m) of a waypoint's setpoint, which for a loiter is its center."""
     return (b.centre_east, b.centre_north) if b.circle != 0.0 else (b.east, b.north)
 
@@ -197,7 +197,7 @@ def _is_on_exit_course(estimated: Record, onward: Record, b: Record) -> bool:  #
 
     No course is required to a setpoint too close to the loiter's center.  onward: the waypoint after the loiter.
     """
-    east, north = _target(onward)
+    east, north = _setpoint_position(onward)
     if math.hypot(east - b.centre_east, north - b.centre_north) <= _MIN_EXIT_DISTANCE_RATIO * abs(b.circle):
         return True
     bearing = math.atan2(east - estimated.east, north - estimated.north)
@@ -248,12 +248,12 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> N
     """
     a, b = waypoints[leg], waypoints[leg + 1]
     own.leg = leg
-    own.from_east, own.from_north = _target(a)
+    own.from_east, own.from_north = _setpoint_position(a)
     own.from_up = a.up
     if a.circle != 0.0 and math.isnan(a.stays):
         own.from_east, own.from_north = estimated.east, estimated.north
     if a.circle != 0.0 and a.leaves_on_tangent and not math.isnan(a.stays):
-        east, north = _target(b)
+        east, north = _setpoint_position(b)
         bearing = math.atan2(east - a.centre_east, north - a.centre_north)
         share = abs(a.circle) / max(1e-3, math.hypot(east - a.centre_east, north - a.centre_north))
         exit_bearing = bearing - math.copysign(math.acos(min(1.0, share)), a.circle)

@@ -129,7 +129,7 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 def _corners(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
     """Tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
-    _fill_corners(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, waypoint_column(3))
+    _fill(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, waypoint_column(3))
     share, more = WIND_SPREAD
     corners["excursion"] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
     # Rounded because plans must be the same on every machine, and sines differ between libraries.
@@ -140,7 +140,7 @@ def _corners(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats
 
 
 @compiled
-def _fill_corners(
+def _fill(
     parameters: Record, airspeed: float, turns: Floats, speeds: Floats, corners: Records, waypoints: Records
 ) -> None:  # pragma: no cover - compiled
     """Fill `CORNER_TRACKING` records (turns, speeds) by flights along three waypoints."""

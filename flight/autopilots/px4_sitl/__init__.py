@@ -1,1 +1,1 @@
-"""PX4 itself: its program in lockstep with our physics."""
+"""PX4 itself: its program in lockstep with planfly's physics."""

@@ -23,9 +23,9 @@ from flight.simulation.setup import FlightSetup
 from world.scenario_tables import NEWEST_PX4, Px4Version
 
 # Timeout to connect to the simulator, s by the clock.
-_CONNECT_TIMEOUT_S = 30.0
+_CONNECTS = 30.0
 # Timeout of its start-up script, s by the clock.
-_STARTUP_TIMEOUT_S = 60.0
+_STARTS = 60.0
 # A PX4 that has sent no answer for this time waits for a step, s by the clock.
 _STALL_TIME_S = 0.2
 # Fraction of the push along the rail after which mission mode is started.
@@ -66,8 +66,8 @@ class Px4Flight(SitlFlight):
             self._lockstep = lockstep
             self._preflight = Px4Preflight(link, lambda: lockstep.time)
             self._apply_gnss_error()
-            port.connect(_CONNECT_TIMEOUT_S)
-            lockstep.boot(self._rail, partial(_has_started, process), _STALL_TIME_S, _STARTUP_TIMEOUT_S)
+            port.connect(_CONNECTS)
+            lockstep.boot(self._rail, partial(_has_started, process), _STALL_TIME_S, _STARTS)
             self._hold_during(self._preflight.meet(given.given))
             version: Px4Version = (
                 "1.16"

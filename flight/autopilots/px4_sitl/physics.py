@@ -165,7 +165,7 @@ class SimulatorPort:
         self._listener.bind((LOOPBACK, 0))
         self._listener.listen(1)
         self.port = int(self._listener.getsockname()[1])
-        self.watch: Callable[[], None] = _nothing
+        self.watch: Callable[[], None] = _do_nothing
         self._stream: socket.socket | None = None
         self._mav = mavlink.MAVLink(None, 1, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._mav.robust_parsing = True
@@ -262,7 +262,7 @@ class SimulatorPort:
         return True
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     """Do nothing: the default of `watch`."""
 
 
@@ -308,14 +308,16 @@ class HilLockstep(Lockstep):
         self._owes = False
 
     @property
-    def _running(self) -> bool:
+    def _answers_every_step(self) -> bool:
         """True if PX4 answers every step."""
         return self._answered >= _RUNNING_ANSWER_COUNT
 
-    def _outputs(self) -> tuple[float, ...]:
+    def _next_outputs(self) -> tuple[float, ...]:
         """Return the answer to the last step; zeros before the first answer."""
         if self._owes:
-            answer = self._port.awaited_answer() if self._running else self._port.answer(_EARLY_ANSWER_TIMEOUT_S)
+            answer = (
+                self._port.awaited_answer() if self._answers_every_step else self._port.answer(_EARLY_ANSWER_TIMEOUT_S)
+            )
             self._answered = 0 if answer is None else self._answered + 1
             self._last, self._owes = answer or self._last, False
         return self._last
@@ -354,12 +356,12 @@ class HilLockstep(Lockstep):
         self._before = after
         data = self._port.packed(self._sensors.measured(between(before, after)))
         # PX4's second step of the previous frame, which it has computed while JSBSim made this frame.
-        self._outputs()
+        self._next_outputs()
         self._send(data)
         # Packed while PX4 computes that step.
         now = [self._sensors.measured(after)]
         if self._frame % _FIX_FRAMES == 0:
             now.append(self._sensors.fix(after))
         data = self._port.packed(*now)
-        self._flown = self._outputs()
+        self._flown = self._next_outputs()
         self._send(data)

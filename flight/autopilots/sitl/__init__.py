@@ -1,1 +1,1 @@
-"""What the programs of autopilots share that fly in lockstep with our physics."""
+"""Shared parts of the autopilot programs that fly in lockstep with planfly's physics."""

@@ -17,7 +17,10 @@ from world.errors import FlightError
 
 Talk = Generator[None, None, None]
 
-SYSTEM, COMPONENT = 1, mavlink.MAV_COMP_ID_AUTOPILOT1
+# MAVLink system id of the autopilot.
+SYSTEM = 1
+# MAVLink component id of the autopilot.
+COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 # Timeout for the first heartbeat, s of the autopilot's time.
 SPEAKS = 30.0
 # Timeout for the position estimate, s of the autopilot's time.

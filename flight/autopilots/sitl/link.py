@@ -10,8 +10,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.autopilots.sitl.exchange import LOOPBACK
 
-# MAVLink ids of planfly, which acts as a ground station.
-_SYSTEM, _COMPONENT = 255, mavlink.MAV_COMP_ID_MISSIONPLANNER
+# MAVLink system id of planfly, which acts as a ground station.
+_SYSTEM = 255
+# MAVLink component id of planfly.
+_COMPONENT = mavlink.MAV_COMP_ID_MISSIONPLANNER
 _MAX_RECEIVE_BYTES = 65536
 
 

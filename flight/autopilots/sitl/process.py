@@ -80,19 +80,19 @@ class AutopilotProcess:
 
     def __init__(self, binary: Path, prepare: Callable[[Path], Launch]) -> None:
         self.binary = binary
-        self._place = contextlib.ExitStack()
+        self._resources = contextlib.ExitStack()
         self._ended = False
-        guard = self._place.enter_context(Guard())
+        guard = self._resources.enter_context(Guard())
         try:
-            self._folder = self._place.enter_context(temporary_folder("planfly-autopilot-"))
+            self._folder = self._resources.enter_context(temporary_folder("planfly-autopilot-"))
             guard.keep_folder(self._folder)
             self._launch = prepare(self._folder)
             for file in self._launch.leaves:
                 guard.keep_file(file)
-                self._place.callback(file.unlink, missing_ok=True)
+                self._resources.callback(file.unlink, missing_ok=True)
             self._process = self._spawn(guard)
         except BaseException:
-            self._place.close()
+            self._resources.close()
             raise
 
     def _spawn(self, guard: Guard) -> "subprocess.Popen[bytes]":
@@ -133,11 +133,11 @@ class AutopilotProcess:
     def __exit__(self, *_: object) -> None:
         """Kill the program and remove its folder."""
         self._kill()
-        self._place.close()
+        self._resources.close()
 
     def watch(self) -> None:
         """Raise FlightError if the program has panicked or ended, with its last output."""
-        panic = self._panic()
+        panic = self._panic_text()
         if panic:
             raise FlightError(f"panicked: {panic}", file=self.binary)
         code = self._process.poll()
@@ -154,7 +154,7 @@ class AutopilotProcess:
         """
         if self._signal(signal.SIGTERM):
             until = time.monotonic() + _GRACE_S
-            while self._lives() and time.monotonic() < until:
+            while self._is_alive() and time.monotonic() < until:
                 if not answer():
                     time.sleep(0.001)
         self._kill()
@@ -180,13 +180,13 @@ class AutopilotProcess:
                 self._ended = True
         return not self._ended
 
-    def _lives(self) -> bool:
+    def _is_alive(self) -> bool:
         """Return True if the program or its children run; an ended program that was not waited for does not."""
         self._process.poll()
         return self._signal(0)
 
     def _kill(self) -> None:
-        if self._lives():
+        if self._is_alive():
             self._signal(signal.SIGKILL)
         self._process.wait()
 
@@ -198,7 +198,7 @@ class AutopilotProcess:
             return []
         return [" ".join(line.split()) for line in text.splitlines() if line.strip()]
 
-    def _panic(self) -> str:
+    def _panic_text(self) -> str:
         return next((line.partition(_PANIC_MARK)[2].strip() for line in self.lines() if _PANIC_MARK in line), "")
 
 

@@ -57,7 +57,7 @@ class FakeVehicle:
         found = [one for data in datagrams for one in self.link.take(data, ("127.0.0.1", port))]
         self.link.receive = lambda: found  # the one place where bytes come in
         for message, peer in found:
-            self.vehicle._from_station(message, peer, self.vehicle._clock())
+            self.vehicle._handle_message(message, peer, self.vehicle._clock())
         del self.link.receive
         self.turn()
 

@@ -242,7 +242,7 @@ def test_a_mission_taken_back_while_it_is_judged_is_not_flown(fake: FakeVehicle)
     fake.link.take(b"", ("127.0.0.1", 5))
     for message in (many_items(3)[2], command(400, 1.0), mavlink.MAVLink_mission_clear_all_message(1, 1, 0)):
         ((found, peer),) = fake.link.take(packed(message), ("127.0.0.1", 5))
-        fake.vehicle._from_station(found, peer, 0.0)
+        fake.vehicle._handle_message(found, peer, 0.0)
     fake.turn()
     fake.turn()
     fake.send(command(176, 1.0, 10.0))
