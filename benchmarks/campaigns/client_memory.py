@@ -1,7 +1,7 @@
-"""Memory of the process that leads a campaign.
+"""Measure the memory of the process that leads a campaign.
 
-``python -m benchmarks.campaigns.client_memory FLIGHTS`` leads a campaign of the demo, but of made-up flights, each row
-as large as a real one's, to its report, and prints its largest resident size in MB.
+``python -m benchmarks.campaigns.client_memory FLIGHTS`` leads a campaign of the demo to its report, with synthetic
+flights whose rows are as large as real ones, and prints its largest resident size in MB.
 """
 
 import subprocess
@@ -21,21 +21,21 @@ from planfly.campaigns.statistics.decision import Goal
 from planfly.campaigns.worker_pool import Workers, in_own_process
 from tests.planfly.campaigns.made_campaigns import made_flight
 
-# Waypoints whose crossings a row of the demo holds.
-_WAYPOINTS = 14
+# Number of waypoints with crossings in a row of the demo.
+_WAYPOINT_COUNT = 14
 
 
 def large_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
-    """A made flight with a shape of a real one's size; of no duration, so that none is flown again for its log."""
+    """Make a synthetic flight of a real row's size, with no duration, so that it is not flown again for its log."""
     row = made_flight(base, index, wind)
     random = np.random.default_rng(index)
     clearance = random.uniform(50.0, 300.0, STATIONS).astype(np.float32)
-    crossings = random.normal(0.0, 3.0, (_WAYPOINTS, 2)).astype(np.float32)
+    crossings = random.normal(0.0, 3.0, (_WAYPOINT_COUNT, 2)).astype(np.float32)
     return replace(row, duration=0.0, clearance=clearance.tobytes(), crossings=crossings.tobytes())
 
 
 def lead(flights: int, folder: Path) -> None:
-    """Lead a campaign of so many flights, from its first to its report."""
+    """Lead a campaign of some flights, from the first flight to the report."""
     base = in_own_process(open_campaign, "jacksboro-air", default_dispersions(), seed=1)
     goal = Goal(None, False, flights, 0.95)
     with open_store(base, goal, folder, resume=False) as store:
@@ -44,7 +44,7 @@ def lead(flights: int, folder: Path) -> None:
 
 
 def client_memory(flights: int) -> float:
-    """Largest resident size of a client of so many flights, MB."""
+    """Return the largest resident size of a client with some flights, MB."""
     command = [sys.executable, "-m", "benchmarks.campaigns.client_memory", str(flights)]
     return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()[-1])
 
@@ -52,6 +52,6 @@ def client_memory(flights: int) -> float:
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as name:
         lead(int(sys.argv[1]), Path(name))
-    # Of this process alone: what getrusage tells is at least what the process that started it had.
+    # Of this process alone; getrusage gives at least the size of the process that started it.
     status = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     print(next(int(line.split()[1]) / 1024.0 for line in status if line.startswith("VmHWM")))

@@ -1,7 +1,7 @@
-"""What TLS between a campaign's client, scheduler and workers costs: flights a minute, and processor time of a flight.
+"""Measure the cost of TLS between a campaign's client, scheduler and workers, in flights a minute and CPU time.
 
-``python -m benchmarks.campaigns.tls_cost [ROUNDS] [FLIGHTS]``.  Campaigns with and without it take turns in one run.
-Other programs change the flights a minute of a round; the processor time of a flight they hardly change.
+``python -m benchmarks.campaigns.tls_cost [ROUNDS] [FLIGHTS]``.  Campaigns with and without TLS alternate in one run.
+Other programs affect the flights a minute of a round, but hardly the CPU time of a flight.
 """
 
 import statistics
@@ -19,26 +19,29 @@ from planfly.campaigns import worker_pool
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.worker_pool import FlightRequest, Workers
 
-ROUNDS, FLIGHTS = 9, 60
-# Of workers at a time.
+# Number of rounds.
+ROUNDS = 9
+# Number of flights of a campaign.
+FLIGHTS = 60
+# Number of workers.
 _WORKERS = 2
 
 
 class Flown(NamedTuple):
-    """Flights a minute, and processor seconds that client, scheduler and workers took for a flight."""
+    """Flights a minute, and CPU time of client, scheduler and workers per flight, s."""
 
     a_minute: float
     cpu: float
 
 
 def _cpu() -> float:
-    """Processor seconds of this process and all that it started."""
+    """Return the CPU time of this process and its children, s."""
     processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
     return sum(sum(one.cpu_times()[:2]) for one in processes)
 
 
 def fly(base: CampaignBase, flights: int) -> Flown:
-    """Fly so many flights, counted from the first that came back of each worker on."""
+    """Fly some flights, and measure from the first result of each worker on."""
     requests: Iterator[FlightRequest] = (FlightRequest(index) for index in range(flights))
     began = cpu = 0.0
     with worker_pool.worker_pool(Workers(_WORKERS), base) as pool:
@@ -50,7 +53,7 @@ def fly(base: CampaignBase, flights: int) -> Flown:
 
 
 def tls_cost(base: CampaignBase, rounds: int = ROUNDS, flights: int = FLIGHTS) -> dict[str, Any]:
-    """The median ratios of all rounds."""
+    """Return the median ratios of all rounds."""
     rates, cpus = [], []
     for number in range(rounds):
         flown: dict[bool, Flown] = {}
@@ -72,7 +75,7 @@ def tls_cost(base: CampaignBase, rounds: int = ROUNDS, flights: int = FLIGHTS) -
 
 
 def main() -> None:
-    """Measure, and print a line each."""
+    """Measure, and print a line for each figure."""
     # Imported here: the rows of campaigns import this.
     from benchmarks.campaigns.campaign_rows import mission_13_km
 
