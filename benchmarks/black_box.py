@@ -126,7 +126,7 @@ def path_costs(paths: Floats, ground: Floats, cylinders: Floats) -> Floats:  # p
 
 
 def by_bearing(rows: Floats, ground: Floats) -> Floats:
-    """Decode paths (n, 12, 3) from distances, [climb angles,] and bearings (n, 20 or 30), as `SphericalToCart.m` does."""
+    """Decode paths (n, 12, 3) from distances, [climb angles,] and bearings (n, 20 or 30), as `SphericalToCart.m`."""
     distance, bearing = rows[:, :NODES], rows[:, -NODES:]
     climb = rows[:, NODES:-NODES] if rows.shape[1] > 2 * NODES else np.zeros_like(distance)
     steps = (distance * np.cos(climb) * np.sin(bearing), distance * np.cos(climb) * np.cos(bearing))

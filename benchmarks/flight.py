@@ -91,7 +91,7 @@ def _most(values: NDArray[Any]) -> float:
 
 
 def windy(seed: int, speed: float = 10.0, turbulence: str = "moderate", share: float = 0.8, **more: Any) -> FlightSetup:
-    """Make the standard mission in a wind from the seed's direction, with slopes at a fraction of the model's limits."""
+    """Make the standard mission in a wind from the seed's direction, with slopes scaled to the model's limits."""
     from_deg = float(np.random.default_rng(seed).uniform(0.0, 360.0))
     way = standard()
     setup = maker()(way, wind=(speed, from_deg), turbulence=turbulence, seed=seed, **more)
