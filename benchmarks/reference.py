@@ -181,7 +181,7 @@ def brute_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
 
 @njit
 def _prefers(u: Floats, v: Floats, columns: Ints, goals: Floats, ends: Ints) -> bool:
-    """Whether u is preferred to v: the relation as it is defined (see `planner.optimisers.preference`)."""
+    """Return True if u is preferred to v, by definition (see `planner.optimisers.preference`)."""
     begin = 0
     for level in range(ends.size):
         better, worse, equal, open_goal, better_in, worse_in = False, False, True, False, False, False
@@ -222,7 +222,7 @@ def _flat(levels: Sequence[Level]) -> tuple[Ints, Floats, Ints]:
 
 
 def preferred(u: Floats, v: Floats, levels: Sequence[Level]) -> bool:
-    """Whether the score row u (c,) is preferred to v by the definition."""
+    """Return True if the score row u (c,) is preferred to v by definition."""
     return bool(_prefers(u, v, *_flat(levels)))
 
 
