@@ -222,7 +222,7 @@ def _excess_height(
 def _excess_height_around(
     data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, lateral: float, above: float, enough: float
 ) -> float:  # pragma: no cover - compiled
-    """Return the largest excess over the maximum height above ground of a line and the lines offset to both sides: m x km.
+    """Return the largest excess over the maximum height of a line and the lines offset to both sides: m x km.
 
     A lower bound on it where it exceeds `enough`.
     """

@@ -54,7 +54,10 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
 
 
 def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
-    """Return the distance from the path to the surface of the nearest missile sphere, m: negative inside, inf without any."""
+    """Return the distance from the path to the nearest missile sphere, m.
+
+    Negative inside, inf without any.
+    """
     return float(missile_distance(data, np.array(waypoints, dtype=np.float64)))
 
 
@@ -120,7 +123,7 @@ def _turn_lengths(data: ProblemArrays, waypoints: Floats, problems: list[str]) -
 
 
 def _arc_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest slope margin along the arcs, which are shorter and hence steeper than the legs they replace, rad."""
+    """Return the smallest slope margin along the arcs, rad, which are shorter, hence steeper, than the legs."""
     smallest = math.inf
     by_numbers = not (math.isnan(data.max_climb) or math.isnan(data.max_dive))
     if not data.legs_hold_turns or data.fly_over or by_numbers:

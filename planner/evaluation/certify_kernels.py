@@ -59,7 +59,7 @@ ENDS = 100.0
 
 @inner
 def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """Return `TRACKED_PIECE` records of the legs of a path (w, 3), followed by those of its corners."""
+    """Return `TRACKED_PIECE` records of the legs of a path (w, 3) and then of its corners."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     lags, wind, across = np.zeros(count - 1, dtype=HEIGHT_LAG), downwind(data.aircraft), data.tracking.across
@@ -153,8 +153,9 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 @compiled
 def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:  # pragma: no cover - compiled
-    """Return the distance from the flight of a path (w, 3) to the surface of the nearest missile sphere, m; inf without missiles.
+    """Return the distance of the flight of a path (w, 3) from the nearest missile sphere, m.
 
+    Inf without missiles.
     The flight is on the legs and arcs, or within the tracking error of them.
     """
     nearest = math.inf
@@ -196,7 +197,7 @@ def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) ->
 
 @compiled
 def with_courses(data: ProblemArrays, path: Floats) -> Floats:  # pragma: no cover - compiled
-    """Return the path extended by a distant point before the start and after the destination, on the courses prescribed there.
+    """Return the path with distant points before the start and after the destination on the prescribed courses.
 
     Without a prescribed course the point is on the extension of the leg, so that there is no turn.
     """
@@ -247,7 +248,7 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 
 @compiled
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """Return `CERTIFIED_PIECE` records of the legs of a path (w, 3), followed by those of its fly-by arcs or corners."""
+    """Return `CERTIFIED_PIECE` records of the legs of a path (w, 3) and then of its fly-by arcs or corners."""
     if data.tracking.has_error:
         return _tracked_heights(data, tracked_pieces(data, waypoints))
     last = waypoints.shape[0] - 1

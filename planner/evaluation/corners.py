@@ -178,7 +178,7 @@ ARC_STEP = math.radians(15.0)
 
 @inlined
 def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
-    """Return half the length of the parabola that blends two slopes, m per unit of slope difference, with a full tailwind."""
+    """Return half the length of the parabola that blends two slopes, m per unit of slope, with a full tailwind."""
     speed = true_airspeed(aircraft, amsl) + wind_speed_at(aircraft, amsl)
     length: float = speed * speed / (2.0 * BLEND_ACCELERATION)
     return length

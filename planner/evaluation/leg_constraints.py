@@ -238,7 +238,7 @@ def _slope_limits_on(
 
 @compiled
 def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Return the steepest climb and dive of the leg a-b, rad: smallest over its ends and middle height, minus the margin."""
+    """Return the slope limits of the leg a-b, rad: smallest over its ends and middle altitude, minus the margin."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     run = math.sqrt(dx * dx + dy * dy)
     ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 1.0)
@@ -365,7 +365,7 @@ def _add_turn_lengths(
 def _arc_excess(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, i: int, legs: Records, corners: Records
 ) -> float:  # pragma: no cover - compiled
-    """Return the amount by which the arc at waypoint i is steeper than the aircraft can fly on either course, m per m."""
+    """Return the excess of the arc's slope at waypoint i over the aircraft's limit on either course, m per m."""
     rise_in = (path[i, 2] - path[i - 1, 2]) / max(legs[i - 1].run, 1.0)
     rise_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1.0)
     slope = arc_slope(rise_in, rise_out, corners[i].tangent, corners[i].radius)

@@ -49,7 +49,7 @@ POINTS = 6
 
 
 def paper_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
-    """Return the violation counts and objectives of paths (n, w, 3) at six points per leg and the destination (eq. 1-11).
+    """Score paths (n, w, 3) at six points per leg and the destination (eq. 1-11).
 
     Returns violations (n, 4) by `planner.plan.Violation` and objectives (n, 4) by `planner.plan.Objective`.
     """

@@ -234,7 +234,10 @@ def _required(
 
 @inlined
 def clearance_at(required: RequiredClearance, east: float, north: float) -> float:  # pragma: no cover - compiled
-    """Return the height above ground required at a point, m: the buffer grows away from fixed ends that have less of it."""
+    """Return the required height above ground at a point, m.
+
+    The buffer grows away from fixed ends with less.
+    """
     # Without branches, so that loops over many points become vector instructions: an end with the full buffer never
     # reduces it.
     dx, dy = east - required.start_east, north - required.start_north
@@ -414,7 +417,7 @@ def _max_buffer(certified: ProblemArrays, at_edge: float) -> float:
 
 
 def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
-    """Return the performance of the aircraft, reduced in turbulence and for its autopilot, within the rates that this demands."""
+    """Return the aircraft's performance, reduced for turbulence and within the rates that the autopilot demands."""
     share, tracking = TURBULENCE_SHARE[scenario.wind.turbulence], limits.tracking
     if tracking is None:
         return derated(limits.performance(), share, share, limits.reserve_climb, limits.reserve_sink)
@@ -424,7 +427,7 @@ def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
 
 
 def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:
-    """Return the growth of the buffer away from an end without it, m per m, that the aircraft can follow in still air."""
+    """Return the growth of the buffer away from an end without it that the aircraft can follow, m per m."""
     if not (limits.reserve_height or limits.reserve_above):
         return BUFFER_GROWTH
     slopes = [

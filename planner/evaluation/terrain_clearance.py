@@ -138,7 +138,7 @@ def _sample(
     rise: float,
     pitch: float,
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Return the height above the required clearance at a point of a line, and the fraction of the line to the next sample.
+    """Return the height above the required clearance at a point of a line, and the step to the next sample.
 
     tiles, tile_side: of `SlopeBounds`. growth: of `RequiredClearance`. need: required clearance. later: largest further
     requirement elsewhere on the line, m. run, rise: of the whole line, m. pitch: spacing of samples near the ground, as

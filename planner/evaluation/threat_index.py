@@ -221,7 +221,7 @@ def kill_density(
     below: float,
     above: float,
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Return the mean kill density over the segment a-b, radii enlarged by the margin, and distances to the nearest spheres, m.
+    """Return the mean kill density over a-b with enlarged radii, and the distances to the nearest spheres, m.
 
     first, last: lengths (m) at a and at b from which the two distances are measured; a distance is exact if below
     `within`. below, above: vertical tracking error, m.
@@ -276,7 +276,7 @@ def _part(f: float, g: float) -> tuple[float, float]:  # pragma: no cover - comp
 
 @inlined
 def _nearer(z: float, rise: float, below: float, above: float) -> float:  # pragma: no cover - compiled
-    """Return the height of a segment's beginning above a missile (m), shifted by the vertical tracking error towards it.
+    """Return the height of a segment's start above a missile (m), shifted towards it by the tracking error.
 
     rise: of the segment up to its closest point.
     """

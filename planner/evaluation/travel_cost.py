@@ -63,9 +63,9 @@ LENGTH = TravelCost(1.0, 0.0, 0.0, _NONE, _NONE, _NONE, _NONE, _NONE)
 
 
 def make_travel_cost(objective: Objective, envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
-    """Return the cost of a path by an objective, in m: its length, or time or energy over those of a metre in level flight.
+    """Make the cost of an objective, in m: length, or time or energy relative to a metre of level flight.
 
-    None where energy is asked for and the aircraft's power is unknown.
+    Returns None for energy if the aircraft's power is unknown.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario

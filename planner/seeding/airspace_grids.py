@@ -443,7 +443,7 @@ def airspace_routes(
     *,
     finer_only: bool = False,
 ) -> Iterator[GridRoute]:
-    """Return routes in the order found, for each grid (stages, number of different routes), with `FINER` times its stages.
+    """Yield routes for each grid (stages, number of different routes), with `FINER` times its stages.
 
     Routes of gentle grids are easier to fly. The first grid is also searched without that restriction, because narrow
     gaps can require steep or curved routes. pause: as in `cheapest_airspace_route`.
@@ -477,7 +477,7 @@ def _route(
     expected: float,
     pause: Callable[[], None],
 ) -> GridRoute | None:
-    """Return the cheapest route over a grid away from those used, None if there is none. expected: first bound to try."""
+    """Return the cheapest route over a grid away from used ones, or None. expected: first bound to try."""
     extra = proximity_cost(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, used)
     for bound in (expected, math.inf):
         points, cost = cheapest_airspace_route(data, frame, grid, extra, bound, pause)

@@ -135,7 +135,7 @@ def _find_steep_arcs(
 def arc_room(
     before: Floats, at: Floats, after: Floats, radius: float, sign: float, steepest: float
 ) -> float:  # pragma: no cover - compiled
-    """Return the length of the arc past the waypoint `at`, minus what it needs to climb (sign 1) or sink (-1) as it does, m.
+    """Return the arc's length past the waypoint `at` minus the length of its climb (sign 1) or descent (-1), m.
 
     Slopes are those of `aircraft.path_limits.arc_slope`; steepest: tangent of what can be flown.
     """

@@ -562,7 +562,7 @@ def grid_routes(
     grids: tuple[tuple[int, int], ...],
     pause: Callable[[], None] = lambda: None,
 ) -> Iterator[GridRoute]:
-    """Return routes in the order found, for each grid (stages, number of different routes). pause: as in `cheapest_route`."""
+    """Yield routes for each grid (stages, number of different routes). pause: as in `cheapest_route`."""
     expected = EXPECTED * math.dist(data.start, data.destination)
     for stages, each in grids:
         grid = make_grid(data, frame, span, stages)

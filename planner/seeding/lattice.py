@@ -265,7 +265,7 @@ def trace_route(parents: Numbers, found: int, lattice: Lattice) -> Records:  # p
 
 @compiled
 def simplify_route(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no cover - compiled
-    """Return the route (j, 3) with as many points of a route (k, 3) as possible dropped: greedy line-of-sight simplification.
+    """Simplify a route (k, 3) to as few points (j, 3) as possible by greedy line of sight.
 
     From each remaining point the leg goes to the furthest point that it reaches without a violation.
     """
@@ -305,7 +305,7 @@ STATES_AT_ONCE = 2000
 
 
 def turning_step(data: ProblemArrays) -> float:
-    """Return the length of a leg between two right-angled turns to the same side, m: their lengths and settling between them."""
+    """Return the length of a leg between two right-angled turns to the same side, m, including settling."""
     if not data.legs_hold_turns:
         return MIN_STEP
     long = MAX_STEP
@@ -350,7 +350,7 @@ def cheapest_lattice_route(
     max_states: int,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Records, int]:
-    """Return `LATTICE_CELL` records of the cheapest route from start to destination, empty if there is none, and states seen.
+    """Return `LATTICE_CELL` records of the cheapest route, empty without one, and the number of states seen.
 
     courses: largest turn per step, in units of 45 degrees. max_states: maximum number of expanded states.
     """
@@ -372,9 +372,9 @@ def lattice_route(
     pause: Callable[[], None] = lambda: None,
     max_states: int = MAX_EXPANDED,
 ) -> tuple[Floats, int]:
-    """Return world points (k, 3) of a route from start to destination over a lattice of this step (m), and states expanded.
+    """Return world points (k, 3) of a route over a lattice of this step (m), and the number of states expanded.
 
-    (0, 3) if there is none. pause: called after every `STATES_AT_ONCE` states; an exception raised there stops the
+    (0, 3) without a route. pause: called after every `STATES_AT_ONCE` states; an exception raised there stops the
     search. max_states: maximum number of expanded states.
     """
     lattice = make_lattice(data, frame, step)

@@ -256,7 +256,7 @@ def _continue_search(
     until: int,
     max_evaluations: int,
 ) -> _State:  # pragma: no cover - compiled
-    """Return the search, with moves (k, d) of initial steps `first` (k,), until at least so many evaluations are made."""
+    """Continue a search, with moves (k, d) of initial steps `first` (k,), for at least `max_evaluations`."""
     here, best, feasible, shortest, before, steps, move, alive, made, _ = state
     limits, candidate, trial = precompute_limits(data), _make_candidate(data, here.size // 3 + 2), here.copy()
     while made < max_evaluations:

@@ -210,9 +210,9 @@ def shorten_path(
     corners_too: bool = False,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, int]:
-    """Return a path (w, 3) world m, shorter or with smaller violations than this one, and the number of models evaluated.
+    """Shorten a path (w, 3) world m, or reduce its violations; also return the number of models evaluated.
 
-    A model counts as an evaluation. extra_margin: additional margin to spheres and ground, m. pause: called after some
+    A model is one evaluation. extra_margin: additional margin to spheres and ground, m. pause: called after some
     milliseconds of work; an exception raised there stops it. Zones and the maximum height above ground are ignored.
     corners_too: whether corners as flown are held clear of the ground and below the steepest slopes, which is slower.
 

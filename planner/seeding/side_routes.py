@@ -130,7 +130,7 @@ CELLS_AT_ONCE = 100_000
 def grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, pause: Callable[[], None] = lambda: None
 ) -> GridCosts:
-    """Return the costs of the cheapest partial routes over a grid, from its start and to its destination, up to a bound.
+    """Return the costs of the cheapest partial routes over a grid, from start and to destination, up to a bound.
 
     pause: called after every `CELLS_AT_ONCE` cells; an exception raised there stops the search.
     """

@@ -250,7 +250,7 @@ def _corner_cost(
 
 @compiled
 def free_points(data: ProblemArrays, points: Floats) -> Flags:  # pragma: no cover - compiled
-    """Whether points (n, 3), world m, are on the map, above the required clearance and outside all kill spheres, (n,).
+    """Return True for points (n, 3), world m, on the map, above the clearance and outside all kill spheres.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
