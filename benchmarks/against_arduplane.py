@@ -1,11 +1,11 @@
-"""ArduPlane's law against ArduPlane itself: both fly the same random plans in the same wind, gust for gust.
+"""Compare ArduPlane's law with ArduPlane itself on the same random plans in the same wind, gust for gust.
 
 ``python -m benchmarks.against_arduplane [--plans N] [--from SEED] [--steep] [--json FILE] [--keep FILE]`` plans
-across the ridges near Jacksboro (random ends, winds of 0 to 10 m/s from anywhere, light or moderate turbulence),
+across the ridges near Jacksboro (random ends, winds of 0 to 10 m/s from any direction, light or moderate turbulence),
 flies each plan with the law and with the program that PLANFLY_ARDUPLANE names (default: ``arduplane`` in the working
-folder), and prints, for all corners that turn enough, how far each overshoots, and how much ground clearance each
-keeps.  --steep plans for climbs that take all the throttle there is; plans otherwise leave gusts a share of it.
---keep writes what the program flew, with its missions, as `tests.authorities` keeps it.
+folder), and prints the overshoots of both at all sufficiently sharp corners, and the ground clearance of both.
+--steep plans climbs at full throttle; other plans leave a part of it for gusts.  --keep writes the program's flights,
+with their missions, in the form of `tests.authorities`.
 """
 
 import argparse
@@ -37,22 +37,29 @@ from world.scenario import Scenario, from_spec, load_scenario
 
 Floats = NDArray[np.float64]
 
-# The program of a real ArduPlane; without the variable, one of the working folder.
+# Program of a real ArduPlane; without the variable, the one in the working folder.
 BINARY = Path(os.environ.get("PLANFLY_ARDUPLANE", "arduplane"))
-# Corners that count: they turn by this much at least (rad), onto a leg of this length at least (m).
-MIN_TURN, MIN_LEG = math.radians(10.0), 250.0
-# Of the leg after a corner, how much of it is looked at: the next corner begins on the rest.
+# Smallest turn of a compared corner, rad.
+MIN_TURN = math.radians(10.0)
+# Shortest leg after a compared corner, m.
+MIN_LEG = 250.0
+# Fraction of the leg after a corner that is used; the next corner begins on the rest.
 LOOKED_AT = 0.75
-# Of TECS_CLMB_MAX, what plans climb with, and in turbulence what it leaves of that.
+# Climb rate of plans as a fraction of TECS_CLMB_MAX; turbulence reduces it further.
 PLANNED_CLIMB = 0.9
-# Distances along the legs at which two tracks are compared, m.
+# Spacing along the legs at which two tracks are compared, m.
 STEP = 20.0
-RATIO_MEDIAN, RATIO_SPREAD, CLEARANCE = (0.95, 1.05), (0.8, 1.25), 3.0
+# Allowed range of the median ratio of overshoots.
+RATIO_MEDIAN = (0.95, 1.05)
+# Allowed range of the spread of the ratios.
+RATIO_SPREAD = (0.8, 1.25)
+# Allowed difference of clearances, m.
+CLEARANCE = 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class Corner:
-    """How one corner was flown: its turn (degrees) and how far the flight overshot the leg after it, m."""
+    """Flown corner: turn (degrees) and overshoot of the leg after it, m."""
 
     waypoint: int
     turn_deg: float
@@ -61,7 +68,7 @@ class Corner:
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """A flight in figures: least clearance, extremes of height error and cross-track distance to the legs, m."""
+    """Figures of a flight: smallest clearance, extremes of altitude error, largest cross-track error, m."""
 
     ended: str
     clearance: float
@@ -72,7 +79,7 @@ class Flown:
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """One plan as both flew it, and how far apart (RMS and most) they flew: across the legs and in height, m."""
+    """Flights of one plan by both, and their differences (RMS and maximum) across the legs and in altitude, m."""
 
     seed: int
     wind: float
@@ -84,9 +91,9 @@ class Compared:
 
 
 def random_setup(seed: int, *, steep: bool = False) -> tuple[FlightSetup, Airframe]:
-    """A plan between random ends in a random wind, for ArduPlane with exact navigation: the first that is feasible.
+    """Make the first feasible plan between random ends in a random wind, for ArduPlane with exact navigation.
 
-    The same seed gives the same one.  steep: whether plans may climb as `_climbing` says.
+    The same seed gives the same plan.  steep: True to allow the climbs of `_climbing`.
     """
     for draw in range(50):
         rng = np.random.default_rng([seed, draw])
@@ -117,9 +124,9 @@ def random_setup(seed: int, *, steep: bool = False) -> tuple[FlightSetup, Airfra
 
 
 def _climbing(airframe: Airframe, scenario: Scenario) -> Airframe:
-    """An airframe that is planned for climbs as steep as descents: more than is left for ArduPlane in turbulence.
+    """Return an airframe whose plans climb more steeply than ArduPlane's plans in turbulence.
 
-    There the throttle comes to its limit now and then, which is the hardest for its law.
+    The throttle then saturates now and then, which is the hardest case for the law.
     """
     limits, parameters = airframe.limits, airframe.autopilot.parameters
     assert limits.tracking is not None
@@ -129,7 +136,7 @@ def _climbing(airframe: Airframe, scenario: Scenario) -> Airframe:
 
 
 def _legs(setup: FlightSetup) -> tuple[Floats, Floats, Floats]:
-    """Starts (l, 2), unit courses (l, 2) and lengths (l,) of a route's legs, m."""
+    """Return starts (l, 2), unit courses (l, 2) and lengths (l,) of a route's legs, m."""
     points = setup.route.waypoints[:, :2]
     steps = np.diff(points, axis=0)
     runs = np.hypot(steps[:, 0], steps[:, 1])
@@ -137,13 +144,13 @@ def _legs(setup: FlightSetup) -> tuple[Floats, Floats, Floats]:
 
 
 def _along_legs(setup: FlightSetup, track: Track) -> tuple[Floats, Floats]:
-    """Distance across (m right) and height at each step along every leg, (n,), of the rows that pass abeam of it."""
+    """Return cross-track distance (m right) and altitude (n,) at each step along every leg, of the rows abeam of it."""
     across, up = [], []
     begin = 0
     for start, course, run in zip(*_legs(setup), strict=True):
         rows = track.position[begin:]
         along = (rows[:, :2] - start) @ course
-        # The leg begins where the flight is first abeam of its start and ends where it is abeam of its end.
+        # The leg begins when the flight is first abeam of its start and ends when it is abeam of its end.
         first = int(np.argmax(along >= 0.0))
         last = first + int(np.argmax(along[first:] >= run)) if (along[first:] >= run).any() else len(along) - 1
         stretch = np.maximum.accumulate(along[first : last + 1])
@@ -177,7 +184,7 @@ def _corners(setup: FlightSetup, track: Track) -> tuple[Corner, ...]:
 
 
 def flown_figures(setup: FlightSetup, track: Track, ended: str) -> Flown:
-    """Figures of one flight."""
+    """Return the figures of one flight."""
     across, _ = _along_legs(setup, track)
     error = track.height_error
     return Flown(
@@ -204,18 +211,18 @@ def compare(seed: int, *, steep: bool = False) -> tuple[Compared, FlightSetup]:
         wind.turbulence,
         flown_figures(setup, law.track, law.ended),
         flown_figures(setup, real.track, real.ended),
-        _apart(law_across - across),
-        _apart(law_up - up),
+        _differences(law_across - across),
+        _differences(law_up - up),
     )
     return compared, setup
 
 
-def _apart(values: Floats) -> tuple[float, float]:
+def _differences(values: Floats) -> tuple[float, float]:
     return math.sqrt(float((values**2).mean())), float(np.abs(values).max())
 
 
 def summary(all_compared: list[Compared]) -> dict[str, Any]:
-    """Ratios of overshoots and differences of clearances, over all plans."""
+    """Return the ratios of overshoots and the differences of clearances, over all plans."""
     ratios = [
         law.overshoot / real.overshoot
         for one in all_compared
@@ -239,7 +246,7 @@ def summary(all_compared: list[Compared]) -> dict[str, Any]:
 
 
 def kept_flight(compared: Compared, setup: FlightSetup) -> dict[str, Any]:
-    """What `tests.authorities` keeps of a real flight: who flew, its scenario, its mission, and its figures."""
+    """Return the record of a real flight for `tests.authorities`: program, scenario, mission and figures."""
     return {
         "arduplane_sha256": hashlib.sha256(BINARY.read_bytes()).hexdigest(),
         "seed": setup.seed,
@@ -263,7 +270,7 @@ def _print(one: Compared, seconds: float) -> None:
 
 
 def main() -> None:
-    """Compare, print, and write what was found."""
+    """Compare, print, and write the results."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.against_arduplane")
     parser.add_argument("--plans", type=int, default=40)
     parser.add_argument("--from", dest="first", type=int, default=1, help="seed of the first plan")

@@ -1,6 +1,6 @@
-"""The rows of the aircraft: trim and modes against the book, and predicted limits against flown ones.
+"""Compare the aircraft's trim and modes with the book, and predicted limits with flown ones.
 
-``python -m benchmarks.aircraft`` prints them alone; `run` is for ``make bench``.
+``python -m benchmarks.aircraft`` prints these rows only; `run` is for ``make bench``.
 """
 
 import math
@@ -20,7 +20,7 @@ PUBLISHED_CONSTANTS = np.array([22.62885, 130.88368, 5.29474, -36.11239])
 
 
 def against_the_book() -> dict[str, float]:
-    """Worst relative errors, on a flat planet that does not turn: trim, modes, published trim and constants."""
+    """Return the worst relative errors of trim, modes, published trim and constants, on a flat non-rotating planet."""
     aerosonde = load_aircraft("aerosonde")
     world = reference.BookAtmosphere()
     trims, modes = [], []
@@ -69,7 +69,7 @@ MUST = {
 
 
 def limit_line(limit: Limit) -> str:
-    """A row: predicted beside flown."""
+    """Return a row with the predicted and the flown limit."""
     wind = f"{limit.wind:.0f} m/s from {math.degrees(limit.wind_from):4.0f}" if limit.wind else "calm"
     factor, unit = (1.0, "m") if limit.kind == "leg" else (180.0 / math.pi, "deg")
     predicted, flown = factor * limit.predicted, factor * limit.flown

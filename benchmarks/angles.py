@@ -1,4 +1,4 @@
-"""Turning angles and slopes of feasible missions as flown, measured from the track alone, against the plan."""
+"""Compare the flown turning angles and slopes of feasible missions, measured from the track alone, with the plan."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,14 +14,15 @@ from world.geometry import wrap
 
 Floats = NDArray[np.float64]
 
-# A leg is measured where it is flown straight for at least this far, m, from a second's flight after the arc and blend
-# before it to the next ones.
-STRETCH, SETTLING = 100.0, 25.0
+# Shortest straight stretch of a leg that is measured, m.
+STRETCH = 100.0
+# Distance after the arc and blend before a leg from which it is measured, m: about a second of flight.
+SETTLING = 25.0
 
 
 @dataclass(frozen=True, slots=True)
 class Angles:
-    """How far the flown angles are from the planned ones, deg: of turns between two measured legs, of measured legs."""
+    """Errors of the flown angles, deg: turns between two measured legs, and slopes of measured legs."""
 
     turns: Floats
     slopes: Floats
@@ -47,7 +48,7 @@ def angles(numbers: Iterable[int], margin: float) -> Angles:
 
 
 def _line(shape: RouteRequirements, track: Track, leg: int) -> Floats:
-    """(3,) east, north and up for each m of the way over the ground, by least squares; NaN for a short stretch."""
+    """Return east, north and up (3,) per metre over the ground, by least squares; NaN for a short stretch."""
     away = track.position - shape.points[leg]
     along = away[:, :2] @ shape.leg_unit(leg)
     low = shape.after[leg] + shape.blend[leg] + SETTLING

@@ -1,6 +1,6 @@
-"""How fast ArduPlane itself and PX4 itself fly in our physics, and where the time goes, as numbers.
+"""Measure how fast ArduPlane and PX4 themselves fly in planfly's physics, and where the time is spent.
 
-``python -m benchmarks autopilot``.  Of a program that is not at hand the part says so and measures nothing.
+``python -m benchmarks autopilot``.  A program that is not available is reported and not measured.
 """
 
 import os
@@ -23,17 +23,18 @@ from flight.simulation.simulate import fly_to_end
 from tests.autopilots import arduplane_program, find_arduplane, find_px4
 from tests.setups import setup_maker, standard
 
+# Number of flights.
 ROUNDS = 3
 
 
 @dataclass(frozen=True, slots=True)
 class AutopilotCost:
-    """One flight, a mission of 13 km; seconds by the clock, or of a processor, a second of flight.
+    """Cost of one flight, a mission of 13 km.
 
-    times_real: seconds of the exchange, from the boot on, over seconds by the clock.
-    in_flight: the same from the first waypoint on.
-    before: s by the clock, from the boot to the first waypoint.
-    ours, theirs: CPU of our process and of the autopilot's.
+    times_real: simulated time from the boot relative to wall-clock time.
+    in_flight: the same from the first waypoint.
+    before: wall-clock time from the boot to the first waypoint, s.
+    ours, theirs: CPU time of planfly's process and of the autopilot's process, s per second of flight.
     """
 
     times_real: float
@@ -44,7 +45,7 @@ class AutopilotCost:
 
 
 def autopilot_cost(make_flight: Callable[[int], SitlFlight], seed: int) -> AutopilotCost:
-    """Fly once, in 5 m/s and light turbulence."""
+    """Fly once, in a wind of 5 m/s and light turbulence."""
     cpu, started = os.times(), time.perf_counter()
     with make_flight(seed) as flight:
         flight.prepare()
@@ -58,7 +59,7 @@ def autopilot_cost(make_flight: Callable[[int], SitlFlight], seed: int) -> Autop
 
 
 def run() -> dict[str, Any]:
-    """Print and return the median flight's figures, by the programs' names."""
+    """Print and return the figures of the median flight, by the programs' names."""
     aerosonde = load_aircraft("aerosonde")
 
     def mission(seed: int) -> FlightSetup:

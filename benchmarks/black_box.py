@@ -1,19 +1,19 @@
-"""`planfly.optimise` on black boxes of others, beside the defaults of pymoo and cmaes.
+"""Compare `planfly.optimise` on published black-box problems with the defaults of pymoo and cmaes.
 
 ``python -m benchmarks.black_box [--seeds N] functions``: functions of the CEC 2005 kind (Suganthan et al., Nanyang
-Technological University 2005) in 20 variables, each moved and turned by a seed of its own; the median error of each
-method.  Three seeds take four minutes of CPU.  Each result is kept in ``--kept FILE`` as it comes, and not computed
-again; a line of progress for each function goes to the standard error.
+Technological University 2005) in 20 variables, each shifted and rotated by its own seed; the median error of each
+method.  Three seeds take four minutes of CPU time.  Each result is stored in ``--kept FILE`` at once, and not computed
+again; a line of progress for each function is written to the standard error.
 
 ``python -m benchmarks.black_box [--seeds N] bbob``: the same for the 24 functions of BBOB in 20 variables, as the
 package coco-experiment computes them (Hansen and others, "COCO: a platform for comparing continuous optimizers in a
-black-box setting", Optimization Methods and Software 36, 2021); each seed is an instance of its own.
+black-box setting", Optimization Methods and Software 36, 2021); each seed is a different instance.
 
 ``python -m benchmarks.black_box paths TERRAIN [--seeds N]``: the cost of Phung and Ha, "Safety-enhanced UAV path
 planning with spherical vector-based particle swarm optimization", Applied Soft Computing 107, 2021, on the scenario
-that their program SPSO comes with.  TERRAIN is its elevation file, ChrismasTerrain.tif, which is public with that
-program.  Ten waypoints are written in three ways: distances and bearings, as the paper has it, at a height of 150 m (20
-variables); the same with climb angles (30); and offsets from the straight line, with heights (20).
+of their program SPSO.  TERRAIN is its elevation file, ChrismasTerrain.tif, which is public with that program.  Ten
+waypoints are encoded in three ways: distances and bearings, as in the paper, at a height of 150 m (20 variables); the
+same with climb angles (30); and offsets from the straight line, with heights (20).
 """
 
 import argparse
@@ -36,7 +36,10 @@ from world.kernels import compiled
 Floats = NDArray[np.float64]
 Cost = Callable[[Floats], Floats]
 
-VARIABLES, EVALUATIONS = 20, 100_000
+# Number of variables of a function.
+VARIABLES = 20
+# Evaluations of each method on a path.
+EVALUATIONS = 100_000
 # Functions of BBOB, by number.
 BBOB = {
     1: "sphere", 2: "ellipsoid", 3: "Rastrigin", 4: "Büche-Rastrigin", 5: "linear slope", 6: "attractive sector",
@@ -45,30 +48,47 @@ BBOB = {
     17: "Schaffers F7", 18: "Schaffers F7, ill-conditioned", 19: "Griewank-Rosenbrock", 20: "Schwefel",
     21: "Gallagher, 101 peaks", 22: "Gallagher, 21 peaks", 23: "Katsuura", 24: "Lunacek, two funnels",
 }  # fmt: skip
-# Of each method on a function.
+# Evaluations of each method on a function.
 ON_FUNCTIONS = 50_000
+# Default file of stored results.
 KEPT = Path("runs") / "black-box-functions.json"
 MODELS: tuple[Model, ...] = ("multistart", "umda", "emna", "differential")
-# Seeds on which nothing was tuned begin here.
+# First seed; nothing was tuned on seeds from here on.
 FIRST_SEED = 100
 
-# The paper's scenario, in cells of its terrain, counted from 1: start and end (east, north, m above ground), cylinders
-# (east, north, radius), and the heights between which it flies.
-START, END = (200.0, 100.0, 150.0), (800.0, 800.0, 150.0)
+# The paper's scenario, in cells of its terrain, counted from 1.  Start: east, north, m above ground.
+START = (200.0, 100.0, 150.0)
+# End: east, north, m above ground.
+END = (800.0, 800.0, 150.0)
+# Cylinders: east, north, radius.
 CYLINDERS = np.array([
     [400.0, 500.0, 80.0], [600.0, 200.0, 70.0], [500.0, 350.0, 80.0],
     [350.0, 200.0, 70.0], [700.0, 550.0, 70.0], [650.0, 750.0, 80.0],
 ])  # fmt: skip
-LOW, HIGH = 100.0, 200.0
+# Lowest height of a path, m above ground.
+LOW = 100.0
+# Highest height of a path, m above ground.
+HIGH = 200.0
+# Number of waypoints between the ends.
 NODES = 10
-# The vehicle's size and the margin beside a cylinder, in cells; the weights of length and height; and the turn and the
-# change of climb from which on they cost, degrees.
-SIZE, MARGIN, PER_LENGTH, PER_HEIGHT, STEEP = 1.0, 10.0, 5.0, 10.0, 45.0
+# Size of the vehicle, in cells.
+SIZE = 1.0
+# Margin around a cylinder, in cells.
+MARGIN = 10.0
+# Weight of the length.
+PER_LENGTH = 5.0
+# Weight of the height.
+PER_HEIGHT = 10.0
+# Turn, and change of climb angle, above which a cost is added, degrees.
+STEEP = 45.0
 
 
 @compiled
 def path_cost(nodes: Floats, ground: Floats, cylinders: Floats) -> float:  # pragma: no cover - compiled
-    """Cost of a path (w, 3), in cells and m above ground: length, cylinders, heights, turns; infinite through one."""
+    """Return the cost of a path (w, 3), in cells and m above ground: length, cylinders, heights and turns.
+
+    The cost is infinite for a path through a cylinder.
+    """
     count = nodes.shape[0]
     up = np.empty(count)
     for i in range(count):
@@ -98,7 +118,7 @@ def path_cost(nodes: Floats, ground: Floats, cylinders: Floats) -> float:  # pra
 
 @compiled
 def path_costs(paths: Floats, ground: Floats, cylinders: Floats) -> Floats:  # pragma: no cover - compiled
-    """Costs (n,) of paths (n, w, 3)."""
+    """Return the costs (n,) of paths (n, w, 3)."""
     out = np.empty(paths.shape[0])
     for k in range(out.size):
         out[k] = path_cost(paths[k], ground, cylinders)
@@ -106,7 +126,7 @@ def path_costs(paths: Floats, ground: Floats, cylinders: Floats) -> Floats:  # p
 
 
 def by_bearing(rows: Floats, ground: Floats) -> Floats:
-    """Paths (n, 12, 3) from distances, [climb angles,] and bearings (n, 20 or 30), as `SphericalToCart.m` has them."""
+    """Decode paths (n, 12, 3) from distances, [climb angles,] and bearings (n, 20 or 30), as `SphericalToCart.m`."""
     distance, bearing = rows[:, :NODES], rows[:, -NODES:]
     climb = rows[:, NODES:-NODES] if rows.shape[1] > 2 * NODES else np.zeros_like(distance)
     steps = (distance * np.cos(climb) * np.sin(bearing), distance * np.cos(climb) * np.cos(bearing))
@@ -120,7 +140,7 @@ def by_bearing(rows: Floats, ground: Floats) -> Floats:
 
 
 def by_offset(rows: Floats, ground: Floats) -> Floats:
-    """Paths (n, 12, 3) from offsets to the left of the straight line, at equal steps along it, and heights (n, 20)."""
+    """Decode paths (n, 12, 3) from offsets to the left of the straight line, at equal steps, and heights (n, 20)."""
     start, way = np.array(START), np.array(END) - np.array(START)
     left = np.array([-way[1], way[0]]) / math.hypot(way[0], way[1])
     paths = np.empty((len(rows), NODES + 2, 3))
@@ -132,7 +152,7 @@ def by_offset(rows: Floats, ground: Floats) -> Floats:
 
 
 def path_boxes() -> dict[str, tuple[Callable[[Floats, Floats], Floats], Floats, Floats]]:
-    """How a path is written, and the box of its variables, by name."""
+    """Return the decoder of a path and the box of its variables, by name of the encoding."""
     way = np.array(END[:2]) - np.array(START[:2])
     ahead, reach = math.atan2(way[1], way[0]), 2.0 * math.hypot(*way) / NODES
     distance, quarter = (np.zeros(NODES), np.full(NODES, reach)), np.full(NODES, 0.25 * math.pi)
@@ -150,7 +170,7 @@ def path_boxes() -> dict[str, tuple[Callable[[Floats, Floats], Floats], Floats, 
 
 
 def measure_paths(terrain: Path, seeds: int) -> None:
-    """Print the median and the worst cost of each model, for each way of writing a path."""
+    """Print the median and the worst cost of each model, for each encoding of a path."""
     with Image.open(terrain) as picture:
         ground = np.maximum(np.asarray(picture, dtype=np.float64), 0.0)
     for name, (decode, low, high) in path_boxes().items():
@@ -168,7 +188,7 @@ def measure_paths(terrain: Path, seeds: int) -> None:
 
 
 def functions(seed: int) -> dict[str, Cost]:
-    """Functions of points (n, d) in [-5, 5], each with a bottom of 0 that is moved and turned by a seed."""
+    """Make functions of points (n, d) in [-5, 5], each with a minimum of 0, shifted and rotated by a seed."""
     rng = np.random.default_rng(seed)
     bottom = rng.uniform(-4.0, 4.0, VARIABLES)
     turn = np.linalg.qr(rng.standard_normal((VARIABLES, VARIABLES)))[0]
@@ -206,7 +226,7 @@ def functions(seed: int) -> dict[str, Cost]:
 
 
 def bbob_functions(seed: int) -> dict[str, Cost]:
-    """Errors of points (n, d) in [-5, 5] on the functions of BBOB, in the instance that a seed numbers."""
+    """Make functions for the errors of points (n, d) in [-5, 5] on BBOB, in the instance of a seed."""
     from cocoex import BareProblem
 
     def cost(number: int) -> Cost:
@@ -218,13 +238,13 @@ def bbob_functions(seed: int) -> dict[str, Cost]:
 
 
 def by_model(model: Model, cost: Cost, seed: int) -> float:
-    """Least value by `planfly.optimise`."""
+    """Return the smallest value found by `planfly.optimise`."""
     search = planfly.optimise([-5.0] * VARIABLES, [5.0] * VARIABLES, model=model, seed=seed)
     return search.minimise(cost, evaluations=ON_FUNCTIONS).value
 
 
 def by_cmaes(cost: Cost, seed: int) -> float:
-    """Least value by `cmaes.CMA` from the middle, a sixth of the box wide; restarted anywhere when it stops."""
+    """Return the smallest value of `cmaes.CMA` from the centre, a sixth of the box wide, with random restarts."""
     from cmaes import CMA
 
     bounds, rng = np.tile([-5.0, 5.0], (VARIABLES, 1)), np.random.default_rng(seed)
@@ -242,7 +262,7 @@ def by_cmaes(cost: Cost, seed: int) -> float:
 
 
 def by_pymoo(name: str, cost: Cost, seed: int) -> float:
-    """Least value by an algorithm of pymoo as it comes."""
+    """Return the smallest value of an algorithm of pymoo with its defaults."""
     from pymoo.algorithms.soo.nonconvex.de import DE
     from pymoo.algorithms.soo.nonconvex.ga import GA
     from pymoo.algorithms.soo.nonconvex.pso import PSO
@@ -261,7 +281,7 @@ def by_pymoo(name: str, cost: Cost, seed: int) -> float:
 
 
 def measure_functions(made: Callable[[int], dict[str, Cost]], seeds: int, kept: Path) -> None:
-    """Print the median error of every method on every function of a seed, with what is kept of earlier runs."""
+    """Print the median error of every method on every function, with the stored results of earlier runs."""
     methods: dict[str, Callable[[Cost, int], float]] = {model: partial(by_model, model) for model in MODELS}
     methods |= {"cmaes": by_cmaes} | {f"pymoo {name}": partial(by_pymoo, name) for name in ("DE", "GA", "PSO")}
     kept.parent.mkdir(exist_ok=True)
@@ -284,7 +304,7 @@ def measure_functions(made: Callable[[int], dict[str, Cost]], seeds: int, kept: 
 
 
 def main() -> None:
-    """Measure what is asked for."""
+    """Measure the requested part."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.black_box")
     parser.add_argument("--seeds", type=int, default=10)
     parts = parser.add_subparsers(dest="part", required=True)

@@ -1,7 +1,7 @@
-"""What the stages cost against each other: bare JSBSim, the closed loop, recording, judging, reading, reporting.
+"""Compare the cost of the stages: bare JSBSim, the closed loop, recording, judging, reading, reporting.
 
-Seconds are CPU seconds, the least of a few rounds, so that other work on the machine counts little.  Flights with and
-without a log are flown in turn, so that a machine that slows down slows them all.
+Seconds are CPU seconds, the smallest of a few rounds, to reduce the effect of other work on the machine.  Flights with
+and without a log alternate, so that a busy machine slows them all down.
 """
 
 import resource
@@ -29,6 +29,7 @@ from planfly.make_plan import make_plan, make_setup
 from planfly.pipeline import BATCH
 from world.scenario import load_scenario
 
+# Number of rounds.
 ROUNDS = 5
 
 
@@ -88,9 +89,9 @@ def run() -> dict[str, Any]:
 
 
 def recording(setup: FlightSetup, airframe: Airframe, folder: Path, rounds: int = 2 * ROUNDS) -> dict[str, float]:
-    """The flight without a log, with one at 20 Hz and with one at 60 Hz, flown in turn: CPU s, the least of each.
+    """Measure the flight without a log, with a log at 20 Hz and at 60 Hz, in turn: smallest CPU time of each, s.
 
-    The cost of recording is a small difference of these, which medians on a busy machine would bury.
+    The cost of recording is a small difference of these, which would be lost in medians on a busy machine.
     """
     log = folder / "flight.mcap"
 
@@ -114,12 +115,12 @@ def recording(setup: FlightSetup, airframe: Airframe, folder: Path, rounds: int 
 
 
 def planfly(*argv: str) -> None:
-    """Run a command in a process of its own."""
+    """Run a command in a separate process."""
     subprocess.run([sys.executable, "-m", "planfly", *argv], check=True, capture_output=True)
 
 
 def in_child(*argv: str, rounds: int = 2) -> float:
-    """CPU seconds of a command, its start included."""
+    """Return the CPU time of a command, including its start, s."""
     spent = []
     for _ in range(rounds):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -130,7 +131,10 @@ def in_child(*argv: str, rounds: int = 2) -> float:
 
 
 def long_flight(folder: Path, legs: int = 20) -> tuple[Path, float]:
-    """Fly legs of 3 minutes or so above the demo's ridges, in wind and turbulence: the log, and the hours in it."""
+    """Fly legs of about 3 minutes above the demo's ridges, in wind and turbulence.
+
+    Return the log and its hours.
+    """
     corners = ([(36.273, -84.28), (36.273, -84.22), (36.313, -84.22), (36.313, -84.28)] * legs)[:legs]
     lines = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t36.273\t-84.28\t1150\t1"]
     lines += [f"{k}\t0\t0\t16\t0\t0\t0\t0\t{lat}\t{lon}\t1200\t1" for k, (lat, lon) in enumerate(corners, 1)]

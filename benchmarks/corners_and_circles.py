@@ -1,8 +1,8 @@
-"""Corners beyond 100 degrees and circles by ArduPlane's law against those that ArduPlane itself flew.
+"""Compare corners beyond 100 degrees and loiters of ArduPlane's law with the flights of ArduPlane itself.
 
-``python -m benchmarks.corners_and_circles`` flies the kept missions of `tests.flight.autopilots.arduplane` by the law,
-and prints each corner's overshoot, each circle's radius (its greatest distance from the middle, where it is tighter
-than the bank limit's) and how near its middle was come to: by the law, by ArduPlane, and their ratio.
+``python -m benchmarks.corners_and_circles`` flies the stored missions of `tests.flight.autopilots.arduplane` with the
+law, and prints the overshoot of each corner, and the radius of each loiter (its largest distance from the centre, if it
+is tighter than the bank limit allows) and its smallest distance: of the law, of ArduPlane, and their ratio.
 """
 
 import math
@@ -11,12 +11,12 @@ import numpy as np
 
 from tests.flight.autopilots.arduplane.kept_missions import CIRCLES, CORNERS, by_law, kept, middles
 
-# A circle that is nearer to its middle somewhere than this share of its radius is not held about it.
-_HELD = 0.8
+# Smallest distance from the centre of a held loiter, as a fraction of its radius.
+_MIN_RADIUS_FRACTION = 0.8
 
 
 def main() -> None:
-    """Print the comparison, and of each kind the 5th, 50th and 95th percentile of the ratios."""
+    """Print the comparison, and the 5th, 50th and 95th percentile of the ratios of each kind."""
     ratios: dict[str, list[float]] = {"overshoot": [], "radius": [], "greatest distance": []}
     for flight in CORNERS:
         law, real = by_law(flight), kept(flight)
@@ -27,7 +27,7 @@ def main() -> None:
         for middle in middles(flight):
             near = law.away(middle).min(), real.away(middle).min()
             wide = law.widest(middle), real.widest(middle)
-            if min(near) > _HELD * min(wide):
+            if min(near) > _MIN_RADIUS_FRACTION * min(wide):
                 _compare("radius", flight, law.radius(middle), real.radius(middle), ratios)
             else:
                 _compare("greatest distance", flight, *wide, ratios)
@@ -39,7 +39,7 @@ def main() -> None:
 
 def _compare(kind: str, name: str, law: float, real: float, ratios: dict[str, list[float]]) -> None:
     if not math.isfinite(law / real):
-        # Left before its distance from the middle had settled.
+        # Left before its distance from the centre had settled.
         return
     ratios[kind].append(law / real)
     print(f"{name}: {kind} {law:.1f} m by law, {real:.1f} m by ArduPlane, {law / real:.3f}")

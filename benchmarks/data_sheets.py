@@ -1,9 +1,9 @@
-"""Aircraft from data sheets: whether random ones fly, and whether their intervals hold what published aircraft do.
+"""Test aircraft made from data sheets: do random ones fly, and do the intervals contain published performance?
 
 ``python -m benchmarks.data_sheets [--sheets N] [--seed S]``.  Random sheets of all classes (0.5 to 25 kg; tail, V-tail,
 flying wing; battery, fuel) are made into aircraft, each of which flies 5 km with turns, climbs and descents in wind and
-light turbulence, by planfly's guidance and by ArduPlane's law.  Then the data sheets of published aircraft: whether the
-stated intervals hold the published model's climb, sink and cruise power.
+light turbulence, with planfly's guidance and with ArduPlane's law.  Then the intervals of data sheets of published
+aircraft are compared with the climb, sink and cruise power of the published models.
 """
 
 import argparse
@@ -31,17 +31,22 @@ from world.errors import FlightError
 
 Floats = NDArray[np.float64]
 
+# Default number of random sheets.
 SHEETS = 20
+# Length of the mission, m.
 LENGTH = 5000.0
+# Altitude of the mission's start, m AMSL.
 AMSL = 500.0
-# Wind as a share of the cruise speed, up to; slopes as shares of the steepest climb and descent, up to.
-WIND, SLOPE = 0.3, 0.5
+# Largest wind as a fraction of the cruise speed.
+WIND = 0.3
+# Largest slope as a fraction of the steepest climb and descent.
+SLOPE = 0.5
 
 
 def random_sheet(random: np.random.Generator) -> DataSheet:
-    """A sheet of a small aircraft: its mass log-uniform, speeds and span of the size that such a mass has.
+    """Draw the data sheet of a small aircraft: log-uniform mass, with typical speeds and span for the mass.
 
-    Wing loading and span are those of aircraft of this mass within a factor of 1.5.
+    Wing loading and span are within a factor of 1.5 of typical aircraft of this mass.
     """
     mass = math.exp(random.uniform(math.log(0.5), math.log(25.0)))
     layout = ("tail", "wing", "vtail")[int(random.integers(3))]
@@ -61,7 +66,7 @@ def random_sheet(random: np.random.Generator) -> DataSheet:
 
 
 def sheets(count: int, seed: int) -> list[DataSheet]:
-    """So many random sheets; one that is no aircraft is drawn anew."""
+    """Draw random sheets; a sheet that is not a valid aircraft is drawn again."""
     random = np.random.default_rng(seed)
     found: list[DataSheet] = []
     while len(found) < count:
@@ -75,7 +80,7 @@ def sheets(count: int, seed: int) -> list[DataSheet]:
 
 
 def route(aircraft: Aircraft, random: np.random.Generator, climb: float, descent: float) -> Floats:
-    """(w, 3) waypoints, 5 km in all: turns of 20 to 90 degrees, slopes up to half of what the aircraft can."""
+    """Return waypoints (w, 3) of 5 km: turns of 20 to 90 degrees, slopes up to half of the aircraft's limits."""
     legs = 7
     runs = random.uniform(0.6, 1.4, legs)
     runs *= LENGTH / runs.sum()
@@ -88,7 +93,7 @@ def route(aircraft: Aircraft, random: np.random.Generator, climb: float, descent
 
 
 def fly_both(aircraft: Aircraft, seed: int) -> dict[str, tuple[str, float, float]]:
-    """How the flight ended by each law, and its largest errors across and in height, m."""
+    """Fly with each law; return how the flight ended, and its largest errors across and in altitude, m."""
     random = np.random.default_rng([seed, 7])
     make = setup_maker(aircraft)
     climb, descent = make(np.array([[0.0, 0.0, AMSL], [0.0, 500.0, AMSL]])).envelope.air_angles(aircraft.airspeed, AMSL)
@@ -107,7 +112,7 @@ def fly_both(aircraft: Aircraft, seed: int) -> dict[str, tuple[str, float, float
 
 
 def fly_random_sheets(count: int, seed: int) -> dict[str, int]:
-    """How many of the random sheets complete their mission by each law."""
+    """Count the random sheets that complete their mission with each law."""
     done = {"planfly": 0, "arduplane": 0}
     print(f"{count} random data sheets (seed {seed}), {LENGTH / 1000.0:g} km each:")
     with tempfile.TemporaryDirectory() as place:
@@ -133,7 +138,10 @@ def fly_random_sheets(count: int, seed: int) -> dict[str, int]:
 
 @dataclass(frozen=True, slots=True)
 class Performance:
-    """Steepest climb at cruise, rad; sink without power, m/s; power in level flight, W; all at 500 m."""
+    """Performance at 500 m: steepest climb at cruise, rad; sink without power, m/s.
+
+    Power in level flight, W.
+    """
 
     climb: float
     sink: float
@@ -141,7 +149,7 @@ class Performance:
 
 
 def performance(aircraft: Aircraft, variation: Variation | None = None) -> Performance:
-    """What a model does at its cruise speed; NaN where it has no such flight."""
+    """Compute a model's performance at its cruise speed; NaN for a flight that it cannot trim."""
     fdm = Fdm(aircraft, variation=variation, tried=True)
     speed = aircraft.airspeed
     level = straight(fdm, speed, AMSL)
@@ -156,26 +164,29 @@ def performance(aircraft: Aircraft, variation: Variation | None = None) -> Perfo
 
 
 # Data sheets of published aircraft as their makers would print them: mass, span, area, speeds and bank; climb, sink and
-# power are what is asked for.  The class of each leaves the aircraft itself out: the other flying wing, the other tail.
+# power are to be estimated.  The class of each excludes the aircraft itself: the other flying wing, the other tail.
 _OTHER_WING = {
     "zagi": {"lift_slope": 0.893, "drag": 0.0194, "oswald": 0.829},
     "x8": {"lift_slope": 0.717, "drag": 0.0257, "oswald": 0.9},
 }
 _OTHER_TAIL = {"aerosonde": {"drag": 0.0426, "oswald": 0.75}}
 SHEETS_OF: dict[str, AircraftClass] = {
-    "aerosonde": replace(TAIL, **_OTHER_TAIL["aerosonde"]),  # the Ultra Stick's
+    "aerosonde": replace(TAIL, **_OTHER_TAIL["aerosonde"]),  # of the Ultra Stick
     "zagi": replace(WING, **_OTHER_WING["zagi"]),
     "x8": replace(WING, **_OTHER_WING["x8"]),
     "c172x": TAIL,
 }
-# JSBSim's Cessna flies level more slowly than a Cessna's handbook has it stall: 48 knots without flaps.
+# Stall speed, m/s, from the Cessna's handbook (48 knots without flaps), as JSBSim's Cessna flies level more slowly.
 STALL = {"c172x": 24.7}
-# Each quantity of `Performance`, and its interval's two-sided share.
+# Two-sided probability of the intervals of `Performance`.
 INSIDE = 0.95
 
 
 def sheet_of(name: str) -> DataSheet:
-    """The data sheet of a published aircraft; a Cessna's numbers are no small aircraft's, and taken all the same."""
+    """Return the data sheet of a published aircraft.
+
+    Also of a Cessna, although it is not a small aircraft.
+    """
     known = load_aircraft(name)
     top = fastest(Fdm(known), AMSL)
     return DataSheet(
@@ -188,7 +199,7 @@ def sheet_of(name: str) -> DataSheet:
 
 
 def check_intervals(draws: int) -> int:
-    """How many of climb, sink and power of the published models lie within their data sheet's intervals."""
+    """Count the published values of climb, sink and power that are within their data sheet's intervals."""
     print(f"data sheets of published aircraft: intervals of {100.0 * INSIDE:.0f} %, {draws} draws each")
     inside = 0
     with tempfile.TemporaryDirectory() as place:
@@ -201,7 +212,7 @@ def check_intervals(draws: int) -> int:
             found = [performance(made, Variation(properties=drawn.properties(k))) for k in range(draws)]
             for what, unit, factor in (("climb", "deg", 180.0 / math.pi), ("sink", "m/s", 1.0), ("power", "W", 1.0)):
                 values = factor * np.array([getattr(one, what) for one in found])
-                # A drawn aircraft that cannot fly level has no power; it climbs below the least.
+                # A drawn aircraft that cannot fly level has no power; its climb is below the smallest.
                 low, high = np.nanquantile(values, (0.5 - 0.5 * INSIDE, 0.5 + 0.5 * INSIDE)).tolist()
                 true = factor * getattr(published, what)
                 inside += (good := low <= true <= high)

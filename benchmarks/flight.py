@@ -1,7 +1,7 @@
-"""How closely flights follow, how the laws compare, and how fast the closed loop is, as numbers.
+"""Measure the tracking accuracy of flights, compare guidance laws, and time the closed loop.
 
-Each function returns figures; ``run`` prints them.  `tests/flight/simulation/test_tracking_accuracy.py` holds them to
-their limits.
+Each function returns figures; ``run`` prints them.  `tests/flight/simulation/test_tracking_accuracy.py` checks them
+against their limits.
 """
 
 import math
@@ -29,8 +29,11 @@ from tests.setups import MakeSetup, setup_maker, standard
 
 Floats = NDArray[np.float64]
 
-# Seconds after the start that are not counted, and how far (m) a straight stretch keeps from its corners.
-SETTLING, CLEAR = 5.0, 400.0
+# Time after the start that is excluded, s.
+SETTLING = 5.0
+# Distance of a straight stretch from its corners, m.
+CLEAR = 400.0
+# Differences of the aircraft from the model.
 MISMATCHES = {
     "mass +10 %": Variation(mass=1.1),
     "mass -10 %": Variation(mass=0.9),
@@ -38,15 +41,15 @@ MISMATCHES = {
     "control power -25 %": Variation(control=0.75),
     "volts -8 %": Variation(volts=0.92),
 }
-# The reference laws at their best: what `python -m benchmarks.tuning.tune_reference_laws` found, in winds that are not
-# reported on and on the inner loops as they are; what swings in any of those winds is left out.
+# Best settings of the reference laws, found by `python -m benchmarks.tuning.tune_reference_laws` in winds that are not
+# reported on and with the present inner loops, without settings that oscillate in any of those winds.
 BEST_L1 = {"l1_period": 5.0, "l1_damping": 1.2}
 BEST_FIELD = {"field_path": 0.1, "field_course": 11.0, "field_course_integral": 0.2}
 
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """RMS and largest error across and in height, m, greatest bank, degrees, and whether the flight completed."""
+    """Errors of a flight: RMS and largest error across and in altitude, m, largest bank, degrees, and completion."""
 
     cross_rms: float
     cross_max: float
@@ -57,7 +60,7 @@ class Errors:
 
     @property
     def worst(self) -> float:
-        """The larger of the largest errors, m."""
+        """Larger of the two largest errors, m."""
         return max(self.cross_max, self.height_max)
 
 
@@ -88,7 +91,7 @@ def _most(values: NDArray[Any]) -> float:
 
 
 def windy(seed: int, speed: float = 10.0, turbulence: str = "moderate", share: float = 0.8, **more: Any) -> FlightSetup:
-    """The standard mission in a wind from the seed's direction, slopes to a share of what the model can fly in it."""
+    """Make the standard mission in a wind from the seed's direction, with slopes scaled to the model's limits."""
     from_deg = float(np.random.default_rng(seed).uniform(0.0, 360.0))
     way = standard()
     setup = maker()(way, wind=(speed, from_deg), turbulence=turbulence, seed=seed, **more)
@@ -120,7 +123,7 @@ def moderate(seeds: Sequence[int], guidance_hz: int = 60) -> list[Errors]:
 
 
 def anywhere(seeds: Sequence[int]) -> list[Errors]:
-    """Flights in winds of 0 to 10 m/s, none to moderate turbulence."""
+    """Fly in winds of 0 to 10 m/s, none to moderate turbulence."""
     found = []
     for seed in seeds:
         random = np.random.default_rng([seed, 1])
@@ -130,7 +133,7 @@ def anywhere(seeds: Sequence[int]) -> list[Errors]:
 
 
 def mismatched(seeds: Sequence[int]) -> dict[str, list[Errors]]:
-    # The same slopes for all, though with fewer volts the motor gives up to a quarter less climb.
+    # The same slopes for all, although at a lower voltage the motor gives up to a quarter less climb.
     return {
         name: [errors_of(simulate(windy(seed), aerosonde(), variation=variation)) for seed in seeds]
         for name, variation in MISMATCHES.items()
@@ -139,7 +142,7 @@ def mismatched(seeds: Sequence[int]) -> dict[str, list[Errors]]:
 
 @contextmanager
 def flown_with(gains: Gains) -> Iterator[None]:
-    """Let flights take these gains instead of their aircraft's."""
+    """Use these gains in flights, instead of the gains of their aircraft."""
     module: Any = simulation
     usual = module.load_gains
     module.load_gains = lambda aircraft: gains
@@ -150,7 +153,7 @@ def flown_with(gains: Gains) -> Iterator[None]:
 
 
 def straight_rms(setup: FlightSetup, flown: SimulatedFlight, clear: float = CLEAR) -> float:
-    """RMS distance (m) of the true track from the legs, further than ``clear`` from their corners."""
+    """Return the RMS distance (m) of the true track from the legs, more than ``clear`` from their corners."""
     way, track, found = setup.route.waypoints, flown.track, []
     for leg in range(len(way) - 1):
         step = (way[leg + 1] - way[leg])[:2]
@@ -165,7 +168,7 @@ def straight_rms(setup: FlightSetup, flown: SimulatedFlight, clear: float = CLEA
 
 
 def reference_laws(seeds: Sequence[int]) -> dict[str, list[float]]:
-    """RMS on the straight legs, the reference laws' over ours, in the same wind, for each seed."""
+    """Return the RMS on the straight legs of the reference laws relative to planfly's, in the same wind, by seed."""
     gains = load_gains(aerosonde())
     laws: dict[str, tuple[str, Gains]] = {
         "L1, ArduPlane's defaults": ("l1", gains),
@@ -185,7 +188,7 @@ def reference_laws(seeds: Sequence[int]) -> dict[str, list[float]]:
 
 @dataclass(frozen=True, slots=True)
 class LoopCost:
-    """CPU time of the closed loop over that of bare `run()`, and how many times real time each goes: medians of rounds.
+    """CPU time of the closed loop relative to bare `run()`, and the real-time factor of each: medians of rounds.
 
     least: the smallest ratio of a round.
     """
@@ -196,17 +199,17 @@ class LoopCost:
     least: float
 
 
-# Seconds of flight that the closed loop and bare JSBSim take in turn.
+# Flight time of the turns of closed loop and bare JSBSim, s.
 TURN = 10
 
 
 def loop_cost(guidance_hz: int, rounds: int = 7, seconds: int = 240, *, ardupilot: bool = False) -> LoopCost:
-    """The closed loop against bare JSBSim, without set-up: the median round's ratio and factors, CPU time.
+    """Compare the CPU time of the closed loop with bare JSBSim, without the set-up, in the median round.
 
-    Both step the same configuration at the same rate, in turns of ten seconds of flight, so that a machine that slows
-    down slows both.
+    Both step the same configuration at the same rate, in turns of ten seconds of flight, so that both are slowed down
+    alike on a busy machine.
 
-    ardupilot: whether ArduPlane's law flies, in place of planfly's guidance.
+    ardupilot: True to fly ArduPlane's law instead of planfly's guidance.
     """
     ratios, closed, bares = [], [], []
     autopilot = ArduPlane(ArduPilotParameters.load(aerosonde())) if ardupilot else PlanflyGuidance()
@@ -231,7 +234,7 @@ def loop_cost(guidance_hz: int, rounds: int = 7, seconds: int = 240, *, ardupilo
     return LoopCost(*(float(np.median(found)) for found in (ratios, closed, bares)), least=min(ratios))
 
 
-# Must and aim, by the row's name or the end of it; rows without are for information.
+# Limit and aim, by the row's name or the end of it; rows without them are for information.
 NEEDED = {
     "calm: cross_rms, median": (0.10, 0.05),
     "calm: cross_max, 95 %": (0.6, 0.4),
@@ -256,7 +259,7 @@ NEEDED = {
 
 
 def rows(seeds: int = 20) -> dict[str, float]:
-    """Every figure that flights answer, by its row's name."""
+    """Return every figure of flights, by the name of its row."""
     found: dict[str, float] = {}
 
     def tracking(name: str, flights: Sequence[Errors]) -> None:

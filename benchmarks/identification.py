@@ -1,13 +1,13 @@
-"""How well aircraft of known truth are identified from their logs: fresh variants, flown by ArduPlane's law.
+"""Measure how well aircraft of known truth are identified from their logs, flown by ArduPlane's law.
 
     python -m benchmarks.identification --first 1001 --count 10 --repeats 2 --out build/identification.json
     python -m benchmarks.identification --first 4001 --count 3 --missions --shorts 0 --out build/missions.json
 
-Each variant's truth is drawn from 0.8 of the priors, with the things that identification holds fixed drawn as well.
-It flies the mission of manoeuvres in light turbulence, `tests.instrumented_flights` makes its sensors and clocks, and
+The truth of each variant is drawn from 0.8 of the priors, including the parameters that identification keeps fixed.  It
+flies the mission of manoeuvres in light turbulence, `tests.instrumented_flights` simulates its sensors and clocks, and
 the log is identified, once without and once with the battery's current.  With ``--missions`` it flies missions A and B
-of the project's shared flights in place of that (27 minutes), and both logs are identified together.  ``--sensors 2``
-draws the errors of airspeed, level and accelerometers from twice the deviations that are usual.
+of the project's shared flights instead (27 minutes), and both logs are identified together.  ``--sensors 2`` draws the
+errors of airspeed, level and accelerometers from twice the usual deviations.
 """
 
 import argparse
@@ -50,47 +50,53 @@ from world.errors import FlightError, LogError
 
 Floats = NDArray[np.float64]
 
-_SHARE, _CRUISE = 0.8, 25.0
-# Standard deviations of what identification holds fixed, and of moments of inertia.
-_FIXED = {"side_force": 0.25, "lift_of_rate": 0.4, "lift_of_elevator": 0.4}
-_INERTIA = {"roll_inertia": 0.15, "pitch_inertia": 0.12, "yaw_inertia": 0.12}
-_STEEP = 1.2
-# Either of the missions takes longer than this, s.
-_MISSION_SECONDS = 600.0
+# Width of the draws as a fraction of the priors.
+_PRIOR_FRACTION = 0.8
+# Cruise airspeed, m/s.
+_CRUISE_MPS = 25.0
+# Standard deviations of the parameters that identification keeps fixed.
+_FIXED_SIGMAS = {"side_force": 0.25, "lift_of_rate": 0.4, "lift_of_elevator": 0.4}
+# Standard deviations of the moments of inertia.
+_INERTIA_SIGMAS = {"roll_inertia": 0.15, "pitch_inertia": 0.12, "yaw_inertia": 0.12}
+# Slope of the too steep leg, as a factor on the true climb.
+_STEEP_SLOPE_RATIO = 1.2
+# Shortest complete flight of a mission, s.
+_MIN_MISSION_S = 600.0
+# Folder of the missions.
 MISSIONS = Path(__file__).parent / "identification_missions"
 
 
 def drawn_truth(seed: int) -> Truth:
-    """A truth by its seed that climbs at least 4 degrees, flies level below full throttle, and trims in JSBSim."""
+    """Draw a truth that climbs at least 4 degrees, flies level below full throttle, and trims in JSBSim."""
     numbers = base_model(load_aircraft("aerosonde"))
     for attempt in range(100):
         draw = np.random.default_rng([seed, attempt])
         values: dict[str, float] = {"mass": float(np.clip(draw.normal(1.0, 0.12), 0.8, 1.25))}
         for parameter in PARAMETERS:
             field = parameter.name.replace("-", "_")
-            off = float(np.clip(draw.normal(), -2.0, 2.0)) * _SHARE * parameter.sd
+            off = float(np.clip(draw.normal(), -2.0, 2.0)) * _PRIOR_FRACTION * parameter.sd
             values[field] = max(0.25, parameter.prior + off) if parameter.kind == "factor" else 0.5 * off
-        for field, sd in (_FIXED | _INERTIA).items():
+        for field, sd in (_FIXED_SIGMAS | _INERTIA_SIGMAS).items():
             values[field] = float(np.clip(draw.normal(1.0, sd), 1.0 - 2.0 * sd, 1.0 + 2.0 * sd))
         truth = Truth(**values)
         base = scaled(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
-        flown = performance(base, true_values(truth), _CRUISE, DENSITY)
+        flown = performance(base, true_values(truth), _CRUISE_MPS, DENSITY)
         stable = truth.pitch_stiffness > 0.5 and truth.weathercock > 0.4 and truth.roll_damping > 0.5
         if math.radians(4.0) < flown.climb[0] < math.radians(16.0) and flown.throttle[0] < 0.93 and stable:
             with tempfile.TemporaryDirectory() as name:
-                if straight(Fdm(changed_aerosonde(Path(name) / "tried", truth)), _CRUISE, AMSL) is not None:
+                if straight(Fdm(changed_aerosonde(Path(name) / "tried", truth)), _CRUISE_MPS, AMSL) is not None:
                     return truth
     raise RuntimeError(f"seed {seed}: no aircraft that flies")
 
 
 def true_values(truth: Truth) -> Floats:
-    """(n,) of the parameters."""
+    """Return the true parameters (n,)."""
     true = truth.parameters()
     return np.array([true[name] for name in NAMES])
 
 
 def worse_sensors(seed: int, factor: float, *, battery: bool) -> Sensors:
-    """Sensors by a seed, with errors of airspeed, level and accelerometers so many times as large."""
+    """Draw sensors, with the errors of airspeed, level and accelerometers scaled by a factor."""
     usual = drawn_sensors(seed, battery=battery)
     ahead, right, down = usual.bias
     return replace(
@@ -102,7 +108,10 @@ def worse_sensors(seed: int, factor: float, *, battery: bool) -> Sensors:
 def identify(
     tracks: Sequence[Track], changed: Aircraft, base: BaseModel, seed: int, sensors: Sensors
 ) -> tuple[Estimate, Any, float]:
-    """The estimate, the last log, and the CPU time it took, s; tracks: of flights with the same sensors."""
+    """Return the estimate, the last log, and the CPU time, s.
+
+    Tracks: tracks of flights with the same sensors.
+    """
     prior = load_aircraft("aerosonde")
     logs = [sensed(track, changed, sensors, seed + 100_000 * k) for k, track in enumerate(tracks)]
     began = time.process_time()
@@ -113,11 +122,14 @@ def identify(
 
 
 class NotFlown(Exception):
-    """An aircraft that does not fly missions A and B to their ends."""
+    """Raised for an aircraft that does not fly missions A and B to their ends."""
 
 
 def fly_missions(folder: Path, truth: Truth, seed: int) -> tuple[list[Track], Aircraft]:
-    """Missions A and B by ArduPlane's law, each in a wind of its own and light turbulence.  Raises NotFlown."""
+    """Fly missions A and B by ArduPlane's law, each in its own wind and light turbulence.
+
+    Raises NotFlown.
+    """
     aircraft = changed_aerosonde(folder / f"v{seed}", truth)
     tracks = []
     for k, file in enumerate(sorted(MISSIONS.glob("*.waypoints"))):
@@ -128,15 +140,15 @@ def fly_missions(folder: Path, truth: Truth, seed: int) -> tuple[list[Track], Ai
             params=str(aircraft.folder / "ardupilot.parm"),
         )  # fmt: skip
         tracks.append(made.track)
-        if made.track.time[-1] < _MISSION_SECONDS:
+        if made.track.time[-1] < _MIN_MISSION_S:
             raise NotFlown(f"seed {seed}: {file.name} ended after {made.track.time[-1] / 60.0:.1f} min")
     return tracks, aircraft
 
 
 def errors(base: BaseModel, truth: Floats, estimate: Estimate) -> dict[str, Any]:
-    """Errors of performance, and whether truths lie within their intervals."""
-    best = performance(base, np.vstack([truth, estimate.values]), _CRUISE, DENSITY)
-    drawn = performance(base, draw_aircraft(estimate), _CRUISE, DENSITY)
+    """Return the errors of performance, and if the true values are within their intervals."""
+    best = performance(base, np.vstack([truth, estimate.values]), _CRUISE_MPS, DENSITY)
+    drawn = performance(base, draw_aircraft(estimate), _CRUISE_MPS, DENSITY)
     low, high = np.degrees(np.percentile(drawn.climb, [2.5, 97.5]))
     climb, found = np.degrees(best.climb)
 
@@ -161,7 +173,7 @@ def errors(base: BaseModel, truth: Floats, estimate: Estimate) -> dict[str, Any]
 
 
 def verdict_of_too_steep(folder: Path, climb: float, estimate: Estimate, base: BaseModel, log: Any) -> str:
-    """What the identified model says of a leg that is a fifth steeper than the truth climbs; climb: rad.
+    """Return the identified model's verdict on a leg a fifth steeper than the true climb; climb: rad.
 
     "refused", "undecided" or "flyable".
     """
@@ -171,7 +183,7 @@ def verdict_of_too_steep(folder: Path, climb: float, estimate: Estimate, base: B
     place.mkdir()
     for name, text in folder_files(found, "mine", (prior.battery_voltage, prior.battery_energy)).items():
         (place / name).write_text(text, encoding="utf-8")
-    rise = 2000.0 * math.tan(_STEEP * climb)
+    rise = 2000.0 * math.tan(_STEEP_SLOPE_RATIO * climb)
     lat, lon, ground = HOME
     rows = [
         ("0 1 0 16", lat, lon, ground),
@@ -186,7 +198,7 @@ def verdict_of_too_steep(folder: Path, climb: float, estimate: Estimate, base: B
 
 
 def one_variant(seed: int, repeats: int, shorts: int, factor: float, *, missions: bool) -> dict[str, Any]:
-    """All rows of one variant; factor: on the errors of its sensors."""
+    """Return all rows of one variant; factor: factor on the errors of its sensors."""
     truth = drawn_truth(seed)
     values = true_values(truth)
     numbers = base_model(load_aircraft("aerosonde"))
@@ -203,7 +215,7 @@ def one_variant(seed: int, repeats: int, shorts: int, factor: float, *, missions
             track, changed = fly_identification(folder, truth, seed, repeats=repeats)
             tracks = [track]
         made["minutes"] = sum(float(track.time[-1]) for track in tracks) / 60.0
-        climb = float(performance(base, values, _CRUISE, DENSITY).climb[0])
+        climb = float(performance(base, values, _CRUISE_MPS, DENSITY).climb[0])
         for battery in (False, True):
             estimate, log, spent = identify(tracks, changed, base, seed, worse_sensors(seed, factor, battery=battery))
             own = folder / ("with" if battery else "without")
@@ -238,12 +250,12 @@ def main() -> None:
         try:
             row = one_variant(seed, args.repeats, args.shorts, args.sensors, missions=args.missions)
         except NotFlown as error:
-            # The next seed takes its place.
+            # The next seed replaces it.
             print(error, flush=True)
             seed += 1
             continue
         except (LogError, FlightError) as error:
-            # An answer of its own: it counts, and no other seed takes its place.
+            # A refusal is a result: it is included, and not replaced by another seed.
             row = {"seed": seed, "refused": str(error)}
         rows.append(row)
         print(json.dumps(row), flush=True)
@@ -253,7 +265,7 @@ def main() -> None:
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """The rows of the table; of variants whose log was refused, how many."""
+    """Return the rows of the table, and the number of variants whose log was refused."""
     refused = [row["seed"] for row in rows if "refused" in row]
     made: dict[str, Any] = {"refused": refused}
     rows = [row for row in rows if "refused" not in row]

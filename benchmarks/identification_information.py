@@ -1,12 +1,13 @@
-"""What logs of missions A and B hold of sink and power at most without the battery's current, and what would add to it.
+"""Bound the information of logs of missions A and B on sink and power without the battery's current.
 
     python -m benchmarks.identification_information --seeds 7001 7002 7003
 
-The bound of Cramer and Rao with the priors that identification has (van Trees 1968, section 2.4.3): no estimate that
-begins with them can be surer, whatever its method.  It is taken at the truth, of the forward force over each log's own
-airspeeds and throttles, for three kinds of noise: that of the accelerometers alone, with airspeed and angle of attack
-known exactly; that with the airspeed sensor's; and what identification assumes that no model gets right.  Then with
-glides at idle at cruise speed added, and with the battery's current.
+The Cramer-Rao bound with the priors of the identification (van Trees 1968, section 2.4.3): no estimate with these
+priors can be more certain, by any method.  It is computed at the truth, for the forward force at each log's own
+airspeeds and throttles, for three kinds of noise: of the accelerometers alone, with exactly known airspeed and angle of
+attack; with the noise of the airspeed sensor; and with the model error that identification assumes.  Then with added
+glides at idle
+at cruise speed, and with the battery's current.
 """
 
 import argparse
@@ -49,16 +50,25 @@ from tests.instrumented_flights import drawn_sensors, sensed
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_CRUISE, _TWO_SIDED = 25.0, 1.96
-_OWN = np.array([parameter.group == "drag" for parameter in PARAMETERS])
-# Noise of the sensors of `tests.instrumented_flights`: m/s^2 at 50 Hz, and m/s at 10 Hz; of the current, A at 5 Hz.
-_ACCELEROMETER, _AIRSPEED, _CURRENT = 0.05, 0.08, 0.3
+# Cruise airspeed, m/s.
+_CRUISE_MPS = 25.0
+# Standard deviations of a two-sided 95 % interval.
+_INTERVAL_SIGMAS = 1.96
+# True for the parameters of drag.
+_IS_DRAG_PARAMETER = np.array([parameter.group == "drag" for parameter in PARAMETERS])
+# Noise of the accelerometers of `tests.instrumented_flights`, m/s^2 at 50 Hz.
+_ACCELEROMETER_NOISE_MPS2 = 0.05
+# Noise of the airspeed sensor, m/s at 10 Hz.
+_AIRSPEED_NOISE_MPS = 0.08
+# Noise of the current, A at 5 Hz.
+_CURRENT_NOISE_A = 0.3
+# Durations of the added glides, s.
 GLIDES = (0, 20, 60, 120, 300)
 
 
 def flown_as(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
-    """(3,) sink (rad), power (W) and climb (rad) at cruise of an aircraft with these unknowns, nuisances among them."""
-    own = int(_OWN.sum())
+    """Return sink (rad), power (W) and climb (rad) at cruise for these unknowns, including nuisance parameters."""
+    own = int(_IS_DRAG_PARAMETER.sum())
     resistance, idle, voltage, elevator = unknown[own + 1 : own + 5]
     motor = base.motor.changed(resistance=1.0 + resistance, idle=1.0 + idle)
     assert isinstance(motor, ElectricMotor)
@@ -66,13 +76,13 @@ def flown_as(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
     changed = replace(base, motor=replace(motor, voltage=motor.voltage * (1.0 + voltage)),
                       coefficients=replace(c, drag_elevator=c.drag_elevator * (1.0 + elevator)))  # fmt: skip
     every = values.copy()
-    every[_OWN] = unknown[:own]
-    made = performance(changed, every, _CRUISE, DENSITY)
+    every[_IS_DRAG_PARAMETER] = unknown[:own]
+    made = performance(changed, every, _CRUISE_MPS, DENSITY)
     return np.concatenate([made.sink, made.power, made.climb])
 
 
 def gradients(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
-    """(3, p) of `flown_as`, as shares of sink and power, and the climb in degrees."""
+    """Return the gradients (3, p) of `flown_as`, relative to sink and power, and of the climb in degrees."""
     step = 1e-4
     at = flown_as(base, values, unknown)
     rows = [(flown_as(base, values, unknown + step * one) - at) / step for one in np.eye(len(unknown))]
@@ -81,13 +91,13 @@ def gradients(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
 
 
 def glide(base: BaseModel, values: Floats, seconds: float) -> ForwardForces:
-    """A steady glide at idle and cruise speed, at as many rows a second as thinned signals have."""
+    """Make a steady glide at idle and cruise speed, at the row rate of thinned signals."""
     count = max(2, round(seconds * GRID_HZ / FORCE_THINNING))
     flat = np.ones(count)
     signals: Any = SimpleNamespace(
-        airspeed=_CRUISE * flat, throttle=0.0 * flat, density=DENSITY * flat, smooth=lambda series, band: series
+        airspeed=_CRUISE_MPS * flat, throttle=0.0 * flat, density=DENSITY * flat, smooth=lambda series, band: series
     )
-    c, pressure = base.coefficients, 0.5 * DENSITY * _CRUISE**2 * base.area
+    c, pressure = base.coefficients, 0.5 * DENSITY * _CRUISE_MPS**2 * base.area
     lift = base.mass * GRAVITY / pressure * flat
     doubt = AlphaDoubt()
     tilts = pressure * lift * np.vstack([doubt.angle * flat, doubt.by_lift * (lift - doubt.middle)])
@@ -97,7 +107,10 @@ def glide(base: BaseModel, values: Floats, seconds: float) -> ForwardForces:
 
 
 def information(forces: ForwardForces, unknown: Floats, noise: str, *, current: bool = False) -> Floats:
-    """(p, p) of the forward force, and of the current; noise: "accelerometers", "sensors" or "model"."""
+    """Return the information (p, p) of the forward force, and of the current if it is used.
+
+    noise: "accelerometers", "sensors" or "model".
+    """
     rows, amperes = forces.slopes(unknown)
     step = 0.05
     signals: Any = forces.signals
@@ -105,34 +118,37 @@ def information(forces: ForwardForces, unknown: Floats, noise: str, *, current: 
         airspeed=signals.airspeed + step, throttle=signals.throttle, density=signals.density, smooth=signals.smooth
     )
     by_speed = replace(forces, signals=shifted).predicted(unknown)[0] - forces.predicted(unknown)[0]
-    # The drag of a gust, too: twice the share of the speed.
+    # Includes the drag of a gust: twice the relative change of the speed.
     drag = np.array(unknown[:2]) @ forces.drags / forces.base.mass
     by_speed = by_speed / step + 2.0 * drag / signals.airspeed
-    variance = np.full(len(rows), _ACCELEROMETER**2)
+    variance = np.full(len(rows), _ACCELEROMETER_NOISE_MPS2**2)
     if noise != "accelerometers":
-        variance += np.square(by_speed * _AIRSPEED) * GRID_HZ / 10.0
+        variance += np.square(by_speed * _AIRSPEED_NOISE_MPS) * GRID_HZ / 10.0
     if noise == "model":
         variance += FORCE_FLOOR**2 * FLOOR_SECONDS * GRID_HZ
     made = FORCE_THINNING * (rows / variance[:, np.newaxis]).T @ rows
     if current:
-        floor = _CURRENT**2 * (FLOOR_SECONDS * GRID_HZ / FORCE_THINNING if noise == "model" else 1.0)
+        floor = _CURRENT_NOISE_A**2 * (FLOOR_SECONDS * GRID_HZ / FORCE_THINNING if noise == "model" else 1.0)
         made = made + amperes.T @ amperes / floor
     return np.asarray(made)
 
 
 def halves(precision: Floats, slopes: Floats, known: Flags) -> dict[str, float]:
-    """Half the 95 % interval of sink and power, percent, and of the climb, degrees; known: held at the truth."""
+    """Return half the 95 % interval of sink and power, percent, and of the climb, degrees.
+
+    Known: fixed at the truth.
+    """
     inverse = np.zeros_like(precision)
     free = np.flatnonzero(~known)
     inverse[np.ix_(free, free)] = np.linalg.inv(precision[np.ix_(free, free)])
-    sink, power, climb = _TWO_SIDED * np.sqrt(np.einsum("ij,jk,ik->i", slopes, inverse, slopes))
+    sink, power, climb = _INTERVAL_SIGMAS * np.sqrt(np.einsum("ij,jk,ik->i", slopes, inverse, slopes))
     return {"sink_percent": 100.0 * sink, "power_percent": 100.0 * power, "climb_deg": float(climb)}
 
 
 def stated(base: BaseModel, estimate: Estimate) -> dict[str, float]:
-    """The same of an estimate: half of what it says itself."""
-    best = performance(base, estimate.values, _CRUISE, DENSITY)
-    drawn = performance(base, draw_aircraft(estimate), _CRUISE, DENSITY)
+    """Return half the intervals that an estimate states itself."""
+    best = performance(base, estimate.values, _CRUISE_MPS, DENSITY)
+    drawn = performance(base, draw_aircraft(estimate), _CRUISE_MPS, DENSITY)
     ends = [np.percentile(values, [2.5, 97.5]) for values in (drawn.sink, drawn.power, np.degrees(drawn.climb))]
     sink, power, climb = (0.5 * float(high - low) for low, high in ends)
     return {
@@ -158,9 +174,9 @@ def one_seed(seed: int) -> dict[str, Any]:
     signals = aligned_signals(records, estimate.clocks, base)
     forces = forward_forces(signals, base, values, vane(signals, base, values), AlphaDoubt())
     _, sds = drag_priors(with_current=False)
-    unknown = np.concatenate([values[_OWN], np.zeros(len(NUISANCES))])
+    unknown = np.concatenate([values[_IS_DRAG_PARAMETER], np.zeros(len(NUISANCES))])
     before, slopes = np.diag(1.0 / np.square(sds)), gradients(base, values, unknown)
-    nothing, nuisances = np.zeros(len(sds), np.bool_), np.arange(len(sds)) >= int(_OWN.sum())
+    nothing, nuisances = np.zeros(len(sds), np.bool_), np.arange(len(sds)) >= int(_IS_DRAG_PARAMETER.sum())
     throttle = forces.signals.throttle
     made: dict[str, Any] = {
         "seed": seed, "minutes": sum(record.seconds for record in records) / 60.0,

@@ -1,11 +1,11 @@
-"""How well flying wings of known truth are identified from logs of their elevons: fresh variants of three bases.
+"""Measure how well flying wings of known truth are identified from logs of their elevons.
 
     python -m benchmarks.identification_wings --first 7301 --count 3 --out build/wings.json
 
-The bases are the X8, the Zagi, and a wing of 2.1 kg from its data sheet.  A variant's truth is drawn from 0.8 of the
-priors, on what its base's model has factors for, with another mass.  It flies twelve minutes of manoeuvres by
+The bases are the X8, the Zagi, and a wing of 2.1 kg from its data sheet.  The truth of a variant is drawn from 0.8 of
+the priors, for the factors of its base's model, with another mass.  It flies twelve minutes of manoeuvres by
 ArduPlane's law in light turbulence, and its log is identified from the base, once without and once with the battery's
-current.  What the truth and what was found fly like is JSBSim's answer for both.
+current.  The performance of the truth and of the result is computed with JSBSim.
 """
 
 import argparse
@@ -37,9 +37,11 @@ from world.errors import FlightError, LogError
 
 Floats = NDArray[np.float64]
 
-_SHARE = 0.8
+# Width of the draws as a fraction of the priors.
+_PRIOR_FRACTION = 0.8
+# Names of the bases.
 BASES = ("x8", "zagi", "foam")
-# Factors that the models of all three have.
+# Factors that all three models have.
 _DRAWN = (
     "zero-lift-drag", "induced-drag", "thrust", "motor-speed", "lift-slope", "pitch-stiffness", "pitch-damping",
     "elevator-power", "roll-damping", "aileron-power",
@@ -47,14 +49,17 @@ _DRAWN = (
 
 
 def base_aircraft(name: str, folder: Path) -> Aircraft:
-    """The X8 or the Zagi, or the foam wing of the docs from its data sheet."""
+    """Load the X8 or the Zagi, or make the foam wing of the docs from its data sheet."""
     if name != "foam":
         return load_aircraft(name)
     return planfly.new_aircraft(folder / "foam", mass=2.1, span=1.6, cruise=15.0, stall=10.0, layout="wing")
 
 
 def flown_like(aircraft: Aircraft) -> tuple[float, float, float] | None:
-    """Steepest climb and descent, degrees, and the power of level flight, W, at cruise; None of one that cannot."""
+    """Return climb and descent limits, degrees, and power of level flight, W, at cruise.
+
+    None if it cannot fly.
+    """
     fdm = Fdm(aircraft)
     level = straight(fdm, aircraft.airspeed, AMSL)
     up, down = (steepest(fdm, aircraft.airspeed, AMSL, level) for steepest in (full_throttle, idle))
@@ -65,13 +70,13 @@ def flown_like(aircraft: Aircraft) -> tuple[float, float, float] | None:
 
 
 def drawn_wing(base: Aircraft, folder: Path, seed: int) -> tuple[Aircraft, dict[str, float]]:
-    """A wing by its seed, with its truth, that climbs 4 to 16 degrees at cruise and is stable."""
+    """Draw a stable wing that climbs 4 to 16 degrees at cruise, with its truth."""
     for attempt in range(100):
         draw = np.random.default_rng([seed, attempt, 8])
         truth = {MASS: float(np.clip(draw.normal(1.0, 0.12), 0.8, 1.25))}
         for name in (*_DRAWN, TORQUE):
             sd = PARAMETERS[INDEX[name]].sd
-            truth[name] = max(0.25, 1.0 + float(np.clip(draw.normal(), -2.0, 2.0)) * _SHARE * sd)
+            truth[name] = max(0.25, 1.0 + float(np.clip(draw.normal(), -2.0, 2.0)) * _PRIOR_FRACTION * sd)
         if truth["pitch-stiffness"] < 0.5 or truth["roll-damping"] < 0.5:
             continue
         made = changed_wing(base, folder / f"v{seed}-{attempt}", truth)
@@ -82,7 +87,7 @@ def drawn_wing(base: Aircraft, folder: Path, seed: int) -> tuple[Aircraft, dict[
 
 
 def one_variant(name: str, seed: int, repeats: int) -> dict[str, Any]:
-    """All figures of one variant.  Raises LogError, or FlightError, for a log or an estimate that is refused."""
+    """Return all figures of one variant.  Raises LogError or FlightError for a refused log or estimate."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         base = base_aircraft(name, folder)
@@ -163,7 +168,7 @@ def main() -> None:
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Worst and median errors, and how many truths lie within their intervals."""
+    """Return worst and median errors, and the number of true values within their intervals."""
     flown = [row for row in rows if "refused" not in row]
     made: dict[str, Any] = {"refused": len(rows) - len(flown)}
     if not flown:

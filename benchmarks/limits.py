@@ -1,4 +1,4 @@
-"""Limits that the envelope predicts against those that flights show: slopes, and the shortest leg between two turns."""
+"""Compare the envelope's limits with flown limits: slopes, and the shortest leg between two turns."""
 
 import math
 from collections.abc import Callable
@@ -22,30 +22,40 @@ from world.scenario import from_spec
 
 Floats = NDArray[np.float64]
 
+# Course of the flights, rad.
 COURSE = 0.5
+# Altitude of the flights, m AMSL.
 AMSL = 800.0
+# Bank limit of the flights, rad.
 BANK = math.radians(30.0)
-# A slope is held if the airspeed does not fall in a climb or rise in a dive by more than this (m/s, mean of 5 s), and
-# the height stays within this (m).
-SPEED_HELD, HEIGHT_HELD = 0.25, 1.0
-# A leg is long enough if its turns are flown at the bank limit, as they are with this much leg (m) between them: the
-# track within 2 m of the fly-by path (the verdict lets it swing out by 5 m), and the largest mean bank of 2 seconds at
-# most half a degree more than the limit, or than far apart (30.7 degrees on a 30 degree arc in calm air), if that is
-# more, but no more than so much.  Guidance may not slow down for arcs here: that would hold the bank in turns too tight
-# for the airspeed.
+# Largest decrease of the airspeed in a held climb, or increase in a held dive, m/s, mean of 5 s.
+SPEED_HELD = 0.25
+# Largest altitude error on a held slope, m.
+HEIGHT_HELD = 1.0
+# A leg is long enough if its turns are flown at the bank limit, as with a leg of `FAR` between them: the track within 2
+# m of the fly-by path (the verdict allows 5 m), and the largest mean bank of 2 seconds at most half a degree above the
+# limit, or above the bank of turns far apart (30.7 degrees on a 30 degree arc in calm air) if that is more, but at most
+# `MAX_BANK`.  Guidance may not slow down for arcs here, as that would keep the bank in turns too tight for the
+# airspeed. Length of a leg between independent turns, m.
 FAR = 4000.0
-CROSS_HELD, BANK_HELD, MAX_BANK = 2.0, math.radians(0.5), BANK + math.radians(1.3)
+# Largest cross-track error on a sufficient leg, m.
+CROSS_HELD = 2.0
+# Excess of the mean bank over the limit on a sufficient leg, rad.
+BANK_HELD = math.radians(0.5)
+# Upper limit of the mean bank in any case, rad.
+MAX_BANK = BANK + math.radians(1.3)
+# Number of bisection steps.
 _BISECTIONS = 7
 
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """One limit, predicted and flown.  Slopes in rad, positive in the direction of their name; legs in m.
+    """Predicted and flown limit.  Slopes in rad, positive in the direction of their name; legs in m.
 
-    same_way: whether both turns of a leg go the same way round.
+    same_way: True if both turns of a leg have the same direction.
 
-    optimistic: by how much more was predicted than flown; negative where the prediction is on the safe side.
-    conservative: by which share of the flown limit the prediction stays inside it.
+    optimistic: excess of the predicted over the flown limit; negative if the prediction is on the safe side.
+    conservative: distance of the prediction inside the flown limit, as a fraction of it.
     """
 
     kind: str
@@ -66,7 +76,7 @@ class Limit:
 
 
 def made_setup(points: ArrayLike, aircraft: Aircraft, wind: float, wind_from: float) -> FlightSetup:
-    """A flight through these points at cruise over flat ground, in a steady wind (m/s, rad that it blows from)."""
+    """Make a flight through points at cruise over flat ground, in a steady wind (m/s, rad that it blows from)."""
     way = np.array(points, dtype=np.float64)
     low, high = way.min(axis=0) - 3000.0, way.max(axis=0) + 3000.0
     ends = [dict(zip(("east_m", "north_m", "amsl_m"), map(float, p), strict=True)) for p in (way[0], way[-1])]
@@ -101,7 +111,10 @@ def made_setup(points: ArrayLike, aircraft: Aircraft, wind: float, wind_from: fl
 
 
 def bisect(holds: Callable[[float], bool], good: float, bad: float) -> float:
-    """The value between one that holds and one that does not, where that changes.  NaN if it does not change."""
+    """Bisect for the boundary between a value that holds and one that does not.
+
+    NaN if there is no change.
+    """
     if not holds(good) or holds(bad):
         return math.nan
     for _ in range(_BISECTIONS):
@@ -111,10 +124,10 @@ def bisect(holds: Callable[[float], bool], good: float, bad: float) -> float:
 
 
 def slope_limit(aircraft: Aircraft, direction: float, wind: float = 0.0, wind_from: float = 0.0) -> Limit:
-    """The steepest climb (direction 1) or dive (-1) that is held over 1.2 km, after a level kilometre.
+    """Find the steepest climb (direction 1) or dive (-1) that is held over 1.2 km, after a level kilometre.
 
-    The prediction is the envelope's at the leg's end that limits it: the top of a climb (thinner air, less power), and
-    the top of a dive (thinner air, less drag).
+    The prediction is the envelope's limit at the limiting end of the leg: the top of a climb (thinner air, less power),
+    and the top of a dive (thinner air, less drag).
     """
     along = np.array([math.sin(COURSE), math.cos(COURSE), 0.0])
     low = np.array([0.0, 0.0, AMSL])
@@ -150,7 +163,7 @@ def _held(track: Track, airspeed: float, direction: float) -> bool:
 
 
 def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0, wind_from: float = 0.0) -> Limit:
-    """The shortest leg between two turns (rad each), the same way round or one each, at 30 degrees of bank."""
+    """Find the shortest leg between two turns (rad each), in the same or opposite directions, at 30 degrees of bank."""
     courses = np.array([COURSE, COURSE + turn, COURSE + (2.0 * turn if same_way else 0.0)])
     ways = np.array([[math.sin(course), math.cos(course), 0.0] for course in courses])
     straight = 60.0 * aircraft.airspeed
@@ -183,14 +196,14 @@ def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0
 
 
 def _held_bank(track: Track) -> float:
-    """Largest mean bank over two seconds, either way, rad."""
+    """Return the largest mean bank over two seconds, to either side, rad."""
     width = round(2.0 / float(np.median(np.diff(track.time))))
     bank = track.attitude[:, 0].astype(np.float64)
     return float(np.abs(np.convolve(bank, np.full(width, 1.0 / width), "valid")).max())
 
 
 def calm_limits(*, whole: bool) -> list[Limit]:
-    """Slopes and shortest legs of the Aerosonde in calm air; fewer of them unless ``whole``."""
+    """Measure slopes and shortest legs of the Aerosonde in calm air; fewer of them unless ``whole``."""
     aircraft = load_aircraft("aerosonde")
     found = [slope_limit(aircraft, side) for side in ((1.0, -1.0) if whole else (1.0,))]
     turns = [(turn, way) for turn in (60.0, 30.0, 45.0, 90.0, 120.0) for way in (False, True)]
@@ -199,7 +212,7 @@ def calm_limits(*, whole: bool) -> list[Limit]:
 
 
 def wind_limits(*, whole: bool) -> list[Limit]:
-    """Slopes and shortest legs of the Aerosonde in a wind of 10 m/s: from ahead, behind and the side."""
+    """Measure slopes and shortest legs of the Aerosonde in a wind of 10 m/s: from ahead, behind and the side."""
     aircraft = load_aircraft("aerosonde")
     sides = [COURSE + part * math.pi for part in ((0.0, 0.5, 1.0, 1.5) if whole else (1.0,))]
     found = []

@@ -1,12 +1,13 @@
-"""OMPL's Informed RRT* on a scenario: ``python -m benchmarks.ompl_peer NAME SEED SECONDS [RATIO]`` prints JSON.
+"""Run OMPL's Informed RRT* on a scenario: ``python -m benchmarks.ompl_peer NAME SEED SECONDS [RATIO]`` prints JSON.
 
-States are points of the map between floor and ceiling; a motion is valid if its leg meets slope, terrain and map and
-no missile reaches it, by the same compiled evaluation and margins that our search uses.  A tree of straight motions
-knows no turns: each path that is shorter than the last is certified, and the last that passes is reported.
+States are points of the map between floor and ceiling; a motion is valid if its leg meets slope, terrain and map limits
+and no missile reaches it, by the same compiled evaluation and margins as in planfly's search.  A tree of straight
+motions ignores turns: each path that is shorter than the last one is certified, and the last certified path is
+reported.
 
-The planner is asked after each of its steps whether its best cost has fallen; if it has, the path is certified, and
-the search goes on.  Seconds are CPU time of the process without those certificates: they are ours.  With RATIO it ends
-with the first certified path of at most that length ratio.
+After each step of the planner its best cost is checked; if it has decreased, the path is certified, and the search
+continues.  Seconds are CPU time of the process without these certificates, which are planfly's work.  With RATIO it
+ends with the first certified path of at most that length ratio.
 """
 
 import math
@@ -24,12 +25,12 @@ from benchmarks.task import Task, graded_scores, is_safe, make_task
 
 Floats = NDArray[np.float64]
 
-# Steps of the planner between looks at the clock; to its best cost it looks after each.
+# Number of steps of the planner between readings of the clock; its best cost is checked after each step.
 STEPS = 20
 
 
 class Motions(ob.MotionValidator):
-    """Checks motions in the direction of the mission; counts them, and the time they take."""
+    """Validator of motions in the direction of the mission, which counts them and their time."""
 
     def __init__(self, information: object, task: Task) -> None:
         super().__init__(information)
@@ -40,9 +41,9 @@ class Motions(ob.MotionValidator):
         self.count, self.nanoseconds = 0, 0
 
     def checkMotion(self, one: list[float], two: list[float]) -> bool:
-        """The library's callback."""
+        """Check a motion (callback of the library)."""
         began = time.process_time_ns()
-        # Climb and dive limits differ, and rewiring turns motions round: all are evaluated as they would be flown.
+        # Climb and dive limits differ, and rewiring reverses motions: all are evaluated in the direction of flight.
         forward = (two[0] - one[0]) * self.east + (two[1] - one[1]) * self.north >= 0.0
         valid = self.is_valid(one, two) if forward else self.is_valid(two, one)
         self.count += 1
@@ -50,7 +51,7 @@ class Motions(ob.MotionValidator):
         return valid
 
     def is_valid(self, one: list[float], two: list[float]) -> bool:
-        """Whether the leg violates nothing and no missile reaches it."""
+        """Return True if the leg violates nothing and no missile reaches it."""
         for row, state in enumerate((one, two)):
             for axis in range(3):
                 self.leg[0, row, axis] = state[axis]
@@ -59,7 +60,7 @@ class Motions(ob.MotionValidator):
 
 
 class Watch:
-    """Ends a stretch of the search when its best cost falls, or at a time."""
+    """Termination condition that ends a part of the search when its best cost decreases, or at a time."""
 
     def __init__(self, planner: og.InformedRRTstar, seconds: float) -> None:
         self.planner, self.seconds = planner, seconds
@@ -67,11 +68,11 @@ class Watch:
         self.began = time.process_time()
 
     def spent(self) -> float:
-        """CPU s since the search began, without our certificates."""
+        """Return the CPU time since the search began, without planfly's certificates, s."""
         return time.process_time() - self.began - self.certifying
 
     def __call__(self) -> bool:
-        """Whether to end this stretch; the library's callback."""
+        """Return True to end this part of the search (callback of the library)."""
         self.steps += 1
         cost = float(self.planner.bestCost().value())
         if cost < self.best:
@@ -81,17 +82,17 @@ class Watch:
 
 
 class Anywhere(ob.StateValidityChecker):
-    """States need no check of their own: every motion is checked whole."""
+    """Validator of states, which are always valid, as every motion is checked completely."""
 
     def isValid(self, _state: object) -> bool:
-        """The library's callback."""
+        """Accept a state (callback of the library)."""
         return True
 
 
 def plan(task: Task, seed: int, seconds: float, ratio: float = 0.0) -> Found:
-    """Run for so many seconds of CPU, compiled code warm, or to a certified path of this length ratio.
+    """Run for a CPU time, s, with compiled code loaded, or to a certified path of this length ratio.
 
-    trace: each certified path that is shorter than those before it.
+    The trace of the result has each certified path that is shorter than all earlier ones.
     """
     ou.noOutputHandler()
     ou.RNG.setSeed(seed)
@@ -125,7 +126,7 @@ def plan(task: Task, seed: int, seconds: float, ratio: float = 0.0) -> Found:
     watch = Watch(planner, seconds)
     spent = 0.0
     while spent < seconds and not shortest <= ratio:
-        # A condition that has ended one stretch ends every later one: each gets its own.
+        # A condition that has ended one part stays fulfilled, so that each part gets a new one.
         setup.solve(ob.PlannerTerminationCondition(watch))
         spent = watch.spent()
         if not setup.haveExactSolutionPath():

@@ -1,4 +1,4 @@
-"""Peers on the same problem and evaluation function: NSGA-II (pymoo), CMA-ES (cmaes), Informed RRT* (ompl)."""
+"""Compare NSGA-II (pymoo), CMA-ES (cmaes) and Informed RRT* (ompl) on the same problem and evaluation."""
 
 import json
 import math
@@ -20,21 +20,23 @@ from planner.search.plan_path import plan_path
 
 Floats = NDArray[np.float64]
 
-# Where a straight frame holds no path; of these no best length is known.
+# Scenarios without a path in a straight frame; their best length is not known.
 TRAPS = ("trap-u", "trap-valley", "trap-wall", "trap-spiral")
-# A race ends this close to the best known length; seeds of each.
-WITHIN, RACES = 0.02, 5
+# Excess over the best known length at which a race ends, as a fraction.
+WITHIN = 0.02
+# Number of seeds of each race.
+RACES = 5
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What one search by a peer came to.
+    """Result of one search by a peer.
 
     path: (w, 3) world m as lists.
-    safe: whether it meets all four constraints, certified again, and no missile reaches it.
-    checks: paths evaluated, or motions checked.
-    callback_share: of the time, what was spent in our evaluation as called from the peer.
-    trace: (seconds, length ratio) each time its best got shorter; of OMPL and ours, certified paths.
+    safe: True if the path, certified again, meets all four constraints and no missile reaches it.
+    checks: number of paths evaluated, or of motions checked.
+    callback_share: fraction of the time spent in planfly's evaluation, called from the peer.
+    trace: (seconds, length ratio) whenever the best path got shorter; for OMPL and planfly, of certified paths.
     """
 
     path: list[list[float]]
@@ -48,7 +50,7 @@ class Found:
 
 
 def found(task: Task, path: Floats, seconds: float, checks: int, inside: float, trace: Any = ()) -> Found:
-    """Certify a peer's path and put its numbers together."""
+    """Certify a peer's path and collect its numbers."""
     certificate = task.certificate(path)
     problems = list(certificate.problems)
     if certificate.kill_distance <= 0.0:
@@ -60,14 +62,17 @@ def found(task: Task, path: Floats, seconds: float, checks: int, inside: float, 
 
 
 def best_path(task: Task, vectors: Floats) -> Floats:
-    """The first certified safe path of vectors (n, d), in the order of their scalar cost; or the first of all."""
+    """Return the first certified safe path of vectors (n, d), in the order of scalar cost.
+
+    Or the first of all.
+    """
     order = np.argsort(scalar(*task.scores(vectors)), kind="stable")
     paths = task.encoding.decode(vectors[order])
     return next((path for path in paths if is_safe(task.certificate(path))), paths[0])
 
 
 def solve_with_cmaes(task: Task, seed: int, evaluations: int, *, seeded: bool = True, sigma: float = 0.05) -> Found:
-    """CMA-ES in the smooth basis, from our best coarse seed or from the straight line; it restarts."""
+    """Search with CMA-ES in the smooth basis with restarts, from planfly's best coarse seed or the straight line."""
     from cmaes import CMA
 
     started, inside = time.process_time(), 0.0
@@ -93,7 +98,7 @@ def solve_with_cmaes(task: Task, seed: int, evaluations: int, *, seeded: bool = 
         done += size
         outside = np.abs((vectors - clipped) / (high - low)).sum(axis=1)
         with warnings.catch_warnings():
-            # A population of equal costs scales by nothing inside the library.
+            # A population of equal costs divides by zero inside the library.
             warnings.simplefilter("ignore", RuntimeWarning)
             search.tell(list(zip(asked, costs + outside, strict=True)))
         row = int(np.argmin(costs))
@@ -111,7 +116,7 @@ def solve_with_cmaes(task: Task, seed: int, evaluations: int, *, seeded: bool = 
 
 
 def solve_with_nsga2(task: Task, seed: int, evaluations: int) -> Found:
-    """NSGA-II as pymoo ships it: length and kill exposure, four constraints, the paper's population."""
+    """Search with pymoo's NSGA-II: length and kill exposure, four constraints, the paper's population."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import Problem as PymooProblem
     from pymoo.optimize import minimize
@@ -138,7 +143,7 @@ def solve_with_nsga2(task: Task, seed: int, evaluations: int) -> Found:
 
 
 def solve_with_ompl(task: Task, seed: int, seconds: float, ratio: float = 0.0) -> Found:
-    """Informed RRT* for so many seconds or to this length ratio, in a process of its own: its bindings talk at exit."""
+    """Search with Informed RRT* for a time or to a length ratio, in a process of its own, as it prints at exit."""
     command = [sys.executable, "-m", "benchmarks.ompl_peer", task.scenario.name]
     command += [str(number) for number in (seed, seconds, ratio)]
     result = subprocess.run(command, check=True, capture_output=True, text=True)
@@ -146,7 +151,10 @@ def solve_with_ompl(task: Task, seed: int, seconds: float, ratio: float = 0.0) -
 
 
 def measure(seconds: float) -> dict[str, Any]:
-    """Every peer once on each problem, seed 1, the paper's budget; OMPL so many seconds of CPU.  Prints a table."""
+    """Run every peer once on each problem, seed 1, the paper's budget, OMPL for a CPU time, s.
+
+    Print a table.
+    """
     print("\nPeers on the hard set and traps, seed 1: one problem, evaluation and certificate; one core, CPU s, warm")
     print(f"  {'problem':<13}{'method':<28}{'safe':>5}{'PLR':>9}{'/ best':>8}{'CPU s':>8}{'checks':>9}{'in ours':>9}")
     record: dict[str, Any] = {}
@@ -162,7 +170,7 @@ def measure(seconds: float) -> dict[str, Any]:
             "ompl InformedRRTstar": partial(solve_with_ompl, task, 1, seconds),
         }
         if problem in TRAPS:
-            # A straight frame's grids hold no route out of a trap, so that there are no seeds to begin from.
+            # The grids of a straight frame have no route out of a trap, so that there are no seeds to begin from.
             del rows["cmaes, our seeds and basis"]
         for name, work in rows.items():
             package = name.split()[0].rstrip(",")
@@ -182,10 +190,11 @@ def measure(seconds: float) -> dict[str, Any]:
 
 
 def race(seconds: float) -> dict[str, Any]:
-    """CPU time to a certified path within 2 % of best known, OMPL's Informed RRT* and ours.  Prints a table.
+    """Print the CPU time to a certified path within 2 % of the best known, for OMPL's Informed RRT* and planfly.
 
-    Ours counts from the call of the planner, scenario and envelope loaded: problem, grids, certificates.  OMPL's counts
-    from its first step, without certificates.  One that does not come there within `seconds` counts as that long.
+    Planfly's time begins with the call of the planner, with scenario and envelope loaded, and includes problem, grids
+    and certificates.  OMPL's time begins with its first step, without certificates.  A search that does not reach the
+    length within `seconds` is recorded with that time.
     """
     print(f"\nTo a certified path within {100 * WITHIN:.0f} % of best known, CPU ms; median of seeds 1..{RACES}")
     print(f"  {'problem':<9}{'ours':>9}{'OMPL':>11}{'ratio':>10}{'in evaluation':>10}{'ratio without it':>19}")
@@ -215,7 +224,7 @@ def race(seconds: float) -> dict[str, Any]:
 
 
 def _time_to(item: Found, ratio: float, never: float) -> float:
-    """First time in the trace at which the length ratio is at most this, s."""
+    """Return the first time in the trace at which the length ratio is at most this, s."""
     return next((seconds for seconds, length in item.trace if length <= ratio), never)
 
 
@@ -229,7 +238,10 @@ def _print_row(problem: str, name: str, item: Found, known: float) -> None:
 
 
 def solve_with_planfly(task: Task, seed: int) -> Found:
-    """The default planner; its trace is of certified paths, and their certificates count."""
+    """Search with the default planner.
+
+    Its trace contains certified paths, and includes the time of certificates.
+    """
     trace: list[tuple[float, float]] = []
 
     def see(path: Floats) -> None:
@@ -244,5 +256,5 @@ def solve_with_planfly(task: Task, seed: int) -> Found:
 
 
 def as_json(item: Found) -> str:
-    """What was found as one line of JSON."""
+    """Return a result as one line of JSON."""
     return json.dumps(asdict(item))

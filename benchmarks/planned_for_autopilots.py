@@ -1,9 +1,9 @@
-"""Default plans on three terrains, flown by an autopilot's law or by the program itself: what harm comes of it.
+"""Fly default plans on three terrains with an autopilot's law or the program itself, and count violations.
 
 ``python -m benchmarks.planned_for_autopilots [--law LAW] [--plans N] [--from NUMBER] [--autopilot PATH]`` plans random
-scenarios (`tests.autopilot_plans`: winds of 0 to 10 m/s, none to moderate turbulence, satellites' errors) for a law,
-flies each, and prints the margins that the certificate promised and that the flight kept, and in the end how many came
-to harm, with moderate turbulence by itself.
+scenarios (`tests.autopilot_plans`: winds of 0 to 10 m/s, none to moderate turbulence, GNSS errors) for a law, flies
+each, and prints the margins of the certificate and of the flight, and at the end the number of violations, with a
+separate number for moderate turbulence.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from world.scenario import with_flight
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """One plan and its flight: what is wrong with it, "" for nothing; and how much longer the reserve made it."""
+    """Plan and its flight: fault, "" without one; and the added length of the reserve."""
 
     wrong: str
     harm: Harm | None

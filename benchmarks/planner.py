@@ -1,4 +1,4 @@
-"""The planner: its evaluation against NumPy and brute force, its ranking, whole searches, scale, and a cold start."""
+"""Measure the planner: evaluation compared with NumPy and brute force, ranking, searches, scale, and cold start."""
 
 import json
 import os
@@ -43,20 +43,20 @@ def measure(seeds: int) -> dict[str, Any]:
 
 
 def random_paths(task: Task, count: int) -> Floats:
-    """Uniform samples of the rotated encoding (n, w, 3)."""
+    """Draw uniform samples of the rotated encoding (n, w, 3)."""
     rng = np.random.default_rng(1)
     shape = (count, task.encoding.lower.size)
     return np.ascontiguousarray(task.encoding.decode(rng.uniform(task.encoding.lower, task.encoding.upper, shape)))
 
 
 def repeated(evaluate: Callable[..., object], data: ProblemArrays, paths: Floats, times: int) -> None:
-    """Evaluate the same paths so many times."""
+    """Evaluate the same paths several times."""
     for _ in range(times):
         evaluate(data, paths)
 
 
 def evaluation() -> dict[str, Any]:
-    """Full evaluation of one population, in one run: ours, brute force, and one NumPy batch over all paths."""
+    """Measure the evaluation of one population: by planfly, by brute force, and by one NumPy batch over all paths."""
     print("\nFull evaluation of a population (four counts, four objectives), us a path; one core, median of 5")
     print(f"  {'problem':<10}{'ours':>8}{'graded':>9}{'brute force':>13}{'NumPy batch':>13}{'NumPy / ours':>14}  equal")
     record = {}
@@ -73,7 +73,7 @@ def evaluation() -> dict[str, Any]:
         evaluators: tuple[Callable[..., object], ...] = (paper_scores, graded_scores, brute_scores, numpy_scores)
         micro = []
         for evaluate in evaluators:
-            # Short work is repeated until a clock tick is nothing to it.
+            # Short work is repeated, so that it is long compared with a tick of the clock.
             repeat = 1 if evaluate is numpy_scores else 20
             spent = median_cpu(partial(repeated, evaluate, data, paths, repeat))
             micro.append(1e6 * spent / repeat / len(paths))
@@ -90,7 +90,7 @@ def evaluation() -> dict[str, Any]:
 
 
 def ranking() -> dict[str, Any]:
-    """Exact ranks of 500 random paths of paper-60: split by level, and the generic relation pair by pair."""
+    """Measure exact ranks of 500 random paths of paper-60: split by level, and by the generic pairwise relation."""
     task = make_task("paper-60")
     counts, objectives = paper_scores(task.problem.search, random_paths(task, 500))
     scores = np.concatenate([counts.astype(np.float64), objectives], axis=1)
@@ -109,7 +109,7 @@ def ranking() -> dict[str, Any]:
 
 
 def scaled(threats: int) -> Scenario:
-    """paper-60 with so many threats of the same coverage: radii shrink with the root of their number."""
+    """Make paper-60 with more threats of the same coverage: radii shrink with the root of their number."""
     spec = load_scenario("paper-60").spec
     rng, share = np.random.default_rng(threats), np.sqrt(60.0 / threats)
     unit = spec.threats[0]
@@ -127,7 +127,7 @@ def scaled(threats: int) -> Scenario:
 
 
 def scale() -> dict[str, Any]:
-    """10,000 threats of the coverage of 60: cost a path."""
+    """Measure the cost per path with 10,000 threats of the coverage of 60."""
     from planner.evaluation.problem import make_problem
 
     task = make_task("paper-60")
@@ -148,7 +148,7 @@ def scale() -> dict[str, Any]:
 
 
 def whole_searches(seeds: int) -> dict[str, Any]:
-    """Seeded searches of the default planner and of the paper's on every problem."""
+    """Run seeded searches of the default planner and of the paper's algorithm on every problem."""
     print(f"\nWhole searches, seeds 1..{seeds}, one core, warm, CPU s (first safe: default planner, ended by it)")
     print(
         f"  {'problem':<10}{'algorithm':<14}{'safe':>7}{'PLR median':>12}{'worst':>8}{'/ best known':>14}{'worst':>8}"
@@ -207,7 +207,7 @@ print(json.dumps([plan.safe, float(plan.objectives[0]), time.process_time()]))
 
 
 def cold_start() -> dict[str, Any]:
-    """New processes to a first certified path of hard-60, with a warm and an empty cache of compiled code."""
+    """Time new processes to a first certified path of hard-60, with a warm and an empty cache of compiled code."""
     print("\nNew process, s of wall clock (CPU s of the process)")
     record: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as folder:

@@ -1,9 +1,9 @@
-"""Whether what the planner calls safe is flyable: on fresh scenarios, by the geometry of the plan and by its flight.
+"""Test if safe plans are flyable on fresh scenarios, by the geometry of the plan and by its flight.
 
 ``python -m benchmarks.plans_and_verdicts [--plans N] [--from NUMBER] [--plan-only] [--json FILE]`` plans random
 scenarios over ground from 0 to 4,000 m, in wind, among zones and missiles, for each shipped fixed wing and each
-autopilot (`tests.fresh_plans`), judges each plan without a flight, flies it, judges the flight, and counts where they
-differ. With ``--plan-only`` it plans, and says what planning takes, of those without a plan, too.
+autopilot (`tests.fresh_plans`), judges each plan without a flight, flies it, judges the flight, and counts the
+differences. With ``--plan-only`` it only plans, and prints the planning time, also of scenarios without a plan.
 """
 
 import argparse
@@ -23,17 +23,17 @@ from planner.plan import Objective
 from tests.fresh_plans import fresh_scenario
 from world.errors import PlanflyError
 
-# A plan that takes more CPU than this is slow, s.
+# CPU time above which a plan is slow, s.
 SLOW = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What became of one scenario.
+    """Result of one scenario.
 
-    plan: "safe", or why there is none.  drawn, flown: the verdicts without and with a flight, "" where there is none.
-    wrong: what failed of either.  seconds: of a core for the plan, and for its flight and verdicts.  ratio: of the
-    plan's length to the straight line.  evaluations: of its search.
+    plan: "safe", or why there is no safe plan.  drawn, flown: the verdicts without and with a flight, "" without one.
+    wrong: failures of either verdict.  seconds: CPU time of the plan, and of its flight and verdicts.  ratio: length of
+    the plan relative to the straight line.  evaluations: evaluations of its search.
     """
 
     name: str
@@ -48,10 +48,7 @@ class Answer:
 
 
 def answer(number: int, *, judged: bool = True, flown: bool = True) -> Answer:
-    """Plan the scenario of this number; where it is to be judged, judge the plan, and where it is to be flown, fly it.
-
-    A flight is judged, too.
-    """
+    """Plan the scenario of this number, judge the plan if ``judged``, and fly it and judge the flight if ``flown``."""
     scenario = fresh_scenario(number)
     whose = scenario.name, scenario.wind.turbulence
     began = time.process_time()
@@ -83,14 +80,14 @@ def answer(number: int, *, judged: bool = True, flown: bool = True) -> Answer:
 
 
 def main() -> None:
-    """Answer, print a line each, and count."""
+    """Plan and judge all scenarios, print a line for each, and count."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.plans_and_verdicts")
     parser.add_argument("--plans", type=int, default=300)
     parser.add_argument("--from", dest="first", type=int, default=0, help="number of the first scenario")
     parser.add_argument("--plan-only", action="store_true", help="neither judge nor fly the plans")
     parser.add_argument("--json", type=Path, help="file for the answers")
     args = parser.parse_args()
-    # The first plan loads kernels.
+    # The first plan only loads the kernels.
     answer(args.first, judged=False)
     answers = []
     for number in range(args.first, args.first + args.plans):
@@ -112,7 +109,7 @@ def main() -> None:
 
 
 def _print_verdicts(safe: list[Answer]) -> None:
-    """What the verdicts of safe plans are, without a flight and with one."""
+    """Print the verdicts of safe plans, without a flight and with one."""
     print(f"without a flight {dict(Counter(one.drawn for one in safe))}")
     for turbulence in ("none", "light", "moderate"):
         flown = Counter(one.flown for one in safe if one.turbulence == turbulence)

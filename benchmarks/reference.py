@@ -1,4 +1,4 @@
-"""What our compiled evaluation and ranking are measured against: vectorised NumPy, and compiled brute force.
+"""References for the compiled evaluation and ranking: vectorised NumPy, and compiled brute force.
 
 Both are written from the paper's equations and the conventions of `planner.evaluation.paper_scores.paper_scores`, and
 agree with it to 1e-12; they serve problems whose limits are numbers and whose ends have no course.
@@ -26,7 +26,7 @@ POINTS = 6
 
 
 def pixels_of(to_pixel: PolyMapRecord, east: Floats, north: Floats) -> tuple[Floats, Floats]:
-    """Pixel coordinates of map positions: the polynomial, vectorised."""
+    """Return the pixel coordinates of map positions by the vectorised polynomial."""
     size = int(to_pixel["size"])
     a = (east - to_pixel["centre_x"]) / to_pixel["half_x"]
     b = (north - to_pixel["centre_y"]) / to_pixel["half_y"]
@@ -41,7 +41,7 @@ def pixels_of(to_pixel: PolyMapRecord, east: Floats, north: Floats) -> tuple[Flo
 
 
 def bilinear(heights: NDArray[np.float32], col: Floats, row: Floats) -> Floats:
-    """Heights at pixel coordinates; NaN outside the raster."""
+    """Return the heights at pixel coordinates; NaN outside the raster."""
     rows, cols = heights.shape
     inside = (col >= -EDGE) & (col <= cols - 1 + EDGE) & (row >= -EDGE) & (row <= rows - 1 + EDGE)
     i = np.clip(row.astype(np.int64), 0, heights.shape[0] - 2)
@@ -53,7 +53,7 @@ def bilinear(heights: NDArray[np.float32], col: Floats, row: Floats) -> Floats:
 
 
 def numpy_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
-    """Counts (n, 4) and objectives (n, 4) of paths (n, w, 3): one vectorised batch over all of them (eq. 1-11)."""
+    """Return counts (n, 4) and objectives (n, 4) of paths (n, w, 3) in one vectorised batch (eq. 1-11)."""
     legs = np.diff(paths, axis=1)
     counts, objectives = np.empty((len(paths), 4), dtype=np.int64), np.empty((len(paths), 4))
     cross = legs[:, :-1, 0] * legs[:, 1:, 1] - legs[:, :-1, 1] * legs[:, 1:, 0]
@@ -181,7 +181,7 @@ def brute_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
 
 @njit
 def _prefers(u: Floats, v: Floats, columns: Ints, goals: Floats, ends: Ints) -> bool:
-    """Whether u is preferred to v: the relation as it is defined (see `planner.optimisers.preference`)."""
+    """Return True if u is preferred to v, by definition (see `planner.optimisers.preference`)."""
     begin = 0
     for level in range(ends.size):
         better, worse, equal, open_goal, better_in, worse_in = False, False, True, False, False, False
@@ -222,7 +222,7 @@ def _flat(levels: Sequence[Level]) -> tuple[Ints, Floats, Ints]:
 
 
 def preferred(u: Floats, v: Floats, levels: Sequence[Level]) -> bool:
-    """Whether the score row u (c,) is preferred to v by the definition."""
+    """Return True if the score row u (c,) is preferred to v by definition."""
     return bool(_prefers(u, v, *_flat(levels)))
 
 

@@ -1,6 +1,6 @@
-"""What starting takes: the first start after an install, and a new process whose kernels are in the cache.
+"""Measure start times: of the first start after an installation, and of a new process with cached kernels.
 
-Wall seconds count only on a quiet machine; CPU seconds are of all processes, compiling ones too.
+Wall-clock times are valid only on an idle machine; CPU times include all processes, also compiling ones.
 """
 
 import os
@@ -13,14 +13,18 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
+# Number of repetitions.
 ROUNDS = 5
-# What a first start may take, s by the clock on two quiet cores, and a first safe path in a new process, CPU s.
-MAX_COLD, MAX_WARM = 30.0, 1.2
+# Largest wall-clock time of a first start on two idle cores, s.
+MAX_COLD = 30.0
+# Largest CPU time to a first safe path in a new process, s.
+MAX_WARM = 1.2
+# Commands of a first start.
 COLD = {
     "planfly plan jacksboro-air": ("plan", "jacksboro-air", "--seed", "1", "--out", "plan.json"),
     "planfly run jacksboro-air": ("run", "jacksboro-air", "--seed", "1", "--out", "run"),
 }
-# It ends with the path: what taking the interpreter down costs after that is no part of it.
+# Program of a first safe path; it exits at once, as the shutdown of the interpreter is not measured.
 FIRST_SAFE = """
 import os
 from planfly.process_setup import prepare_process
@@ -35,14 +39,17 @@ os._exit(not plan.safe)
 
 
 class Spent(NamedTuple):
-    """Seconds by the clock, and of all cores."""
+    """Wall-clock time, and CPU time of all cores, s."""
 
     wall: float
     cpu: float
 
 
 def spent_on(arguments: tuple[str, ...], folder: Path, **environment: str) -> Spent:
-    """What a Python process and its children take.  Raises CalledProcessError for one that fails by no verdict."""
+    """Measure a Python process and its children.
+
+    Raises CalledProcessError for a failure other than a verdict.
+    """
     began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
         [sys.executable, *arguments], cwd=folder, env=os.environ | environment, capture_output=True, check=False

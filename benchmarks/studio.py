@@ -1,8 +1,8 @@
-"""How quick the studio is: a drag to its coloured verdict, a release to the flight, the page opened, and memory.
+"""Measure the studio: a drag to its coloured verdict, a release to the flight, opening of the page, and memory.
 
-``python -m benchmarks.studio`` starts ``planfly studio`` as it is installed, and a headless Chromium beside it: both
-share the cores, and seconds count only on a quiet machine.  A move is timed in the page, from its event to the first
-frame after a verdict on it, or on a newer one, has been drawn.
+``python -m benchmarks.studio`` starts the installed ``planfly studio`` and a headless Chromium.  Both share the cores,
+so that times are valid only on an idle machine.  A move is timed in the page, from its event to the first frame after a
+verdict on it, or on a newer one, has been drawn.
 """
 
 import contextlib
@@ -32,10 +32,16 @@ from tests.browser import Browser
 from world.frames import to_geo
 from world.scenario import load_scenario
 
-MOVES, RELEASES, EDITS = 200, 7, 1_000
+# Number of moves of a drag.
+MOVES = 200
+# Number of releases.
+RELEASES = 7
+# Number of edits of the memory test.
+EDITS = 1_000
+# Scenario of all missions.
 SCENARIO = "jacksboro-air"
-# Moves of the pointer, 16 ms apart, as a page's own script sends them; gives the time to each
-# verdict's frame, ms, and how many moves had none.
+# Script that sends moves of the pointer, 16 ms apart; returns the time to the frame of each verdict, ms, and the number
+# of moves without a verdict.
 DRAG = """
 new Promise((done) => {
   const page = document.documentElement, map = document.getElementById("map"), asked = [], found = [];
@@ -91,7 +97,7 @@ new Promise((done) => {
   }, 300);
 })
 """
-# Before the page's own scripts: when waypoints, their colours and the ground first stand in the page, ms.
+# Script before the page's own ones: times at which waypoints, their colours and the ground first appear, ms.
 OPENED = """
 window.opened = {};
 new MutationObserver(() => {
@@ -105,7 +111,7 @@ new MutationObserver(() => {
 
 
 def write_missions(folder: Path) -> dict[str, tuple[str, ...]]:
-    """The missions that are dragged, by what they are: what the command is given for each."""
+    """Write the missions that are dragged, and return the arguments of the command by description."""
     scenario = load_scenario(SCENARIO)
     plan = make_plan(scenario, load_airframe(scenario), 1)
     (folder / "demo.json").write_text(plan_json(plan), encoding="utf-8")
@@ -120,7 +126,7 @@ def write_missions(folder: Path) -> dict[str, tuple[str, ...]]:
 
 
 def _long_mission(count: int) -> Mission:
-    """Waypoints along a gentle wave through the middle of the map, at one height."""
+    """Make waypoints along a gentle wave through the centre of the map, at one altitude."""
     scenario = load_scenario(SCENARIO)
     east = np.linspace(-9_000.0, 9_000.0, count)
     north = 1_500.0 * np.sin(east / 3_000.0)
@@ -133,7 +139,7 @@ def _long_mission(count: int) -> Mission:
 
 
 def _zones(way: np.ndarray) -> str:
-    """A thousand square zones to keep out of, up to above the flight, all over the map but for its way."""
+    """Make a thousand square exclusions, up to above the flight, all over the map except near its path."""
     scenario, rng = load_scenario(SCENARIO), np.random.default_rng(38)
     features: list[dict[str, Any]] = []
     while len(features) < 1_000:
@@ -152,7 +158,7 @@ def _zones(way: np.ndarray) -> str:
 
 
 def _distance(point: np.ndarray, way: np.ndarray) -> float:
-    """From a point (2,) to a way (n, 2), m."""
+    """Return the distance of a point (2,) from a path (n, 2), m."""
     along = np.diff(way, axis=0)
     shares = np.clip(((point - way[:-1]) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
     return float(np.hypot(*(way[:-1] + shares[:, None] * along - point).T).min())
@@ -160,7 +166,7 @@ def _distance(point: np.ndarray, way: np.ndarray) -> float:
 
 @contextlib.contextmanager
 def running(folder: Path, given: tuple[str, ...]) -> Iterator[tuple[str, psutil.Process]]:
-    """The address of a studio, and its process."""
+    """Run a studio, and yield its address and its process."""
     command = [sys.executable, "-m", "planfly", "studio", *given, "--no-browser", "--port", "0", "--keep", "kept"]
     with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True, env=os.environ) as process:
         assert process.stdout is not None
@@ -176,7 +182,7 @@ def running(folder: Path, given: tuple[str, ...]) -> Iterator[tuple[str, psutil.
 
 
 def drawn(browser: Browser, address: str) -> None:
-    """Open the page and wait until the mission, its ground and its flight are there."""
+    """Open the page and wait until the mission, its ground and its flight are shown."""
     browser.go(address)
     browser.wait_for("document.querySelectorAll('.mark').length > 1")
     browser.wait_for("document.querySelector('#map-box image').hasAttribute('href')")
@@ -185,17 +191,17 @@ def drawn(browser: Browser, address: str) -> None:
 
 
 def share(values: list[float], part: float) -> float:
-    """The value below which that part of some lies."""
+    """Return the quantile of values at ``part``."""
     return sorted(values)[min(len(values) - 1, math.ceil(part * len(values)) - 1)]
 
 
 def timed(drag: dict[str, Any]) -> list[float]:
-    """Times of a drag's moves, ms; without end for one that was never answered."""
+    """Return the times of a drag's moves, ms; infinite for a move without a verdict."""
     return [*drag["answered"], *[math.inf] * int(drag["never"])]
 
 
 def measure_drags(folder: Path, missions: dict[str, tuple[str, ...]]) -> list[dict[str, Any]]:
-    """A row a mission."""
+    """Measure the drags of each mission, and return a row for each."""
     rows = []
     for name, given in missions.items():
         with (
@@ -220,7 +226,7 @@ def measure_drags(folder: Path, missions: dict[str, tuple[str, ...]]) -> list[di
 
 
 def measure_opening(folder: Path) -> None:
-    """The page opened by a browser that has never seen it, and then again."""
+    """Measure the opening of the page by new browsers without a cache."""
     with running(folder, ("demo.json",)) as (address, _):
         time.sleep(3.0)
         for how in ("cold", "cold", "cold"):
@@ -234,7 +240,7 @@ def measure_opening(folder: Path) -> None:
 
 
 def measure_memory(folder: Path) -> None:
-    """What the server's process takes more after many edits."""
+    """Measure the growth of the server's memory over many edits."""
     with running(folder, ("demo.json",)) as (address, process):
         port, token = re.findall(r":(\d+)/#t=(.+)", address)[0]
         rng = np.random.default_rng(1)

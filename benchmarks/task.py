@@ -1,4 +1,4 @@
-"""One planning problem as every optimiser in the benchmarks sees it: a box, one evaluation, one certificate."""
+"""Planning problem in the form that all optimisers of the benchmarks use: a box, one evaluation, one certificate."""
 
 import json
 from dataclasses import dataclass, replace
@@ -22,14 +22,17 @@ from world.scenario import Scenario, from_spec, load_scenario
 Floats = NDArray[np.float64]
 
 PROBLEMS = (7, 15, 30, 60)
-# Grids that seed a peer: stages of each, and routes from each.
-GRIDS, ROUTES = (36, 66, 130), 2
+# Numbers of stages of the grids that seed a peer.
+GRIDS = (36, 66, 130)
+# Number of routes from each grid.
+ROUTES = 2
+# File of the best known paths.
 BEST_KNOWN = Path(__file__).parents[1] / "tests" / "authorities" / "best_known.json"
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A scenario in the form of compiled code, in the rotated encoding."""
+    """Scenario in the form of compiled code, in the rotated encoding."""
 
     scenario: Scenario
     airframe: Airframe
@@ -38,38 +41,38 @@ class Task:
 
     @property
     def evaluations(self) -> int:
-        """The paper's evaluation budget: the first population, then half of it in each generation."""
+        """Evaluation budget of the paper: the first population, then half of it in each generation."""
         table = self.scenario.planner
         return table.population + table.generations * (table.population // 2)
 
     def scores(self, vectors: Floats) -> tuple[Floats, Floats]:
-        """Graded violations (n, 4) and objectives (n, 4): what the default planner's search ranks."""
+        """Return graded violations (n, 4) and objectives (n, 4), which the default planner's search ranks."""
         return graded_scores(self.problem.search, np.ascontiguousarray(self.encoding.decode(vectors)))
 
     def certificate(self, path: Floats) -> Certificate:
-        """The continuous check of a path (w, 3), all four constraints."""
+        """Return the continuous check of a path (w, 3) for all four constraints."""
         return certify(self.problem, np.ascontiguousarray(path))
 
     def length_ratio(self, path: Floats) -> float:
-        """Length of a path (w, 3) over the straight distance, in three dimensions (eq. 8)."""
+        """Return the length of a path (w, 3) relative to the straight distance, in three dimensions (eq. 8)."""
         legs = np.sqrt((np.diff(path, axis=0) ** 2).sum(axis=1)).sum()
         return float(legs / np.sqrt(((self.scenario.destination - self.scenario.start) ** 2).sum()))
 
 
 def is_safe(certificate: Certificate) -> bool:
-    """Whether all four constraints hold everywhere and no missile reaches the path."""
+    """Return True if all four constraints are met everywhere and no missile reaches the path."""
     return certificate.ok and certificate.kill_distance > 0.0
 
 
 def exact_airframe(scenario: Scenario) -> Airframe:
-    """A scenario's airframe for plans that leave no room for an autopilot: the best known paths have none either."""
+    """Return a scenario's airframe for plans without tracking error, like the best known paths."""
     airframe = load_airframe(scenario)
     return replace(airframe, limits=replace(airframe.limits, tracking=None))
 
 
 @cache
 def make_task(name: str) -> Task:
-    """The task of an embedded scenario."""
+    """Make the task of an embedded scenario."""
     scenario = load_scenario(name)
     airframe = exact_airframe(scenario)
     problem = make_problem(scenario, airframe.limits)
@@ -77,24 +80,24 @@ def make_task(name: str) -> Task:
 
 
 def best_known(name: str) -> float:
-    """Length ratio of the best certified path that is known, NaN where none is (tests/authorities/best_known.json)."""
+    """Return the length ratio of the best known certified path, NaN if unknown (tests/authorities/best_known.json)."""
     known = json.loads(BEST_KNOWN.read_text(encoding="utf-8"))
     return float(known[name]["length_ratio"]) if name in known else float("nan")
 
 
 def all_known() -> list[str]:
-    """The problems of which a best path is known."""
+    """Return the problems with a known best path."""
     return list(json.loads(BEST_KNOWN.read_text(encoding="utf-8")))
 
 
 def with_planner(scenario: Scenario, **changes: object) -> Scenario:
-    """The same scenario with other keys in ``[planner]``."""
+    """Return the same scenario with other keys in ``[planner]``."""
     spec = scenario.spec
     return from_spec(spec.model_copy(update={"planner": spec.planner.model_copy(update=changes)}), scenario.name)
 
 
 def seed_vectors(task: Task) -> Floats:
-    """Our coarse seeds as vectors (n, d), best first: no violation, then least kill exposure, then the shortest."""
+    """Return planfly's coarse seeds as vectors (n, d), ordered by violations, then kill exposure, then length."""
     low, high = task.encoding.lower, task.encoding.upper
     span = (float(low[1::3].min()), float(high[1::3].max()))
     data = task.problem.search
@@ -106,7 +109,7 @@ def seed_vectors(task: Task) -> Floats:
 
 
 def scalar(violations: Floats, objectives: Floats) -> Floats:
-    """One number (n,) for optimisers that know no constraints, in the default planner's order.
+    """Return one number (n,) for optimisers without constraints, in the default planner's order.
 
     Below 100: no violation; below 10: no kill exposure either, and the number is the length ratio.
     """
@@ -117,7 +120,7 @@ def scalar(violations: Floats, objectives: Floats) -> Floats:
 
 
 def smooth_axes(task: Task) -> tuple[Floats, Floats]:
-    """Directions (d, d) of the smooth basis and how far paths spread along each (d,), m."""
+    """Return directions (d, d) of the smooth basis and the spread of paths along each (d,), m."""
     inner = task.encoding.waypoints - 2
     _, deviations = bridge_modes(inner)
     low, high = task.encoding.lower.reshape(inner, 3), task.encoding.upper.reshape(inner, 3)

@@ -1,14 +1,15 @@
-"""How the benchmarks take time."""
+"""Timing functions of the benchmarks."""
 
 import statistics
 import time
 from collections.abc import Callable
 
+# Default number of runs.
 ROUNDS = 5
 
 
 def median_time(work: Callable[[], object], rounds: int = ROUNDS) -> float:
-    """The median of a few runs, s."""
+    """Return the median wall-clock time of a few runs, s."""
     spent = []
     for _ in range(rounds):
         started = time.perf_counter()
@@ -18,7 +19,7 @@ def median_time(work: Callable[[], object], rounds: int = ROUNDS) -> float:
 
 
 def median_cpu(work: Callable[[], object], rounds: int = ROUNDS) -> float:
-    """The median of a few runs in CPU seconds of this process, s."""
+    """Return the median CPU time of this process in a few runs, s."""
     spent = []
     for _ in range(rounds):
         started = time.process_time()

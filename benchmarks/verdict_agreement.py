@@ -1,10 +1,10 @@
-"""The verdict by an autopilot's law against the verdict on the autopilot's own flight of the same mission.
+"""Compare the verdict on the flight of an autopilot's law with the verdict on the autopilot's own flight.
 
 ``python -m benchmarks.verdict_agreement [--law LAW] [--missions N] [--from SEED] [--json FILE]`` makes missions that
-keep one limit by a little, or exceed it (`tests.field_missions.close_mission`), flies each by the law, with satellites'
-errors, and with the program that PLANFLY_ARDUPLANE (or PLANFLY_PX4) names, both in the same air, judges both flights by
-the same rules, and counts where the answers differ.  ``--ordinary N`` instead flies ordinary missions by the law alone,
-and counts which of them it calls not flyable.
+keep one limit narrowly, or exceed it (`tests.field_missions.close_mission`), flies each with the law, with GNSS errors,
+and with the program that PLANFLY_ARDUPLANE (or PLANFLY_PX4) names, both in the same air, judges both flights by the
+same rules, and counts the differences.  ``--ordinary N`` instead flies ordinary missions with the law alone, and counts
+those that are not flyable.
 """
 
 import argparse
@@ -26,17 +26,18 @@ from planfly.make_plan import make_setup
 from planfly.pipeline import fly_and_judge
 from tests.field_missions import GROUND, FieldMission, close_mission, ordinary_mission
 
-# By so much at least clearance is lost, or a sphere entered, to count as grave, m.
+# Loss of clearance, or depth in a sphere, from which a violation is grave, m.
 GRAVE = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What each of two flights of a mission comes to.
+    """Verdicts on two flights of a mission.
 
-    law, real: the first lines of their verdicts.
-    agree: both flyable or neither.
-    harmed: the law's is flyable, and the program's flight lost clearance or entered a sphere by more than a metre.
+    law, real: first line of the verdict on the law's flight and on the program's flight.
+    agree: True if both are flyable or both are not.
+    harmed: True if the law's flight is flyable, and the program's flight lost clearance or entered a sphere by more
+    than a metre.
     """
 
     name: str
@@ -47,20 +48,20 @@ class Answer:
 
 
 def setup_of(made: FieldMission) -> tuple[FlightSetup, Airframe]:
-    """Setup of a mission, with satellites' errors as a scenario has them."""
+    """Make the setup of a mission, with GNSS errors as in a scenario."""
     airframe = load_airframe(made.scenario)
     return make_setup(made.scenario, airframe, made.mission, seed=1), airframe
 
 
 def by_law(made: FieldMission) -> tuple[Verdict, float]:
-    """Verdict on the law's flight, and the energy it took, Wh."""
+    """Return the verdict on the law's flight, and its energy, Wh."""
     setup, airframe = setup_of(made)
     flown = simulate(setup, airframe.aircraft)
     return judge_flight(setup, flown.track, flown.ended), float(flown.track.energy[-1])
 
 
 def by_program(made: FieldMission, program: Path) -> tuple[Verdict, bool]:
-    """Verdict on the program's flight, and whether it lost clearance or entered a sphere by more than `GRAVE`."""
+    """Return the verdict on the program's flight, and True if it violated clearance or a sphere by over `GRAVE`."""
     setup, airframe = setup_of(made)
     flown = fly_and_judge(setup, airframe, None, autopilot=program)
     threats, position = made.scenario.threats, flown.track.position
@@ -71,7 +72,7 @@ def by_program(made: FieldMission, program: Path) -> tuple[Verdict, bool]:
 
 
 def compare(seed: int, law_name: str, program: Path) -> Answer:
-    """Fly the mission of a seed by both."""
+    """Fly the mission of a seed with both."""
     flight = {name: value for name, value in flight_entries(autopilot_law=law_name).items() if value is not None}
     made = close_mission(seed, energy=lambda ordinary: by_law(ordinary)[1], **flight)
     (law, _), (real, lost) = by_law(made), by_program(made, program)

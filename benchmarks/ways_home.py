@@ -1,10 +1,10 @@
-"""Returns and glides from everywhere on the demo's way: how long they take, and whether suggested rally points hold.
+"""Measure the judgement of returns and glides from all points of the demo, and test suggested rally points.
 
-``python -m benchmarks.ways_home [--every S] [--fresh N] [--whole N]`` plans and flies the demo, and judges the returns
-from it as `planfly returns` does: alone, with the glides, and with the search for rally points.  With the points that
-are found it then returns from N places that the search has not seen, by the law on a point mass, and from N of them by
-the whole law in JSBSim, and prints how low they came and how near to a sphere.  Times are those of the second pass:
-what is compiled or cached at first use is not counted.
+``python -m benchmarks.ways_home [--every S] [--fresh N] [--whole N]`` plans and flies the demo, and judges its returns
+as `planfly returns` does: alone, with the glides, and with the search for rally points.  With the suggested points it
+then returns from N places that the search has not used, by the law on a point mass, and from N of them by the whole law
+in JSBSim, and prints the lowest clearance and the nearest sphere.  Times are measured in the second pass, without
+compilation and cold caches.
 """
 
 import argparse
@@ -24,12 +24,14 @@ from logs.verdict.returns.suggest_returns import suggest_rally
 from planfly.return_flights import fly_return
 
 Result = TypeVar("Result")
-# Of the places that are fresh; between two of which they are drawn, s.
-_SEED, _FINE = 35, 0.1
+# Seed of the fresh places.
+_SEED = 35
+# Interval of the places among which they are drawn, s.
+_FINE_INTERVAL_S = 0.1
 
 
 def timed(words: str, work: Callable[[], Result]) -> tuple[Result, float]:
-    """Do a piece of work twice, and print how long the second time took."""
+    """Do a piece of work twice, and print and return the time of the second pass."""
     work()
     begun = perf_counter()
     result = work()
@@ -39,8 +41,8 @@ def timed(words: str, work: Callable[[], Result]) -> tuple[Result, float]:
 
 
 def fresh_places(flown: planfly.FlownMission, every: float, count: int) -> ReturnStarts:
-    """Places of the flight that are not among those of every so many seconds."""
-    starts = flown_starts(flown.setup, flown.track, _FINE)
+    """Return places of the flight away from the places at every ``every`` seconds."""
+    starts = flown_starts(flown.setup, flown.track, _FINE_INTERVAL_S)
     off = np.abs((starts.time / every + 0.5) % 1.0 - 0.5) * every
     unseen = np.flatnonzero(off > 0.4 * every)
     chosen = np.random.default_rng(_SEED).choice(unseen, size=min(count, len(unseen)), replace=False)
@@ -48,7 +50,7 @@ def fresh_places(flown: planfly.FlownMission, every: float, count: int) -> Retur
 
 
 def fly_fresh(world: ReturnWorld, starts: ReturnStarts, whole: int) -> None:
-    """Return from fresh places, and print how many came to harm."""
+    """Fly returns from fresh places, and print the number of unsafe ones."""
     found = judge_returns(world, starts, 0.0)
     low = [one.clearance for one in found.each]
     outside = [one.outside for one in found.each]
@@ -63,7 +65,7 @@ def fly_fresh(world: ReturnWorld, starts: ReturnStarts, whole: int) -> None:
 
 
 def main() -> None:
-    """Measure, and print."""
+    """Measure and print."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.ways_home")
     parser.add_argument("--every", type=float, default=3.2, help="seconds between two returns (299 with 3.2)")
     parser.add_argument("--fresh", type=int, default=100, help="places that the search has not seen")

@@ -126,7 +126,7 @@ class _InnerKernel:
         return _compiled(vars(self)["__wrapped__"], no_cpython_wrapper=True, **self._options)
 
     @functools.cached_property
-    def _python_wrapper(self) -> Any:
+    def _around(self) -> Any:
         kernel = self
         return _compiled(lambda *given: kernel(*given))
 
@@ -136,7 +136,7 @@ class _InnerKernel:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python through the wrapper; without a wrapper the process would crash."""
-        return self._python_wrapper(*arguments)
+        return self._around(*arguments)
 
 
 class _InnerType(numba.types.Dispatcher):  # type: ignore[misc]  # numba states no types

@@ -1,9 +1,9 @@
-"""The check of an hour's log in an airspace of 1,000 zones of 50 corners.
+"""Time the check of an hour's log in an airspace of 1,000 zones of 50 corners.
 
 ``python -m benchmarks.airspace.check_log [--zones N] [--corners N] [--hours H]`` records a flight of an hour, 60 rows
-a second, along legs of 2 km, with zones on both sides of it, as near as 20 m, some of them over its way and every tenth
-with a ceiling above ground; and times, with kernels compiled: the log read, its verdict without the zones, and with
-them.  The flight is made by kinematics, on a grid of hills: what is timed is the check.
+a second, along legs of 2 km, with zones on both sides, as near as 20 m, some of them across its path and every tenth
+with a ceiling above ground; and times, with compiled kernels, the reading of the log, and its verdict without and with
+the zones.  The flight is synthetic, over a grid of hills, as only the check is timed.
 """
 
 import argparse
@@ -23,14 +23,20 @@ from logs.verdict.judge_flight import judge_flight
 from tests.synthetic import fly_path, make_setup
 from world.scenario import from_spec
 
+# Seed of zones and hills.
 SEED = 12
+# Length of a leg, m.
 LEG = 2000.0
+# Airspeed, m/s.
 SPEED = 25.0
-ZONES, CORNERS = 1000, 50
+# Number of zones.
+ZONES = 1000
+# Number of corners of a zone.
+CORNERS = 50
 
 
 def way(hours: float) -> np.ndarray:
-    """Lanes of ten legs to the north and back, 1,500 m apart, long enough for so many hours at 25 m/s; (w, 3) m."""
+    """Return lanes (w, 3) of ten legs to the north and back, 1,500 m apart, for some hours at 25 m/s, m."""
     count = math.ceil(hours * 3600.0 * SPEED / LEG)
     points, north, lane, heading = [(0.0, 0.0)], 0.0, 0.0, 1.0
     for k in range(count):
@@ -43,7 +49,7 @@ def way(hours: float) -> np.ndarray:
 
 
 def zone_tables(points: np.ndarray, count: int, corners: int) -> list[dict[str, Any]]:
-    """Star-shaped zones beside the legs; one in fifty reaches over its leg."""
+    """Make star-shaped zones next to the legs; one in fifty extends over its leg."""
     rng, tables = np.random.default_rng(SEED), []
     for k in range(count):
         leg = int(rng.integers(1, len(points) - 1))
@@ -62,7 +68,7 @@ def zone_tables(points: np.ndarray, count: int, corners: int) -> list[dict[str, 
 
 
 def setup_of(hours: float, zones: list[dict[str, Any]], points: np.ndarray) -> FlightSetup:
-    """The flight's setup, over hills of up to 200 m."""
+    """Make the setup of the flight, over hills of up to 200 m."""
     rng = np.random.default_rng(SEED)
     spots = points[rng.integers(0, len(points), 25), :2] + rng.uniform(-900.0, 900.0, (25, 2))
     peaks = [{"east_m": float(e), "north_m": float(n), "height_m": 200.0, "sigma_m": 600.0} for e, n in spots]
@@ -72,7 +78,7 @@ def setup_of(hours: float, zones: list[dict[str, Any]], points: np.ndarray) -> F
 
 
 def run(count: int = ZONES, corners: int = CORNERS, hours: float = 1.0) -> dict[str, float]:
-    """Measure and print; seconds by name."""
+    """Measure, print, and return seconds by name."""
     points = way(hours)
     tables = zone_tables(points, count, corners)
     record: dict[str, float] = {}
@@ -104,7 +110,7 @@ def run(count: int = ZONES, corners: int = CORNERS, hours: float = 1.0) -> dict[
 
 
 def main() -> None:
-    """Measure what the command line asks for."""
+    """Measure with the options of the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--zones", type=int, default=ZONES)
     parser.add_argument("--corners", type=int, default=CORNERS)

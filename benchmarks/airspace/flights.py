@@ -1,8 +1,8 @@
-"""Default plans among zones and in a band of heights above ground, flown by ArduPlane's law: what harm comes of it.
+"""Fly default plans among zones and in a band of heights above ground with ArduPlane's law, and count violations.
 
 ``python -m benchmarks.airspace.flights [--plans N] [--from NUMBER]`` plans the random scenarios of
-`benchmarks.airspace.scenarios`, flies each, and prints what plan and flight kept, and in the end how many were
-planned and how many came to harm.
+`benchmarks.airspace.scenarios`, flies each, and prints the margins of plan and flight, and at the end the numbers of
+plans and of violations.
 """
 
 import argparse
@@ -26,9 +26,9 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """What positions keep, m: negative where they do not.
+    """Margins of positions, m: negative if violated.
 
-    low, high: from the band's lower and upper edge.  zones: from the nearest zone, on the map or in height.
+    low, high: to the band's lower and upper edge.  zones: to the nearest zone, on the map or in height.
     """
 
     low: float
@@ -37,13 +37,13 @@ class Kept:
 
     @property
     def least(self) -> float:
-        """The least of them."""
+        """Smallest of the margins."""
         return min(self.low, self.high, self.zones)
 
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """One plan and its flight: what is wrong with it, "" for nothing; what it kept, and how long planning took, s."""
+    """Plan and its flight: fault, "" without one; margins; and planning time, s."""
 
     wrong: str
     kept: Kept | None
@@ -51,7 +51,7 @@ class Flown:
 
 
 def kept_by(scenario: Scenario, position: Floats) -> Kept:
-    """What positions (n, 3) keep of a scenario's band and zones, by plain sums on the tables of its file."""
+    """Compute the margins of positions (n, 3) to a scenario's band and zones directly from the tables of its file."""
     terrain, limits = scenario.terrain, scenario.limits
     assert terrain is not None
     assert limits.max_height_m is not None
@@ -65,7 +65,7 @@ def kept_by(scenario: Scenario, position: Floats) -> Kept:
 
 
 def _kept_of(zone: ZoneTable, position: Floats, over: Floats) -> float:
-    """Least distance of positions from one zone, or within it for an inclusion, m."""
+    """Return the smallest distance of positions from one zone, or inside it for an inclusion, m."""
     if zone.radius_m is not None:
         away = np.hypot(position[:, 0] - zone.east_m, position[:, 1] - zone.north_m) - zone.radius_m
     else:

@@ -1,7 +1,7 @@
-"""How long planning takes among 1,000 zones of 50 corners on the Jacksboro tile.
+"""Time planning among 1,000 zones of 50 corners on the Jacksboro tile.
 
 ``python -m benchmarks.airspace.many_zones [--zones N] [--corners N] [--runs N]`` reads the scenario and plans it, each
-timed after a first run that is not, and prints the medians.
+timed after a first untimed run, and prints the medians.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from world.scenario import Scenario, from_spec
 
 
 def crowded_scenario(zones: int, corners: int) -> Scenario:
-    """A way of 22 km between so many exclusions that lie anywhere, and nowhere within 500 m of its ends."""
+    """Make a scenario of 22 km among random exclusions, of which none is within 500 m of its ends."""
     rng = np.random.default_rng([SEED, zones, corners])
     ends = np.array([[-9000.0, -6000.0], [9000.0, 6500.0]])
     made: list[dict[str, Any]] = []
@@ -42,7 +42,7 @@ def crowded_scenario(zones: int, corners: int) -> Scenario:
 
 
 def main() -> None:
-    """Time, and print."""
+    """Time and print."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.airspace.many_zones")
     parser.add_argument("--zones", type=int, default=1000)
     parser.add_argument("--corners", type=int, default=50)

@@ -1,7 +1,7 @@
-"""Random scenarios among zones in a band of heights over the Jacksboro tile, and a grid search that knows no planner.
+"""Random scenarios among zones in a band of heights over the Jacksboro tile, and an independent grid search.
 
-Each comes from its number alone.  Draws that the grid search cannot pass are skipped: it says where a plan must be
-found.  Seed and margins were fixed before any planner ran on them.
+Each scenario depends on its number only.  Draws without a path of the grid search are skipped, so that a plan must
+exist. Seed and margins were fixed before any planner ran on them.
 """
 
 import math
@@ -16,21 +16,36 @@ from world.scenario import Scenario, from_spec
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+# Seed of all scenarios.
 SEED = 2026
-# Half the area's sides, m, and the band of heights above ground, m.
-HALF, LOWEST, HIGHEST = 13_000.0, 100.0, 200.0
-# Between start and destination, m, and of path an interval between waypoints, m.
-SHORTEST, LONGEST, INTERVAL = 5000.0, 8000.0, 350.0
-# No zone is nearer to an end than this, m.
+# Half the side of the area, m.
+HALF = 13_000.0
+# Lower edge of the band, m above ground.
+LOWEST = 100.0
+# Upper edge of the band, m above ground.
+HIGHEST = 200.0
+# Shortest distance between start and destination, m.
+SHORTEST = 5000.0
+# Longest distance between start and destination, m.
+LONGEST = 8000.0
+# Length of the path per interval between waypoints, m.
+INTERVAL = 350.0
+# Smallest distance of a zone from an end, m.
 AWAY = 250.0
-# The grid search: pitch along and across, layers, room kept from zones and from the band's edges, m.
-PITCH, LAYER, ZONE_ROOM, BAND_ROOM = 100.0, 2.5, 40.0, 15.0
-# Of the steepest slopes in still air and light turbulence, what it climbs and sinks by, rad.
+# Pitch of the grid search along and across, m.
+PITCH = 100.0
+# Height of a layer of the grid search, m.
+LAYER = 2.5
+# Distance of the grid search from zones, m.
+ZONE_ROOM = 40.0
+# Distance of the grid search from the edges of the band, m.
+BAND_ROOM = 15.0
+# Turbulence levels of the scenarios.
 _TURBULENCE = ("none", "light")
 
 
 def airspace_scenario(number: int) -> Scenario:
-    """The scenario of this number: its first draw that the grid search can pass."""
+    """Return the scenario of this number: its first draw with a path of the grid search."""
     draw = 0
     while True:
         scenario = draw_scenario(number, draw)
@@ -40,7 +55,7 @@ def airspace_scenario(number: int) -> Scenario:
 
 
 def draw_scenario(number: int, draw: int) -> Scenario | None:
-    """One draw of a scenario; None for one whose ends leave the area."""
+    """Draw a scenario; return None if its ends are outside the area."""
     rng = np.random.default_rng([SEED, number, draw])
     length, course = rng.uniform(SHORTEST, LONGEST), rng.uniform(0.0, 2.0 * math.pi)
     start = rng.uniform(-0.9 * HALF, 0.9 * HALF, 2)
@@ -72,7 +87,10 @@ def draw_scenario(number: int, draw: int) -> Scenario | None:
 
 
 def _zones(rng: np.random.Generator, ends: Floats) -> list[dict[str, Any]]:
-    """Exclusions along the way, of which some can be passed above or below; in every third an inclusion about it."""
+    """Draw exclusions along the path, some with a floor or ceiling.
+
+    In every third scenario an inclusion around it.
+    """
     made: list[dict[str, Any]] = []
     step, side = ends[1] - ends[0], np.array([ends[0, 1] - ends[1, 1], ends[1, 0] - ends[0, 0]])
     for k in range(int(rng.integers(4, 13))):
@@ -100,7 +118,7 @@ def _zones(rng: np.random.Generator, ends: Floats) -> list[dict[str, Any]]:
 
 
 def star(rng: np.random.Generator, place: Floats, radius: float, corners: int, least: float = 0.4) -> list[list[float]]:
-    """A ring of corners about a place, none further than the radius nor nearer than `least` of it, m."""
+    """Draw a ring of corners around a place, at distances between `least` times the radius and the radius, m."""
     turns = (np.arange(corners) + rng.uniform(-0.35, 0.35, corners)) * 2.0 * math.pi / corners
     away = radius * rng.uniform(least, 1.0, corners)
     return [
@@ -109,10 +127,10 @@ def star(rng: np.random.Generator, place: Floats, radius: float, corners: int, l
 
 
 def passable(scenario: Scenario) -> bool:
-    """Whether a grid way exists: monotone along, within slopes, 45 degree turns, the band, and outside the zones.
+    """Return True if a grid path exists: monotone along, within slopes, 45 degree turns and band, outside the zones.
 
-    States are (course of -45, 0 or +45 degrees from the line, place across, layer); each stage goes one pitch along.  A
-    cell is open if it and the places about it are within the band, less its room, and outside all zones, grown.
+    States are (course of -45, 0 or +45 degrees from the line, place across, layer); each stage advances one pitch
+    along. A cell is open if it and its surroundings are within the reduced band, and outside all enlarged zones.
     """
     start, destination = scenario.start, scenario.destination
     span = destination[:2] - start[:2]
@@ -152,7 +170,7 @@ def passable(scenario: Scenario) -> bool:
 
 
 def _band(scenario: Scenario, places: Floats, pitch: float) -> tuple[Floats, Floats]:
-    """Lowest and highest that a path may be at places (s, y, 2), by the ground about them, m AMSL."""
+    """Return the lowest and highest altitude of a path at places (s, y, 2), by the surrounding ground, m AMSL."""
     terrain = scenario.terrain
     assert terrain is not None
     low, high = np.full(places.shape[:2], -np.inf), np.full(places.shape[:2], np.inf)
@@ -164,7 +182,7 @@ def _band(scenario: Scenario, places: Floats, pitch: float) -> tuple[Floats, Flo
 
 
 def _open(scenario: Scenario, places: Floats) -> Flags:
-    """Whether places (s, y, 2) are on the map and outside every zone, whatever its heights, with room to spare."""
+    """Return True for places (s, y, 2) on the map and outside every zone at all heights, with margins."""
     free = (np.abs(places) < HALF - ZONE_ROOM).all(axis=-1)
     for zone in scenario.spec.zones or ():
         if zone.radius_m is not None:
@@ -176,7 +194,7 @@ def _open(scenario: Scenario, places: Floats) -> Flags:
 
 
 def ring_distance(ring: Floats, places: Floats) -> Floats:
-    """Distance of places (..., 2) from a ring (k, 2), m; negative inside."""
+    """Return the distance of places (..., 2) from a ring (k, 2), m; negative inside."""
     nearest, inside = np.full(places.shape[:-1], np.inf), np.zeros(places.shape[:-1], dtype=bool)
     for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
         step, off = b - a, places - a
@@ -190,7 +208,7 @@ def ring_distance(ring: Floats, places: Floats) -> Floats:
 
 
 def _slopes(scenario: Scenario) -> tuple[float, float]:
-    """Steepest climb and dive on any course, rad, with a tenth to spare for turbulence and half a degree beside."""
+    """Return the climb and dive limits for all courses, rad, reduced by a tenth for turbulence and by half a degree."""
     limits = load_airframe(scenario).limits
     up = float(max(scenario.start[2], scenario.destination[2])) + 100.0
     found = np.array([limits.slopes(course, up) for course in np.radians(np.arange(0, 360, 15))])
@@ -203,7 +221,7 @@ def _slopes(scenario: Scenario) -> tuple[float, float]:
 
 
 def _climbed(cells: Flags, climb: int, dive: int) -> Flags:
-    """Layers that one stage reaches from the given ones (across, layers)."""
+    """Return the layers that one stage reaches from the given ones (across, layers)."""
     out = cells.copy()
     for step in range(1, climb + 1):
         out[:, step:] |= cells[:, :-step]

@@ -1,1 +1,1 @@
-"""What campaigns cost, and whether what makes them quick changes what they say."""
+"""Benchmarks of the cost of campaigns, and of the effect of their optimisations on results."""

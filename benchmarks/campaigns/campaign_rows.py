@@ -1,4 +1,4 @@
-"""Flights a minute, what a second worker adds, what a campaign adds to a flight, and how long a proof takes.
+"""Measure campaigns: flights a minute, gain of a second worker, overhead per flight, and duration of a proof.
 
 ``python -m benchmarks campaigns [--flights N] [--long]``.  The mission of the first rows is 13 km over the
 demo's terrain, in its wind.
@@ -23,13 +23,16 @@ from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.worker_pool import Workers, worker_pool
 from world.scenario import Scenario, load_scenario, with_wind
 
-FLIGHTS, ROUNDS = 90, 3
-# Corners of the 13 km: latitude, longitude.
+# Number of flights whose rate is measured.
+FLIGHTS = 90
+# Number of rounds.
+ROUNDS = 3
+# Corners of the 13 km mission: latitude, longitude.
 _CORNERS = ((36.273, -84.28), (36.273, -84.23), (36.309, -84.23), (36.309, -84.28))
 
 
 def mission_13_km(folder: Path) -> CampaignBase:
-    """Three legs of 4.0 to 4.5 km above the demo's ridges, in its wind."""
+    """Make a mission of three legs of 4.0 to 4.5 km above the demo's ridges, in its wind."""
     lines = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t36.293\t-84.25\t1150\t1"]
     lines += [f"{k}\t0\t0\t16\t0\t0\t0\t0\t{lat}\t{lon}\t1200\t1" for k, (lat, lon) in enumerate(_CORNERS, 1)]
     path = folder / "legs.waypoints"
@@ -43,7 +46,7 @@ def mission_13_km(folder: Path) -> CampaignBase:
 
 
 def flights_a_minute(base: CampaignBase, workers: int, flights: int) -> float:
-    """Flights a minute, from the first that came back of each worker on."""
+    """Return the flights a minute, measured from the first result of each worker on."""
     indices = iter(range(flights))
 
     def following() -> FlightRequest | None:
@@ -57,7 +60,7 @@ def flights_a_minute(base: CampaignBase, workers: int, flights: int) -> float:
 
 
 def over_simulate(base: CampaignBase, flights: int = 20) -> float:
-    """CPU time of a flight as a campaign flies it over that of `simulate` alone, the median of as many flights."""
+    """Return the median CPU time of a campaign's flight relative to `simulate` alone, over some flights."""
     fly_one(base, 0)
     ratios = []
     for index in range(1, flights + 1):
@@ -73,7 +76,7 @@ def over_simulate(base: CampaignBase, flights: int = 20) -> float:
 
 
 def proof(folder: Path, share: float) -> tuple[int, float]:
-    """Flights and seconds of ``planfly campaign jacksboro-air --prove SHARE``, planning and report included."""
+    """Return flights and seconds of ``planfly campaign jacksboro-air --prove SHARE``, with planning and report."""
     started = time.perf_counter()
     command = [sys.executable, "-m", "planfly", "campaign", "jacksboro-air", "--prove", str(share), "--seed", "1"]
     done = subprocess.run(
@@ -87,8 +90,8 @@ def proof(folder: Path, share: float) -> tuple[int, float]:
 def run(most: int = FLIGHTS, *, whole: bool = False) -> dict[str, Any]:
     """Measure, print a table, and return it.
 
-    most: flights whose rate is taken; of fewer than 90 the probability that is proved is 0.9.
-    whole: with the rows that take an hour: winds of the demo, the client's memory, both rates of steps.
+    most: number of flights whose rate is measured; with fewer than 90 the proved probability is 0.9.
+    whole: include the rows that take an hour: winds of the demo, the client's memory, both step rates.
     """
     share = 0.99 if most >= FLIGHTS else 0.9
     with tempfile.TemporaryDirectory() as name:

@@ -1,9 +1,9 @@
-"""Flights with JSBSim at 60 steps a second against the same flights at 120.
+"""Compare flights with JSBSim at 60 steps a second with the same flights at 120.
 
 ``python -m benchmarks.campaigns.compare_step_rates [--missions N] [--from SEED] [--aircraft NAME]`` flies missions of
-`tests.field_missions`, every other of them close to a limit, at both rates: as they are, with gusts and satellites'
-errors, for the verdict; in calm and in their wind without gusts, navigation exact, for the track.  It prints in how
-many the verdicts differ, and how far apart the tracks are at most, row by row at the same time.
+`tests.field_missions`, every other one close to a limit, at both rates: unchanged, with gusts and GNSS errors, for the
+verdict; in calm air and in their wind without gusts, with exact navigation, for the track.  It prints the number of
+different verdicts, and the largest distance between the tracks at the same time.
 """
 
 import argparse
@@ -23,17 +23,17 @@ from tests.field_missions import FieldMission, close_mission, ordinary_mission
 from world.scenario import Scenario
 from world.wind import Wind
 
-# A track may be so far from that at 120 steps a second, m.
+# Largest allowed distance of a track from the track at 120 steps a second, m.
 MAX_DIFFERENCE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class StepRates:
-    """One mission at both rates.
+    """Results of one mission at both rates.
 
-    flyable: at 120 and at 60 steps a second.
-    same: whether the same rules failed at the same places.
-    calm, windy: how far apart the tracks are at most without gusts, m; inf where one ended otherwise.
+    flyable: verdicts at 120 and at 60 steps a second.
+    same: True if the same rules failed at the same places.
+    calm, windy: largest distance between the tracks without gusts, m; inf if the flights ended differently.
     """
 
     name: str
@@ -44,18 +44,18 @@ class StepRates:
 
 
 def compare(seed: int, aircraft: str = "aerosonde") -> StepRates:
-    """Fly the mission of a seed."""
+    """Fly the mission of a seed at both rates."""
     made = mission_of(seed, aircraft)
     airframe = load_airframe(made.scenario)
     setup = make_setup(made.scenario, airframe, made.mission, seed=1)
     judged = [_judged(setup, airframe, hz) for hz in (120, 60)]
     failed = [{(item.rule, item.place) for item in one.findings if item.ok is False} for one in judged]
-    calm, windy = (_apart(_without_gusts(made, speed), airframe) for speed in (0.0, made.scenario.wind.speed))
+    calm, windy = (_max_distance(_without_gusts(made, speed), airframe) for speed in (0.0, made.scenario.wind.speed))
     return StepRates(made.name, (judged[0].flyable, judged[1].flyable), failed[0] == failed[1], calm, windy)
 
 
 def mission_of(seed: int, aircraft: str) -> FieldMission:
-    """Ordinary for an even seed, close to a limit for an odd one."""
+    """Make the mission of a seed: ordinary for an even seed, close to a limit for an odd one."""
     flight: dict[str, Any] = {} if aircraft == "aerosonde" else {"aircraft": aircraft}
     if seed % 2 == 0:
         return ordinary_mission(seed, **flight)
@@ -81,10 +81,10 @@ def _without_gusts(made: FieldMission, speed: float) -> FlightSetup:
     return replace(setup, nav="perfect")
 
 
-def _apart(setup: FlightSetup, airframe: Airframe) -> float:
+def _max_distance(setup: FlightSetup, airframe: Airframe) -> float:
     one, other = (_flown(setup, airframe, hz) for hz in (120, 60))
     rows = min(len(one.track), len(other.track))
-    # The last tick may come one later.
+    # The flights may differ by one tick in length.
     if one.ended != other.ended or abs(len(one.track) - len(other.track)) > 1 or not rows:
         return float("inf")
     return float(np.linalg.norm(one.track.position[:rows] - other.track.position[:rows], axis=1).max())
@@ -95,7 +95,7 @@ def _flown(setup: FlightSetup, airframe: Airframe, hz: int) -> SimulatedFlight:
 
 
 def compare_all(seeds: range, aircraft: str = "aerosonde", *, loud: bool = False) -> dict[str, float]:
-    """What all missions come to: figures by name."""
+    """Compare all missions, and return figures by name."""
     found: list[StepRates] = []
     for one in _each(seeds, aircraft):
         found.append(one)

@@ -1,22 +1,20 @@
-"""`planfly winds` on the demo against flights at fixed winds, up to 1,000 of them at each.
+"""Compare the boundaries of `planfly winds` on the demo with up to 1,000 flights at each of some fixed winds.
 
 ``python -m benchmarks.campaigns.winds_reference [--directions K ...] [--flights N] [--even] [--seed N]`` flies the
-demo in wind half a metre a second below and above each boundary that ``planfly winds jacksboro-air`` found, in other
-weather and with other aircraft than that had, and adds the counts to ``tests/authorities/winds_reference.json``: some
-minutes a point.  Where a direction has but one point, and there fewer fly than have to, it gets another a metre a
-second below.
+demo in winds of 0.5 m/s below and above each boundary that ``planfly winds jacksboro-air`` found, with other weather
+and other aircraft, and adds the counts to ``tests/authorities/winds_reference.json``: some minutes per point.  If a
+direction has only one point, and fewer flights than required are flyable there, it gets another point 1 m/s below.
 
-The draws of a point are independent of each other, or with ``--even`` spread evenly over what may be drawn (Sobol's
-points, scrambled by Owen): each is drawn from the same distribution, and as many aircraft are slippery as are to be.
-A point of independent draws ends early where its share of flyable flights is above or below the target with 99 %
-confidence, valid at every number of flights.  One of Sobol samples does not end early.
+The draws of a point are independent, or with ``--even`` evenly spread (Sobol points with Owen scrambling): each draw
+has the same distribution, and the proportions of the drawn aircraft are as expected.  A point of independent draws ends
+early if its share of flyable flights is above or below the target with 99 % confidence, valid at every number of
+flights.  A point of Sobol samples does not end early.
 
-The reference's own boundary is that of the likeliest normal law through a direction's points, and its interval that of
-the likelihood ratio, with the law's slope free; Sobol samples count as if they were independent, which leaves the
-interval wider than it has to be.  A boundary is right that lies within half a metre a second of it, and shown wrong if
-it does of no wind in the interval.  A direction with a single wind has its boundary above that where all
-fly that have to, and
-below it where they do not.
+The boundary of the reference is the maximum-likelihood normal distribution through a direction's points, and its
+interval follows from the likelihood ratio, with a free slope; Sobol samples are treated as independent, which makes the
+interval wider than necessary.  A boundary is right if it is within 0.5 m/s of the reference, and shown wrong if it is
+within 0.5 m/s of no wind in the interval.  A direction with a single wind has its boundary above that wind if enough
+flights are flyable, and below it if not.
 """
 
 import argparse
@@ -40,33 +38,40 @@ from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.statistics.decision import Estimator, Goal, Tally
 from planfly.campaigns.worker_pool import Workers, worker_pool
 
+# File of the reference.
 REFERENCE = Path(__file__).parents[2] / "tests" / "authorities" / "winds_reference.json"
+# Goal of the search for boundaries.
 GOAL = WindsGoal(0.99, 0.95, 16, 20.0, 5000)
+# Tolerance of a boundary, m/s.
 WITHIN = 0.5
-# Laws of the reference: they begin to fail 1 - P there, m/s, and grow so steeply, 1/(m/s).
-_BOUNDARIES, _SLOPES = np.arange(0.0, 30.0, 0.05), np.geomspace(0.02, 20.0, 120)
-# Of the reference's draws, if no other is named; the boundaries are found with seed 1.
+# Grid of the reference's boundaries, where a share 1 - P fails, m/s.
+_BOUNDARIES = np.arange(0.0, 30.0, 0.05)
+# Grid of the slopes of the reference's distributions, 1/(m/s).
+_SLOPES = np.geomspace(0.02, 20.0, 120)
+# Default seed of the reference's draws; the boundaries are found with seed 1.
 _SEED = 77
 
 
 def demo(seed: int) -> CampaignBase:
-    """The demo's plan of seed 1, with a spread but for the wind's mean; seed: of the draws."""
+    """Open the demo's plan of seed 1, dispersed except for the mean wind; seed: seed of the draws."""
     base = open_campaign("jacksboro-air", default_dispersions().without(ASKED), seed=1)
     return replace(base, seed=seed)
 
 
 def share_at(base: CampaignBase, wind: GivenWind, most: int) -> Tally:
-    """Fly independent draws at one wind until it is decided, or so many flights."""
+    """Fly independent draws at one wind until the target is decided, up to ``most`` flights."""
     decide = Estimator(Goal(GOAL.target, True, most, 0.99))
-    return _counted(base, wind, most, decide.decides, fly_one)
+    return _count_outcomes(base, wind, most, decide.decides, fly_one)
 
 
 def sobol_share_at(base: CampaignBase, wind: GivenWind) -> Tally:
     """Fly a full set of Sobol samples at one wind."""
-    return _counted(base, wind, SOBOL_FLIGHTS, lambda _: False, fly_sobol)
+    return _count_outcomes(base, wind, SOBOL_FLIGHTS, lambda _: False, fly_sobol)
 
 
-def _counted(base: CampaignBase, wind: GivenWind, most: int, ends: Callable[[Tally], bool], fly: FlyOne) -> Tally:
+def _count_outcomes(
+    base: CampaignBase, wind: GivenWind, most: int, ends: Callable[[Tally], bool], fly: FlyOne
+) -> Tally:
     indices, flown = iter(range(most)), Tally(0, 0, 0)
 
     def following() -> FlightRequest | None:
@@ -81,14 +86,14 @@ def _counted(base: CampaignBase, wind: GivenWind, most: int, ends: Callable[[Tal
 
 
 def found_winds() -> WindsFound:
-    """The boundaries as `planfly winds jacksboro-air --seed 1` finds them."""
+    """Find the boundaries of `planfly winds jacksboro-air --seed 1`."""
     base = demo(1)
     with tempfile.TemporaryDirectory() as name, open_winds_store(base, GOAL, Path(name), resume=False) as store:
         return find_winds(base, GOAL, Workers(2), store)
 
 
 def winds_row() -> dict[str, float]:
-    """Flights that the boundaries take, and of the reference's directions those that are right within 0.5 m/s."""
+    """Return the number of flights of the search, and of the reference's directions that are right within 0.5 m/s."""
     found = found_winds()
     kept = json.loads(REFERENCE.read_text(encoding="utf-8")) if REFERENCE.exists() else {}
     pairs = [(found.boundaries[int(direction)].estimate, points) for direction, points in kept.items()]
@@ -102,13 +107,15 @@ def winds_row() -> dict[str, float]:
 
 
 def is_within(boundary: float, points: list[dict[str, Any]], confidence: float) -> bool:
-    """Whether a boundary, m/s, is within half a metre a second of the reference's, or, of a confidence, may be."""
+    """Return True if a boundary, m/s, is within 0.5 m/s of the reference's interval of this confidence."""
     low, high = reference_interval(points, confidence)
     return low - WITHIN <= boundary <= high + WITHIN
 
 
 def reference_interval(points: list[dict[str, Any]], confidence: float) -> tuple[float, float]:
-    """Of the reference's boundary, m/s; of confidence 0 the likeliest twice.
+    """Return the interval of the reference's boundary, m/s.
+
+    For confidence 0 the most likely boundary twice.
 
     >>> points = [{"speed": 8.0, "flights": 1000, "flyable": 995}, {"speed": 9.0, "flights": 1000, "flyable": 985}]
     >>> [round(one, 1) for one in reference_interval(points, 0.0)]
@@ -117,20 +124,21 @@ def reference_interval(points: list[dict[str, Any]], confidence: float) -> tuple
     if len(speeds := {float(one["speed"]) for one in points}) == 1:
         speed = speeds.pop()
         return (speed, GOAL.most) if _enough_fly(points) else (0.0, speed - 0.05)
-    likelihood = _likelihood(points).max(axis=0)
+    likelihood = _log_likelihood(points).max(axis=0)
     likely = _BOUNDARIES[likelihood >= likelihood.max() - 0.5 * chi2.ppf(confidence, 1)]
-    # Beyond the largest wind that is looked at all are the same.
+    # Boundaries beyond the largest wind of the search are not distinguished.
     return min(float(likely[0]), GOAL.most), min(float(likely[-1]), GOAL.most)
 
 
 def agreement(points: list[dict[str, Any]], references: int = 100) -> float:
-    """How often another reference of as many flights would have its boundary within half a metre a second of this one.
+    """Return how often another reference of the same size would have its boundary within 0.5 m/s of this one.
 
-    As often as chance has it where this one's likeliest law is the truth; one with a single wind is left out as sure.
+    Simulated with the most likely distribution of this reference as the truth; a reference with a single wind is
+    treated as certain.
     """
     if len({one["speed"] for one in points}) == 1:
         return 1.0
-    likelihood = _likelihood(points)
+    likelihood = _log_likelihood(points)
     k, at = np.unravel_index(int(np.argmax(likelihood)), likelihood.shape)
     boundary, random, agreed = min(float(_BOUNDARIES[at]), GOAL.most), np.random.default_rng(_SEED), 0
     for _ in range(references):
@@ -146,8 +154,8 @@ def _enough_fly(points: list[dict[str, Any]]) -> bool:
     return sum(one["flyable"] for one in points) >= GOAL.target * sum(one["flights"] for one in points)
 
 
-def _likelihood(points: list[dict[str, Any]]) -> NDArray[np.float64]:
-    """(slopes, boundaries) its logarithm."""
+def _log_likelihood(points: list[dict[str, Any]]) -> NDArray[np.float64]:
+    """Return the log-likelihood (slopes, boundaries)."""
     speeds, flights, flyable = (np.array([one[name] for one in points]) for name in ("speed", "flights", "flyable"))
     x = norm.isf(GOAL.target) + _SLOPES[:, None, None] * (speeds - _BOUNDARIES[:, None])
     out: NDArray[np.float64] = (flyable * norm.logsf(x) + (flights - flyable) * norm.logcdf(x)).sum(axis=-1)
@@ -155,7 +163,10 @@ def _likelihood(points: list[dict[str, Any]]) -> NDArray[np.float64]:
 
 
 def _winds_to_fly(boundary: float, beyond: bool, points: list[dict[str, Any]]) -> list[float]:
-    """m/s, below and above a boundary; of one that is beyond what is looked at below it, and lower if it is wrong."""
+    """Return winds below and above a boundary, m/s.
+
+    Only below if it is beyond the search, and lower if it is wrong.
+    """
     below = round(max(0.0, boundary - WITHIN), 2)
     if not beyond:
         return [below, round(boundary + WITHIN, 2)]
@@ -164,7 +175,7 @@ def _winds_to_fly(boundary: float, beyond: bool, points: list[dict[str, Any]]) -
 
 
 def main() -> None:
-    """Fly the points and keep them."""
+    """Fly the points and store them."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.campaigns.winds_reference")
     parser.add_argument("--directions", type=int, nargs="*", default=list(range(GOAL.directions)))
     parser.add_argument("--flights", type=int, default=1000, help="at each point, at most")

@@ -1,1 +1,1 @@
-"""What planners are compared by: independent paths, fresh instances, ablations, and the choices of the paper."""
+"""Comparisons of planners: independent paths, fresh instances, ablations, and the choices of the paper."""

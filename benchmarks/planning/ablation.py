@@ -1,4 +1,4 @@
-"""What each part of the default planner is worth: seeds, generations and tightening, each left out."""
+"""Measure the value of each part of the default planner, without seeds, generations or tightening."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,13 +14,13 @@ from planner.plan import Objective
 from planner.search.algorithms import ALGORITHMS, DEFAULT, Algorithm
 from planner.search.plan_path import plan_path
 
-# Random instances beside the hard set: none of them was looked at while the planner was tuned.
+# Random instances in addition to the hard set; none of them was used to tune the planner.
 RANDOM = range(8001, 8013)
 
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """A way to search: its name in the table, and whether it spends the scenario's generations."""
+    """Search variant: name in the table, algorithm, and True to run the scenario's generations."""
 
     name: str
     algorithm: Algorithm
@@ -28,7 +28,7 @@ class Variant:
 
 
 def variants() -> list[Variant]:
-    """The default, and each of its parts left out or exchanged."""
+    """Return the default algorithm, and variants with each of its parts left out or exchanged."""
     whole, seedless = ALGORITHMS[DEFAULT], ALGORITHMS["fda"]
     return [
         Variant(f"{DEFAULT}, the default", whole),
@@ -43,7 +43,7 @@ def variants() -> list[Variant]:
 
 @contextmanager
 def _named(algorithm: Algorithm) -> Iterator[str]:
-    """A name under which plans are made by an algorithm that has none of its own."""
+    """Register an algorithm under a temporary name, and yield the name."""
     name = "ablation"
     ALGORITHMS[name] = replace(algorithm, name=name)
     try:
@@ -53,7 +53,7 @@ def _named(algorithm: Algorithm) -> Iterator[str]:
 
 
 def _runs(task: Task, variant: Variant, seeds: int) -> tuple[list[float], list[float]]:
-    """Length ratio of each seed's plan, NaN where it is not safe, and its CPU time, s."""
+    """Return the length ratio of each seed's plan, NaN if it is not safe, and its CPU time, s."""
     scenario = task.scenario if variant.generations else with_planner(task.scenario, generations=0)
     ratios, seconds = [], []
     with _named(variant.algorithm) as name:
@@ -66,7 +66,10 @@ def _runs(task: Task, variant: Variant, seeds: int) -> tuple[list[float], list[f
 
 
 def measure(seeds: int) -> dict[str, Any]:
-    """Each variant on the hard set, so many seeds, and on random instances, one; prints a table and returns it."""
+    """Run each variant on the hard set with some seeds, and on random instances with one.
+
+    Print and return a table.
+    """
     tasks = [(make_task(f"hard-{number:02d}"), seeds) for number in PROBLEMS]
     tasks += [(random_task(seed), 1) for seed in RANDOM]
     found = {variant.name: [_runs(task, variant, many) for task, many in tasks] for variant in variants()}

@@ -1,9 +1,10 @@
-"""Fresh random instances that no tuning has seen: ``python -m benchmarks.planning.fresh_instances --from 7001``.
+"""Measure planners on fresh random instances: ``python -m benchmarks.planning.fresh_instances --from 7001``.
 
-60 threats each.  ``--family passable``: of `tests.instances`, draws that a coarse grid can pass; ``drawn``: the first
-draw of each seed, whether or not there is a path; ``wild``: of `benchmarks.planning.wild_instances`.  ``--autopilot``
-says for whom plans leave room.  Best known is the shortest certified path of `benchmarks.planning.reference_search` and
-of everything that is measured here.  What the reference finds is kept in ``--kept FILE``, for it takes the longest.
+No tuning has used these instances of 60 threats.  ``--family passable``: draws of `tests.instances` with a path on a
+coarse grid; ``drawn``: the first draw of each seed, with or without a path; ``wild``: instances of
+`benchmarks.planning.wild_instances`.  ``--autopilot`` names the autopilot of the plans.  Best known is the shortest
+certified path of `benchmarks.planning.reference_search` and of all measurements here.  The results of the reference,
+which takes the longest, are stored in ``--kept FILE``.
 """
 
 import argparse
@@ -31,15 +32,19 @@ from world.scenario_file import parse_scenario
 
 Floats = NDArray[np.float64]
 
+# Default file of the stored references.
 KEPT = Path("runs") / "fresh-instances.json"
+# Number of threats of an instance.
 THREATS = 60
 FAMILIES = ("passable", "drawn", "wild")
-# A path is long if it exceeds the best known by more than this share; a run is slow if it takes more CPU than this, s.
-LONG, SLOW = 0.02, 1.0
+# Excess over the best known length above which a path is long, as a fraction.
+LONG = 0.02
+# CPU time above which a run is slow, s.
+SLOW = 1.0
 
 
 def random_task(seed: int, threats: int = THREATS, family: str = "passable", autopilot: str = "ideal") -> Task:
-    """The task of a random instance."""
+    """Make the task of a random instance."""
     if family == "wild":
         scenario = wild_scenario(seed, autopilot)
     else:
@@ -52,13 +57,16 @@ def random_task(seed: int, threats: int = THREATS, family: str = "passable", aut
 
 
 def _drawn(seed: int, threats: int) -> str:
-    """The first draw of a seed as a scenario file's text."""
+    """Return the first draw of a seed as the text of a scenario file."""
     positions, radii = draw_threats(np.random.default_rng([SEED, threats, seed, 0]), threats)
     return scenario_text(f"drawn-{threats}-{seed}", Instance(positions, radii, 0), f"drawn instance {seed}")
 
 
 def reference_ratios(names: Sequence[str], tasks: Sequence[Task], kept: Path) -> Floats:
-    """Length ratio of the reference of each task (n,), NaN for none; kept from earlier runs by name."""
+    """Return the reference length ratio of each task (n,), NaN without one.
+
+    Earlier results are read by name.
+    """
     kept.parent.mkdir(exist_ok=True)
     known: dict[str, dict[str, float]] = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
     for name, task in zip(names, tasks, strict=True):
@@ -72,7 +80,7 @@ def reference_ratios(names: Sequence[str], tasks: Sequence[Task], kept: Path) ->
 
 
 def measure(tasks: Sequence[Task], reference: Floats, algorithms: Sequence[str], runs: int) -> dict[str, Any]:
-    """Runs of each algorithm on each task beside the reference's ratios (n,); prints a table and returns it."""
+    """Run each algorithm on each task, compare with the reference ratios (n,), print a table and return it."""
     ratios = np.full((len(algorithms), len(tasks), runs), np.nan)
     seconds = np.zeros(ratios.shape)
     for at, task in enumerate(tasks):
@@ -116,9 +124,9 @@ def measure(tasks: Sequence[Task], reference: Floats, algorithms: Sequence[str],
 
 
 def print_worst(names: Sequence[str], record: dict[str, Any], algorithm: str) -> None:
-    """One line for each instance that an algorithm solves by a long path, slowly, or not at all."""
+    """Print a line for each instance that an algorithm solves by a long path, slowly, or not at all."""
     entry = record[algorithm]
-    # Without the reference nothing is known to have a path.
+    # Without the reference no instance is known to have a path.
     solved = np.isfinite(record["the reference"]["ratios"])[:, 0] if "the reference" in record else [False] * len(names)
     for name, over, spent, known in zip(names, entry["ratios"], entry["seconds"], solved, strict=True):
         if max(spent) > SLOW or (known and not max(over) <= 1.0 + LONG):
@@ -126,7 +134,7 @@ def print_worst(names: Sequence[str], record: dict[str, Any], algorithm: str) ->
 
 
 def main() -> None:
-    """Measure what the command line asks for."""
+    """Measure with the options of the command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.planning.fresh_instances")
     parser.add_argument("--family", choices=FAMILIES, default="drawn", help="which instances")
     parser.add_argument("--from", dest="first", type=int, default=7001, help="seed of the first instance")

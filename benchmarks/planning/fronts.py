@@ -1,19 +1,19 @@
-"""Fronts of 20 plans beside those of pymoo's NSGA-II and MOEA/D, by hypervolume.
+"""Compare fronts of 20 plans with fronts of pymoo's NSGA-II and MOEA/D, by hypervolume.
 
 ``python -m benchmarks.planning.fronts [--seeds N] [--from SEED] [--problems NAME,...] [--whole] [--json FILE]`` plans a
 front of 20 (`planner.search.plan_front`) and lets pymoo's algorithms search the same four objectives: length, exposure,
-clearance and energy, under the same graded constraints, with as many evaluations as ours took, and again with as much
-CPU, the default plan, the seeds and the certificates of ours included. NSGA-II takes constraints as it ships them;
-MOEA/D knows none, so violations are added to its objectives. Both search the box of the rotated encoding from random
-samples; and once more from the paths that ours starts from, which they would not have alone: as many of them as a
-population holds, those that cover most. Of what each returns, the 20 certified paths that cover most count; a front
-without any has hypervolume 0.
+clearance and energy, under the same graded constraints, with the same number of evaluations, and again with the same
+CPU time, which includes planfly's default plan, seeds and certificates. NSGA-II handles constraints itself; MOEA/D does
+not, so that violations are added to its objectives. Both search the box of the rotated encoding from random samples,
+and once more from the start paths of planfly, which they would not have alone: one population of them, the paths that
+cover most. Of each result the 20 certified paths that cover most are used; a front without any has hypervolume 0.
 
-A problem is the name of a scenario, ``random-7101`` or ``wild-7101``: an instance of 60 threats of that number as of
-`benchmarks.planning.fresh_instances`. ``--fresh`` measures twelve of these with the first seed, from our paths alone.
+A problem is the name of a scenario, ``random-7101`` or ``wild-7101``: an instance of 60 threats of that number of
+`benchmarks.planning.fresh_instances`. ``--fresh`` measures twelve of these with the first seed, from planfly's paths
+only.
 
-The reference point is that of `reference_point`: 1.5 times the length, exposure and energy of the default plan (1 s of
-exposure at least), and the required clearance. Hypervolumes are shares of the box between it and the straight line's
+The reference point of `reference_point` is 1.5 times the length, exposure and energy of the default plan (1 s of
+exposure at least), and the required clearance. Hypervolumes are fractions of the box between it and the straight line's
 length, no exposure, the clearance of the lower end, and the default plan's energy times straight / length.
 """
 
@@ -37,17 +37,27 @@ from world.scenario import Scenario, load_scenario
 
 Floats = NDArray[np.float64]
 
-PROBLEMS, COUNT, FIRST_SEED = ("hard-30", "hard-60", "jacksboro"), 20, 100
+# Scenarios of the comparison.
+PROBLEMS = ("hard-30", "hard-60", "jacksboro")
+# Number of plans of a front.
+COUNT = 20
+# First seed by default.
+FIRST_SEED = 100
+# Instances of ``--fresh``.
 FRESH = tuple(f"{family}-{number}" for family in ("random", "wild") for number in range(7101, 7107))
-# Populations of pymoo's algorithms, and the neighbours of MOEA/D: its reference directions are those of 7 partitions.
-POPULATION, PARTITIONS, NEIGHBOURS = 120, 7, 15
-# Weight of violations in MOEA/D's objectives, which are shares of the reference box.
+# Population of pymoo's algorithms.
+POPULATION = 120
+# Partitions of the reference directions of MOEA/D.
+PARTITIONS = 7
+# Neighbours of MOEA/D.
+NEIGHBOURS = 15
+# Weight of violations in MOEA/D's objectives, which are fractions of the reference box.
 PENALTY = 100.0
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What one search came to: hypervolume as a share of the box, plans, evaluations and CPU, s."""
+    """Result of one search: hypervolume as a fraction of the box, plans, evaluations and CPU time, s."""
 
     hypervolume: float
     plans: int
@@ -57,7 +67,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Contest:
-    """A problem as every algorithm sees it.
+    """Problem that all algorithms share.
 
     ideal, reference: corners (4,) of the box of objectives.
     """
@@ -68,7 +78,7 @@ class Contest:
     reference: Floats
 
     def share(self, paths: Floats) -> float:
-        """Hypervolume of paths (n, w, 3) as a share of the box."""
+        """Return the hypervolume of paths (n, w, 3) as a fraction of the box."""
         if not len(paths):
             return 0.0
         objectives = self.task.objectives(self.task.values(paths))
@@ -76,7 +86,7 @@ class Contest:
         return hypervolume(scaled, np.ones(4))
 
     def certified(self, paths: Floats) -> Floats:
-        """The 20 certified and safe paths of some (n, w, 3) that cover most."""
+        """Return the 20 certified and safe paths of (n, w, 3) that cover most."""
         safe = [path for path in paths if self._is_safe(path)]
         if not safe:
             return paths[:0]
@@ -90,14 +100,14 @@ class Contest:
 
 
 def _scenario(name: str) -> Scenario:
-    """The scenario of a problem."""
+    """Load or make the scenario of a problem."""
     kind, _, number = name.partition("-")
     families = {"random": "passable", "wild": "wild"}
     return random_task(int(number), family=families[kind]).scenario if kind in families else load_scenario(name)
 
 
 def make_contest(scenario: Scenario, front: Front) -> Contest:
-    """The contest of a problem, in the box about its default plan."""
+    """Make the contest of a problem, with the box of its default plan."""
     default = front.default
     task = fitted_task(front_task(scenario, load_airframe(scenario).limits.surely()), default.plan.waypoints)
     space = task.problem.space
@@ -111,7 +121,7 @@ def make_contest(scenario: Scenario, front: Front) -> Contest:
 
 
 def ours(name: str, seed: int) -> tuple[Front, Contest, Row]:
-    """Our front of a problem, its contest and its row."""
+    """Plan planfly's front of a problem; return it with its contest and its row."""
     scenario = _scenario(name)
     limits = load_airframe(scenario).limits.surely()
     began = time.process_time()
@@ -124,7 +134,7 @@ def ours(name: str, seed: int) -> tuple[Front, Contest, Row]:
 
 
 def _box(contest: Contest, seeds: Floats) -> tuple[Floats, Floats]:
-    """The encoding's box; with seeds (n, d), which keep to no intervals, the box of these and of it."""
+    """Return the encoding's box, extended to seeds (n, d), which are not bound to the intervals."""
     low, high = contest.encoding.lower, contest.encoding.upper
     if not len(seeds):
         return low, high
@@ -134,7 +144,7 @@ def _box(contest: Contest, seeds: Floats) -> tuple[Floats, Floats]:
 def theirs(
     contest: Contest, algorithm: str, seed: int, evaluations: int | None, seconds: float | None, seeds: Floats
 ) -> Row:
-    """A front by one of pymoo's algorithms, until it has had so many evaluations or so much CPU.
+    """Search a front with one of pymoo's algorithms, up to a number of evaluations or a CPU time.
 
     seeds: vectors (n, d) in its first population.
     """
@@ -152,7 +162,7 @@ def theirs(
             spent += len(x)
             objectives, violations = task.scores(task.paths(x))
             if penalised:
-                # It compares what breaks a constraint, too.
+                # MOEA/D compares infeasible paths, too.
                 objectives = task.objectives(task.values(task.paths(x)))
             scaled = (objectives - contest.ideal) / (contest.reference - contest.ideal)
             scaled = np.nan_to_num(scaled, nan=1e6, posinf=1e6, neginf=-1.0)
@@ -169,7 +179,7 @@ def theirs(
     while (evaluations is None or spent < evaluations) and (seconds is None or time.process_time() - began < seconds):
         engine.next()
     took = time.process_time() - began
-    # What it has seen at all that meets the constraints counts, which is more than its last population.
+    # All feasible paths of the search are used, not only its last population.
     if not kept_vectors:
         return Row(0.0, 0, spent, took)
     paths = _thinned(contest, np.array(kept_vectors))
@@ -178,11 +188,11 @@ def theirs(
 
 
 def _thinned(contest: Contest, vectors: Floats) -> Floats:
-    """The paths of vectors (n, d) that cover most, five times as many as are wanted."""
+    """Return the paths of vectors (n, d) that cover most, five times the required number."""
     paths = contest.task.paths(vectors[-20_000:])
     objectives = contest.task.objectives(contest.task.values(paths))
     chosen: list[int] = []
-    # In parts, whose tables fit the memory.
+    # In parts, so that the tables fit in memory.
     for first in range(0, len(paths), 2000):
         chosen += (first + covering_order(objectives[first : first + 2000], contest.reference, 5 * COUNT)).tolist()
     order = covering_order(objectives[chosen], contest.reference, 5 * COUNT)
@@ -190,7 +200,7 @@ def _thinned(contest: Contest, vectors: Floats) -> Floats:
 
 
 def _engine(algorithm: str, seeds: Floats, low: Floats, high: Floats, seed: int) -> Any:
-    """One of pymoo's algorithms, ready to be set up."""
+    """Make one of pymoo's algorithms, ready for its setup."""
     from pymoo.algorithms.moo.moead import MOEAD
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.util.ref_dirs import get_reference_directions
@@ -204,7 +214,10 @@ def _engine(algorithm: str, seeds: Floats, low: Floats, high: Floats, seed: int)
 
 
 def measure(name: str, seeds: range, *, whole: bool, alone: bool = True) -> dict[str, Any]:
-    """All algorithms on a problem; prints a line a seed and the medians. alone: theirs without our paths, too."""
+    """Run all algorithms on a problem.
+
+    Print a line per seed and the medians. alone: also without planfly's paths.
+    """
     print(f"\n{name}: hypervolume as a share of the box; CPU s")
     record: dict[str, list[dict[str, Any]]] = {}
     for seed in seeds:
@@ -220,7 +233,7 @@ def measure(name: str, seeds: range, *, whole: bool, alone: bool = True) -> dict
 
 
 def _rows(name: str, seed: int, *, whole: bool, alone: bool) -> tuple[dict[str, Row], Front]:
-    """What each algorithm came to on a problem with one seed, and our front."""
+    """Return the row of each algorithm on a problem with one seed, and planfly's front."""
     front, contest, mine = ours(name, seed)
     if not front.plans:
         return {"planfly": mine}, front
@@ -238,7 +251,7 @@ def _rows(name: str, seed: int, *, whole: bool, alone: bool) -> tuple[dict[str, 
 
 
 def _covering_first(contest: Contest, vectors: Floats) -> Floats:
-    """Vectors (n, d) in the order of what they cover, those last that break a constraint."""
+    """Return vectors (n, d) in the order of their coverage, infeasible ones last."""
     objectives, violations = contest.task.scores(contest.task.paths(vectors))
     met = np.flatnonzero((violations <= 0.0).all(axis=1))
     first = met[covering_order(objectives[met], contest.reference, len(met))]
@@ -246,7 +259,7 @@ def _covering_first(contest: Contest, vectors: Floats) -> Floats:
 
 
 def _sum_up(record: dict[str, list[dict[str, Any]]]) -> None:
-    """Print medians, and ours over each."""
+    """Print medians, and the ratio of planfly's median to each."""
     own_share = np.array([row["hypervolume"] for row in record["planfly"]])
     for key, found in record.items():
         shares = np.array([row["hypervolume"] for row in found])

@@ -1,15 +1,15 @@
-"""Plans for the least time and the least energy in a wind of 10 m/s, flown beside plans for the shortest path.
+"""Compare plans for least time and least energy in a wind of 10 m/s with plans for the shortest path, in flight.
 
 ``python -m benchmarks.planning.in_the_wind [--missions N] [--from NUMBER] [--setting TEXT] [--planned] [--json FILE]``
-plans missions (`tests.autopilot_plans`: measured and made terrain, ten missiles each) three times, in a wind of 10 m/s
-at the height of the start from a random direction: for length, for time and for energy. Each plan is flown by the law
-in JSBSim, and the flown times and the energy used are compared with those of the shortest path. Settings are the
-wind's increase with height (none; 1 m/s every 100 m, about that of a power law with exponent 1/4 between 100 m and
+plans missions (`tests.autopilot_plans`: measured and synthetic terrain, ten missiles each) three times, in a wind of
+10 m/s at the altitude of the start from a random direction: for length, for time and for energy. Each plan is flown by
+the law in JSBSim, and its flight time and energy are compared with the flight of the shortest path. Settings are the
+wind's increase with altitude (none; 1 m/s every 100 m, similar to a power law with exponent 1/4 between 100 m and
 500 m) and the aircraft (the Aerosonde at 25 m/s, the X8 at 18 m/s).
 
-``--bound`` instead prints a time that no path can beat where the wind is the same at every height, over that of the
-shortest path: straight to the destination, through whatever stands there, at the true airspeed of the ceiling; and that
-of the fastest straight path that climbs there and sinks again, through whatever stands there.
+``--bound`` instead prints two lower bounds of the time relative to the shortest path, for the same wind at every
+altitude and ignoring obstacles: straight to the destination at the true airspeed of the ceiling; and the fastest
+straight path that climbs to the ceiling and descends again.
 """
 
 import argparse
@@ -33,8 +33,11 @@ from world.scenario import Scenario, from_spec
 
 Floats = NDArray[np.float64]
 
-# Of the missions: no other benchmark or test takes numbers so high.
-FIRST, SEED = 3900, 3904
+# Number of the first mission; no other benchmark or test uses numbers this high.
+FIRST = 3900
+# Seed of the wind directions.
+SEED = 3904
+# Wind speed, m/s.
 WIND = 10.0
 SETTINGS: dict[str, dict[str, Any]] = {
     "aerosonde, 1 m/s more every 100 m": {"aircraft": "aerosonde", "gradient": 0.01},
@@ -47,7 +50,10 @@ OBJECTIVES = ("length", "time", "energy")
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """A plan and its flight: flown time (s), energy (Wh), length ratio, CPU of the plan (s); why not, "" if flown."""
+    """Plan and its flight: time (s), energy (Wh), length ratio, CPU time of the plan (s).
+
+    The failure, "" if flown.
+    """
 
     seconds: float
     energy: float
@@ -57,7 +63,7 @@ class Flown:
 
 
 def mission(number: int, aircraft: str, gradient: float, objective: str) -> Scenario:
-    """The mission of this number in 10 m/s of wind from a direction of its own."""
+    """Return the mission of this number in 10 m/s of wind from its own random direction."""
     spec = plan_scenario(number).to_json()
     spec["wind"] = {
         "speed_mps": WIND,
@@ -70,7 +76,10 @@ def mission(number: int, aircraft: str, gradient: float, objective: str) -> Scen
 
 
 def fly(scenario: Scenario, seed: int, *, planned: bool) -> Flown:
-    """Plan a scenario and fly the plan by the law; where `planned`, work out time and energy by the legs alone."""
+    """Plan a scenario and fly the plan by the law.
+
+    If `planned`, compute time and energy from the legs only.
+    """
     airframe = load_airframe(scenario)
     began = time.process_time()
     plan = make_plan(scenario, airframe, seed)
@@ -90,14 +99,14 @@ def fly(scenario: Scenario, seed: int, *, planned: bool) -> Flown:
 
 
 def _by_legs(limits: Limits, table: PerformanceTable, path: Floats) -> tuple[float, float]:
-    """Time (s) and energy (Wh) of a path (w, 3) by its legs."""
+    """Return the time (s) and energy (Wh) of a path (w, 3) by its legs."""
     energy = energy_cost(limits.envelope, table)
     joules = np.nan if energy is None else path_cost(energy, table, path) / energy.energy
     return path_cost(time_cost(table), table, path) / float(table.airspeed), joules / 3600.0
 
 
 def measure(name: str, first: int, count: int, *, planned: bool) -> list[dict[str, Any]]:
-    """Fly every mission in one setting, and print a line for each."""
+    """Fly every mission in one setting, and print a line for each mission."""
     rows = []
     print(f"\n{name}: ratios to the shortest path")
     for number in range(first, first + count):
@@ -118,7 +127,7 @@ def measure(name: str, first: int, count: int, *, planned: bool) -> list[dict[st
 
 
 def _straight_seconds(scenario: Scenario, limits: Limits, course: float, level: float) -> float:
-    """Least time (s) of straight paths through whatever stands there, that climb, stay level and sink."""
+    """Return the least time (s) of straight paths that climb, stay level and descend, ignoring obstacles."""
     table, (climb, dive) = limits.performance(), (np.tan(slope) for slope in limits.slopes(course, level))
     start, destination = np.array(scenario.start), np.array(scenario.destination)
     run, least = float(np.hypot(*(destination - start)[:2])), np.inf
@@ -133,7 +142,7 @@ def _straight_seconds(scenario: Scenario, limits: Limits, course: float, level: 
 
 
 def bounds(name: str, first: int, count: int) -> Floats:
-    """Times (n, 2) that no path beats, over the shortest path's by its legs; prints them, and times it by length."""
+    """Return lower bounds of the time (n, 2) relative to the shortest path's time by its legs, and print them."""
     assert SETTINGS[name]["gradient"] == 0.0
     ratios, detours = np.full((count, 2), np.nan), np.full(count, np.nan)
     for row, number in enumerate(range(first, first + count)):

@@ -1,9 +1,9 @@
-"""An independent search for the shortest safe path: a lattice over the whole map in three dimensions, and many starts.
+"""Search the shortest safe path independently, on a three-dimensional lattice over the whole map, with many starts.
 
 It shares no frame, no intervals and no populations with the planner: Dijkstra's algorithm from both ends over a lattice
-of east, north and height gives the length of the best way through every place; ways through places that lie
-on different sides of the missiles are then fitted and tightened one by one, with a budget no planner has.  So it sees
-the other side of an obstacle, a way over one and a way under it, wherever the lattice has a gap.
+of east, north and altitude gives the length of the best route through every place; routes on different sides of the
+missiles are then fitted and tightened one by one, with a larger budget than any planner.  So it finds routes around
+either side of an obstacle, over it and under it, wherever the lattice has a gap.
 """
 
 import heapq
@@ -26,20 +26,28 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-# Between the lattice's places, m; largest and least distance between its layers, m, so that the longest steps climb
-# one; and steps that climb or sink so many layers at most.
-PITCH, LAYER, LEAST_LAYER, MAX_LAYERS = 66.0, 20.0, 6.0, 4
-# Steps on the map: to the eight neighbours, and a knight's.
+# Spacing of the lattice's places, m.
+PITCH = 66.0
+# Largest distance between layers, m; it is reduced so that the longest steps can climb one layer.
+LAYER = 20.0
+# Smallest distance between layers, m.
+LEAST_LAYER = 6.0
+# Maximum number of layers that a step climbs or descends.
+MAX_LAYERS = 4
+# Steps on the map: to the eight neighbours, and knight's moves.
 STEPS = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3) if math.gcd(i, j) == 1])
-# Ways that are tightened, and how much longer than the best on the lattice they may be.
-WAYS, LONGER = 40, 1.3
-# Rounds of tightening a way, the first move of each, and evaluations of its pattern search.
+# Number of routes that are tightened.
+WAYS = 40
+# Largest length of a route relative to the best on the lattice.
+LONGER = 1.3
+# Scale of the first move in each round of tightening a route.
 SCALES = (1.0, 0.6, 1.0, 0.5, 0.25, 0.5, 0.25, 0.12, 0.06)
+# Evaluations of the pattern search of each round.
 PATTERNS = 1500
 
 
 class Lattice(NamedTuple):
-    """Places of a lattice: which are open (columns, rows, layers), layers' distance and position of the first, m."""
+    """Places of a lattice: open flags (columns, rows, layers), layer distance and position of the first place, m."""
 
     open: Flags
     layer: float
@@ -49,7 +57,7 @@ class Lattice(NamedTuple):
 
 
 def make_lattice(task: Task) -> Lattice:
-    """The lattice of a problem's map, from its floor to its ceiling; the ceiling is a layer."""
+    """Make the lattice of a problem's map, from its floor to its ceiling; the ceiling is a layer."""
     data = task.problem.search
     columns, rows = int((data.east - data.west) / PITCH) + 1, int((data.north - data.south) / PITCH) + 1
     layer = min(LAYER, max(LEAST_LAYER, 0.99 * min(_gentlest(data)) * PITCH * float(np.hypot(*STEPS.T).max())))
@@ -67,10 +75,10 @@ def make_lattice(task: Task) -> Lattice:
 
 
 class Tree(NamedTuple):
-    """Shortest ways between one place and all others of a lattice; arrays are flat.
+    """Shortest routes between one place and all others of a lattice; arrays are flat.
 
-    lengths: m, inf for none.  parents: next place towards the first, -1 for none.  classes: sums of the missiles'
-    weights for the sides on which the way passes them.
+    lengths: m, inf without a route.  parents: next place towards the first, -1 without one.  classes: sums of the
+    missiles' weights for the sides on which the route passes them.
     """
 
     lengths: Floats
@@ -90,10 +98,10 @@ def _tree(
     units: Floats,
     weights: Ints,
 ) -> tuple[Floats, Ints, Ints]:
-    """The `Tree` of a lattice by Dijkstra's algorithm.
+    """Compute the `Tree` of a lattice by Dijkstra's algorithm.
 
-    layer: distance between layers, m.  climb, dive: tangents.  forward: ways from home, or to it.  units, weights: of
-    the missiles, as `_units` makes them.
+    layer: distance between layers, m.  climb, dive: tangents.  forward: True for routes from home, False for routes to
+    it.  units, weights: data of the missiles, from `_units`.
     """
     columns, rows, layers = free.shape
     lengths, parents = np.full(free.size, np.inf), np.full(free.size, -1)
@@ -131,9 +139,10 @@ def _tree(
 
 @njit
 def _passed(a: int, b: int, c: int, d: int, units: Floats, weights: Ints) -> int:
-    """Sum of the weights of the missiles that a step from column a, row b to c, d passes, against the course negative.
+    """Sum the weights of the missiles that a step from column a, row b to c, d passes.
 
-    A missile is passed where the step crosses the line through it across the course from start to destination.
+    Negative against the course.
+    A step passes a missile if it crosses the line through it perpendicular to the course from start to destination.
     """
     total = 0
     for m in range(units.shape[0]):
@@ -150,7 +159,7 @@ def _passed(a: int, b: int, c: int, d: int, units: Floats, weights: Ints) -> int
 
 @njit
 def _trace(parents: Ints, place: int) -> Ints:
-    """Flat places from one to the home of a `Tree`."""
+    """Return the flat places from one place to the home of a `Tree`."""
     out = [place]
     while parents[out[-1]] >= 0:
         out.append(parents[out[-1]])
@@ -158,7 +167,10 @@ def _trace(parents: Ints, place: int) -> Ints:
 
 
 def _units(task: Task, lattice: Lattice) -> tuple[Floats, Ints]:
-    """Arguments `units` (m, 5) and `weights` (m, 2) of `_tree`: along and across in steps, radius, cosine and sine."""
+    """Return the arguments `units` (m, 5) and `weights` (m, 2) of `_tree`.
+
+    units: along and across in steps, radius, cosine and sine.
+    """
     frame = rotated_frame(task.problem.search.start, task.problem.search.destination)
     threats = task.scenario.threats
     east, north = ((threats.position[:, axis] - low) / PITCH for axis, low in enumerate((lattice.west, lattice.south)))
@@ -169,7 +181,7 @@ def _units(task: Task, lattice: Lattice) -> tuple[Floats, Ints]:
 
 
 def _gentlest(data: ProblemArrays) -> tuple[float, float]:
-    """Tangents of the steepest climb and dive on the course on which these are least, from the start's height."""
+    """Return the tangents of the climb and dive limits at the start's altitude, the smallest over all courses."""
     courses = np.linspace(0.0, 2.0 * math.pi, 16, endpoint=False)
     ends = data.start + 100.0 * np.column_stack([np.sin(courses), np.cos(courses), np.zeros(16)])
     slopes = np.array([slope_limits(data, np.array(data.start), end) for end in ends])
@@ -178,9 +190,10 @@ def _gentlest(data: ProblemArrays) -> tuple[float, float]:
 
 
 def lattice_ways(task: Task, most: int = WAYS) -> list[Floats]:
-    """Ways (n, 3) world m on different sides of the missiles, shortest first; none where the lattice is closed.
+    """Return routes (n, 3) world m on different sides of the missiles, shortest first.
 
-    Each is the shortest of its sides that leads through some place by the shortest ways on both sides of that place.
+    Empty if the lattice is closed.
+    Each is the shortest route of its sides that consists of the shortest routes from both ends to some place.
     """
     data, lattice = task.problem.search, make_lattice(task)
     climb, dive = _gentlest(data)
@@ -208,13 +221,13 @@ def lattice_ways(task: Task, most: int = WAYS) -> list[Floats]:
 
 
 def lattice_search(task: Task) -> tuple[float, Floats | None]:
-    """Length ratio and waypoints (w, 3) of the best certified path that is found; inf and None for none."""
+    """Return length ratio and waypoints (w, 3) of the best certified path; inf and None without one."""
     data, encoding = task.problem.search, task.encoding
     frame = rotated_frame(data.start, data.destination)
     best: tuple[float, Floats | None] = (math.inf, None)
     for way in lattice_ways(task):
         points = frame.rotate(way)
-        # The encoding holds no way that turns back: what does is flattened where it does.
+        # The encoding cannot represent a route that turns back, so that such parts are flattened.
         points[:, 0] = np.maximum.accumulate(points[:, 0])
         path = fit_waypoints(data, frame, points, encoding.waypoints)
         vector = rotated_vectors(task.problem.space, encoding, path[None])[0]

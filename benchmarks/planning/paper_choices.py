@@ -1,7 +1,7 @@
-"""What the paper leaves open, each choice measured: ``python -m benchmarks.planning.paper_choices [--runs 15]``.
+"""Measure the choices that the paper leaves open: ``python -m benchmarks.planning.paper_choices [--runs 15]``.
 
-The paper's UMDAc (Yang, Tang and Lozano, CEC 2014) on `paper-07` to `paper-60` with one choice at a time made otherwise
-than `planner.search` makes it.  docs/what-the-paper-leaves-open.md holds the table.
+The paper's UMDAc (Yang, Tang and Lozano, CEC 2014) runs on `paper-07` to `paper-60` with one choice at a time different
+from `planner.search`.  docs/what-the-paper-leaves-open.md contains the table.
 """
 
 import argparse
@@ -32,14 +32,14 @@ KILL_FIRST = (CONSTRAINTS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_GOAL
 
 
 class ClippedUmda(Umda):
-    """Samples outside the box are clipped to it at once."""
+    """UMDA that clips samples outside the box at once."""
 
     def _redraw_each(self, drawn: Floats, mean: Floats, deviation: Floats) -> Floats:
         return np.clip(drawn, self.lower, self.upper)
 
 
 class FreeUmda(Umda):
-    """Samples outside the box stay where they are."""
+    """UMDA that keeps samples outside the box."""
 
     def _redraw_each(self, drawn: Floats, mean: Floats, deviation: Floats) -> Floats:
         return drawn
@@ -47,7 +47,7 @@ class FreeUmda(Umda):
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A way to settle what is open: encoding, strip, optimiser, preference, and which path is reported."""
+    """Choice of encoding, strip, optimiser, preference, and reported path."""
 
     name: str
     encode: Callable[[Space, int], Encoding] = rotated
@@ -58,7 +58,7 @@ class Choice:
 
 
 def _longer(share: float) -> Callable[[Space, int], Encoding]:
-    """Polar with steps of up to this share of the mean leg."""
+    """Return a polar encoding with steps of up to this multiple of the mean leg."""
 
     def encode(space: Space, waypoints: int) -> Encoding:
         encoding, upper = polar(space, waypoints), polar(space, waypoints).upper.copy()
@@ -69,7 +69,7 @@ def _longer(share: float) -> Callable[[Space, int], Encoding]:
 
 
 def _widest(degrees: float) -> Callable[[Space, int], Encoding]:
-    """Polar with turning angles of up to so many degrees."""
+    """Return a polar encoding with turning angles up to a limit in degrees."""
 
     def encode(space: Space, waypoints: int) -> Encoding:
         encoding = polar(space, waypoints)
@@ -81,7 +81,7 @@ def _widest(degrees: float) -> Callable[[Space, int], Encoding]:
 
 
 def _from_east(space: Space, waypoints: int) -> Encoding:
-    """Polar within 45 degrees, the first angle counted from east and free, as no leg is before it."""
+    """Return a polar encoding within 45 degrees, with a free first angle from east, as no leg is before it."""
     encoding = polar_45(space, waypoints)
     lower, upper = encoding.lower.copy(), encoding.upper.copy()
     lower[1], upper[1] = -math.pi, math.pi
@@ -107,7 +107,7 @@ CHOICES = (
 
 
 def searched(choice: Choice, threats: int, seed: int) -> tuple[bool, float]:
-    """Whether the path that a search reports is safe on the paper's points, and its length ratio."""
+    """Return True if the reported path of a search is safe at the paper's points, and its length ratio."""
     scenario = load_scenario(problem_name(threats))
     problem, table = make_problem(scenario, exact_airframe(scenario).limits), scenario.planner
     space = replace(problem.space, across=STRIP_ACROSS[threats]) if choice.strip else problem.space
@@ -132,7 +132,7 @@ def searched(choice: Choice, threats: int, seed: int) -> tuple[bool, float]:
 
 
 def measure(problems: Sequence[int], runs: int) -> None:
-    """Print how many runs are safe on each problem, and their median length ratio."""
+    """Print the number of safe runs on each problem, and their median length ratio."""
     print(f"  {'choice':<46}" + "".join(f"{number:>14}" for number in problems))
     for choice in CHOICES:
         line = f"  {choice.name:<46}"
@@ -144,7 +144,7 @@ def measure(problems: Sequence[int], runs: int) -> None:
 
 
 def main() -> None:
-    """Measure what the command line asks for."""
+    """Measure with the options of the command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.planning.paper_choices")
     parser.add_argument("--runs", type=int, default=15, help="seeds of each")
     measure(PROBLEMS, parser.parse_args().runs)

@@ -1,10 +1,10 @@
-"""The reference of fresh instances: every side that a fine lattice sees, screened, and the best of them polished.
+"""Find reference paths of fresh instances: screen all sides of a fine lattice, and polish the best paths.
 
-`benchmarks.planning.lattice_search.lattice_ways` proposes sides of the missiles, hundreds where the planner looks at
-some 15, without a frame, without stages and with all heights; then the paths found are cut and joined with each other.
+`benchmarks.planning.lattice_search.lattice_ways` proposes sides of the missiles, hundreds compared with some 15 of the
+planner, without a frame, without stages and with all heights; then the paths found are cut and joined with each other.
 Each is shortened in a millisecond or two, by the planner's own shortening but with the certificate's margins, which are
-smaller than those that the planner's search keeps.  The shortest are polished by SciPy's SLSQP
-(`benchmarks.planning.smooth_search`), which shares nothing with it, where limits are in degrees.
+smaller than the margins of the planner's search.  If limits are in degrees, the shortest are polished by SciPy's SLSQP
+(`benchmarks.planning.smooth_search`), which shares nothing with the planner.
 """
 
 import math
@@ -21,17 +21,26 @@ from planner.seeding.shortening import resample, shorten_path
 
 Floats = NDArray[np.float64]
 
-# Ways of the lattice; margins that each is shortened with, m; and shortest paths that are polished, this different in
-# length at least, as a share.
-WAYS, MARGINS, POLISHED, APART = 400, (0.1, 2.0, 5.0), 5, 1e-4
-# What the search keeps beside the certificate's margins, m.
+# Number of lattice routes.
+WAYS = 400
+# Additional margins with which each route is shortened, m.
+MARGINS = (0.1, 2.0, 5.0)
+# Number of shortest paths that are polished.
+POLISHED = 5
+# Smallest difference in length between distinct paths, as a fraction.
+APART = 1e-4
+# Margin of the search in addition to the certificate's margins, m.
 SPARE = 0.5
-# Paths that are cut and joined with each other, rounds of it, and how near to each other they have to pass, m.
-POOL, ROUNDS, NEAR = 12, 2, 300.0
+# Number of paths that are cut and joined with each other.
+POOL = 12
+# Rounds of joining.
+ROUNDS = 2
+# Distance within which paths can be joined, m.
+NEAR = 300.0
 
 
 def reference_search(task: Task) -> tuple[float, Floats | None]:
-    """Length ratio and waypoints (w, 3) of the best certified path that is found; inf and None for none."""
+    """Return length ratio and waypoints (w, 3) of the best certified path; inf and None without one."""
     task = _with_least_margins(task)
     pool = [found for way in lattice_ways(task, WAYS) if (found := _screened(task, way)) is not None]
     for _ in range(ROUNDS):
@@ -42,7 +51,7 @@ def reference_search(task: Task) -> tuple[float, Floats | None]:
         pool += joined
     pool = _distinct(pool)
     best: tuple[float, Floats | None] = pool[0] if pool else (math.inf, None)
-    # The programme knows limits in degrees alone.
+    # The programme supports only limits in degrees.
     programme = None if task.problem.search.legs_hold_turns else Programme(task)
     if programme is None:
         return best
@@ -55,7 +64,7 @@ def reference_search(task: Task) -> tuple[float, Floats | None]:
 
 
 def _with_least_margins(task: Task) -> Task:
-    """The task with the margins of the certificate in its search, not the larger ones of the planner's search."""
+    """Return the task with nearly the certificate's margins in its search, instead of the planner's larger ones."""
     problem = task.problem
     more, certified = SPARE, problem.certified
     reserve = problem.search.kill_margin - SEARCH_KILL_MARGIN
@@ -69,7 +78,7 @@ def _with_least_margins(task: Task) -> Task:
 
 
 def _screened(task: Task, way: Floats) -> tuple[float, Floats] | None:
-    """Length ratio and waypoints of a way (k, 3) once it is shortened; None where it is not safe then."""
+    """Shorten a route (k, 3); return length ratio and waypoints, or None if the result is not safe."""
     for margin in MARGINS:
         path = resample(way, task.encoding.waypoints)
         for _ in range(2):
@@ -83,7 +92,7 @@ def _screened(task: Task, way: Floats) -> tuple[float, Floats] | None:
 
 
 def _distinct(pool: list[tuple[float, Floats]]) -> list[tuple[float, Floats]]:
-    """Paths of different length, shortest first."""
+    """Return the paths of different length, shortest first."""
     out: list[tuple[float, Floats]] = []
     for ratio, path in sorted(pool, key=lambda item: item[0]):
         if not out or ratio > (1.0 + APART) * out[-1][0]:
@@ -92,7 +101,7 @@ def _distinct(pool: list[tuple[float, Floats]]) -> list[tuple[float, Floats]]:
 
 
 def _joined(paths: list[Floats]) -> list[Floats]:
-    """Each path up to where another passes near, and the other one from there on."""
+    """Return paths that follow one path to a place near another path, and the other path from there on."""
     out = []
     for one in paths:
         for other in paths:
@@ -101,7 +110,8 @@ def _joined(paths: list[Floats]) -> list[Floats]:
             a, b = resample(one, 100), resample(other, 100)
             gaps = np.sqrt(((a[:, None] - b[None]) ** 2).sum(axis=2))
             near = gaps.min(axis=1) < NEAR
-            # Once for each stretch along which they are near each other, but not before the first and after the last.
+            # Once for each stretch along which they are near each other, but not before the first or after the last
+            # one.
             middles = [
                 int(run.mean()) for run in np.split(np.arange(100), np.flatnonzero(np.diff(near)) + 1) if near[run[0]]
             ]

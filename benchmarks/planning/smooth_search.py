@@ -1,10 +1,10 @@
-"""Shortest safe paths by a lattice and SciPy's SLSQP: an independent reference that shares no search with the planner.
+"""Find shortest safe paths with a lattice and SciPy's SLSQP, as a reference independent of the planner's search.
 
-Ways on different sides of the missiles come from `benchmarks.planning.lattice_search.lattice_ways`, Dijkstra's
+Routes on different sides of the missiles are from `benchmarks.planning.lattice_search.lattice_ways`, Dijkstra's
 algorithm over the whole map.  Each is then shortened as a nonlinear programme over the positions of all waypoints, with
-derivatives: lengths of legs, distances of legs to spheres, slopes, turns, heights above ground.  No frame, no interval
-binds a waypoint, and neither pattern search nor dynamic programme of the planner takes part.  What comes of it keeps
-the margins that the planner's own search keeps, and counts only if it is certified.
+derivatives: lengths of legs, distances of legs to spheres, slopes, turns, heights above ground.  Waypoints are not
+bound to a frame or to intervals, and neither the pattern search nor the dynamic programme of the planner is used.  The
+result keeps the margins of the planner's own search, and is accepted only if it is certified.
 """
 
 import math
@@ -21,20 +21,35 @@ from planner.search.plan_path import plan_path
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Length of a unit of the programme's variables, m; legs whose distance to a sphere or height above ground is less than
-# this are constrained by it, m; samples of the ground on a leg, and what is kept above it beside the margin, m.
-UNIT, NEAR, NEAR_GROUND, SAMPLES, SPARE = 100.0, 500.0, 80.0, 32, 1.0
-# Rounds, each with the constraints near its start; steps of each; and the shortest leg, m.
-ROUNDS, STEPS, SHORTEST = 4, 60, 25.0
-# Ways and plans without grids that are shortened of each problem; how far waypoints are moved beside a way, m.
-WAYS, PLANS, BESIDE = 16, 1, 60.0
-# Step of the differences that the ground's slopes are taken by, m.
+# Unit of the programme's variables, m.
+UNIT = 100.0
+# Distance to a sphere within which a leg is constrained by it, m.
+NEAR = 500.0
+# Height above ground below which a leg is constrained by the ground, m.
+NEAR_GROUND = 80.0
+# Number of ground samples on a leg.
+SAMPLES = 32
+# Height above ground in addition to the margin, m.
+SPARE = 1.0
+# Number of rounds, each with the constraints near its start.
+ROUNDS = 4
+# Steps of a round.
+STEPS = 60
+# Shortest leg, m.
+SHORTEST = 25.0
+# Number of lattice routes that are shortened for each problem.
+WAYS = 16
+# Number of plans without grids that are shortened for each problem.
+PLANS = 1
+# Offset of waypoints to the side of a route, m.
+BESIDE = 60.0
+# Step of the differences for the slope of the ground, m.
 DIFFERENCE = 5.0
 
 
 @dataclass(frozen=True, slots=True)
 class Near:
-    """Constraints that are near a path: legs and spheres (n,) in pairs, legs and shares (m,) of ground samples."""
+    """Constraints near a path: pairs of legs and spheres (n,), legs and fractions (m,) of ground samples."""
 
     legs: Ints
     spheres: Ints
@@ -43,7 +58,7 @@ class Near:
 
 
 class Programme:
-    """The shortest path of so many waypoints as a nonlinear programme."""
+    """Nonlinear programme of the shortest path with a fixed number of waypoints."""
 
     def __init__(self, task: Task) -> None:
         data = task.problem.search
@@ -59,18 +74,18 @@ class Programme:
         self.high = np.array([data.east, data.north, data.ceiling])
 
     def path(self, x: Floats) -> Floats:
-        """Waypoints (w, 3), m, of variables (3 (w - 2),)."""
+        """Return the waypoints (w, 3), m, of variables (3 (w - 2),)."""
         return np.concatenate([[self.start], UNIT * x.reshape(-1, 3), [self.destination]])
 
     def length(self, x: Floats) -> tuple[float, Floats]:
-        """Length in units, and its gradient."""
+        """Return the length in units, and its gradient."""
         legs = np.diff(self.path(x), axis=0)
         lengths = np.sqrt((legs**2).sum(axis=1))
         unit = legs / lengths[:, None]
         return float(lengths.sum() / UNIT), (unit[:-1] - unit[1:]).ravel()
 
     def near(self, x: Floats) -> Near:
-        """The constraints near a path."""
+        """Return the constraints near a path."""
         path = self.path(x)
         count = len(path) - 1
         legs, spheres = (one.ravel() for one in np.indices((count, len(self.radii))))
@@ -82,7 +97,7 @@ class Programme:
         return Near(legs[close], spheres[close], ground_legs[low], shares[low])
 
     def _sphere_distances(self, path: Floats, legs: Ints, spheres: Ints) -> tuple[Floats, Floats, Floats]:
-        """Distance (n,) of legs to spheres' surfaces, m; the nearest points' shares of the legs, and unit normals."""
+        """Return distances (n,) of legs to spheres, m, fractions of the nearest points on the legs, unit normals."""
         a, along = path[legs], path[legs + 1] - path[legs]
         to = self.centres[spheres] - a
         share = np.clip((to * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
@@ -91,14 +106,14 @@ class Programme:
         return distance - self.radii[spheres], share, off / np.maximum(distance, 1e-6)[:, None]
 
     def _heights(self, path: Floats, legs: Ints, shares: Floats) -> tuple[Floats, Floats]:
-        """What points on legs are above the height wanted, m, and their positions (n, 3)."""
+        """Return the heights of points on legs above the required height, m, and their positions (n, 3)."""
         points = path[legs] + shares[:, None] * (path[legs + 1] - path[legs])
         assert self.terrain is not None
         ground = self.terrain.height(points[:, 0], points[:, 1])
         return points[:, 2] - np.where(np.isnan(ground), 1e4, ground) - self.above, points
 
     def constraints(self, x: Floats, near: Near) -> tuple[Floats, Floats]:
-        """Values (c,), at least 0 where they hold, in units or cosines; and their derivatives (c, 3 w)."""
+        """Return the constraints' values (c,), 0 or more if met, in units or cosines, and derivatives (c, 3 w)."""
         path = self.path(x)
         count = len(path) - 1
         values, rows = [], []
@@ -120,7 +135,7 @@ class Programme:
             rows.append(self._on_legs(count, every, -change, change))
         values.append(run - SHORTEST)
         rows.append(self._on_legs(count, every, -unit, unit))
-        # Cosines of the turns, in units as if a leg were so long.
+        # Cosines of the turns, scaled by a unit of length.
         before, after = unit[:-1], unit[1:]
         cosine = (before * after).sum(axis=1)
         values.append(UNIT * (cosine - self.cosine))
@@ -134,7 +149,7 @@ class Programme:
 
     @staticmethod
     def _on_legs(count: int, legs: Ints, of_first: Floats, of_second: Floats) -> Floats:
-        """Derivatives (n, 3 w) of values that depend on the two ends of a leg each."""
+        """Return derivatives (n, 3 w) of values that each depend on the two ends of a leg."""
         out = np.zeros((len(legs), count + 1, 3))
         rows = np.arange(len(legs))
         out[rows, legs] += of_first
@@ -142,7 +157,7 @@ class Programme:
         return out.reshape(len(legs), 3 * (count + 1))
 
     def _ground_slope(self, points: Floats) -> Floats:
-        """Slope of the ground (n, 2) at points, by central differences."""
+        """Return the slope of the ground (n, 2) at points, by central differences."""
         assert self.terrain is not None
         east, north = points[:, 0], points[:, 1]
         by_east = self.terrain.height(east + DIFFERENCE, north) - self.terrain.height(east - DIFFERENCE, north)
@@ -150,7 +165,7 @@ class Programme:
         return np.nan_to_num(np.column_stack([by_east, by_north]) / (2.0 * DIFFERENCE))
 
     def shortened(self, path: Floats) -> Floats:
-        """A path (w, 3) that is as short as SLSQP makes it from this one."""
+        """Shorten a path (w, 3) with SLSQP."""
         x = path[1:-1].ravel() / UNIT
         box = [
             (low / UNIT, high / UNIT)
@@ -174,17 +189,17 @@ class Programme:
 
 
 def evenly(way: Floats, count: int) -> Floats:
-    """Waypoints (count, 3) at equal distances along a way (k, 3)."""
+    """Return waypoints (count, 3) at equal distances along a route (k, 3)."""
     runs = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(way, axis=0) ** 2).sum(axis=1)))])
     at = np.linspace(0.0, runs[-1], count)
     return np.column_stack([np.interp(at, runs, way[:, axis]) for axis in range(3)])
 
 
 def smooth_search(task: Task, ways: int = WAYS, plans: int = PLANS) -> tuple[float, Floats | None]:
-    """Length ratio and waypoints (w, 3) of the best certified path that is found; inf and None for none.
+    """Return length ratio and waypoints (w, 3) of the best certified path; inf and None without one.
 
-    ways: of the lattice that are shortened, each from waypoints at equal distances and from others beside them.
-    plans: of the algorithm without grids (`fda`) that are shortened too: other sides than the lattice sees.
+    ways: number of lattice routes to shorten, each from waypoints at equal distances and from others next to them.
+    plans: number of plans of the algorithm without grids (`fda`) to shorten, too, for sides that the lattice misses.
     """
     programme, count = Programme(task), task.encoding.waypoints
     rng = np.random.default_rng(1)

@@ -1,7 +1,7 @@
-"""Random instances of 60 threats in which everything is drawn anew: ground, map, ends, ceiling, waypoints and threats.
+"""Draw random instances of 60 threats with random ground, map, ends, ceiling, waypoints and threats.
 
-Those of `tests.instances` share one ground, one pair of ends, one ceiling, and limits in degrees.  These share nothing;
-the aircraft limits turns and slopes, as where a scenario says nothing.
+The instances of `tests.instances` share one ground, one pair of ends, one ceiling, and limits in degrees.  These share
+nothing; the aircraft limits turns and slopes, which is the default of a scenario.
 """
 
 import math
@@ -14,13 +14,18 @@ from world.scenario import Scenario, from_spec
 
 Floats = NDArray[np.float64]
 
-SEED, THREATS = 3901, 60
-# Height of the ends above the ground, m; and how far a threat's sphere stays away from them at least, m.
-ABOVE, AWAY = (100.0, 250.0), 300.0
+# Seed of all instances.
+SEED = 3901
+# Number of threats.
+THREATS = 60
+# Range of heights of the ends above ground, m.
+ABOVE = (100.0, 250.0)
+# Smallest distance of a threat's sphere from the ends, m.
+AWAY = 300.0
 
 
 def wild_scenario(number: int, autopilot: str) -> Scenario:
-    """The scenario of this number, for the aerosonde."""
+    """Make the scenario of this number, for the Aerosonde."""
     rng = np.random.default_rng([SEED, number])
     length, course = float(rng.uniform(8000.0, 16000.0)), float(rng.uniform(0.0, 2.0 * math.pi))
     ends = 0.5 * length * np.array([[-math.sin(course), -math.cos(course)], [math.sin(course), math.cos(course)]])
@@ -50,7 +55,7 @@ def wild_scenario(number: int, autopilot: str) -> Scenario:
 
 
 def _ground(peaks: Floats, places: Floats) -> Floats:
-    """Height of the ground (n,) at places (n, 2), m."""
+    """Return the ground height (n,) at places (n, 2), m."""
     total = np.zeros(len(places))
     for east, north, height, sigma in peaks:
         total += height * np.exp(-((places[:, 0] - east) ** 2 + (places[:, 1] - north) ** 2) / (2.0 * sigma**2))
@@ -65,7 +70,7 @@ def _terrain(peaks: Floats) -> dict[str, Any]:
 
 
 def _threats(rng: np.random.Generator, ends: Floats, peaks: Floats, radii: Floats, half: float) -> list[dict[str, Any]]:
-    """Units on the ground anywhere on the map, whose missiles reach neither end."""
+    """Draw units at random places on the ground whose missiles reach neither end."""
     made: list[dict[str, Any]] = []
     while len(made) < len(radii):
         spot, radius = rng.uniform(-half, half, 2), float(radii[len(made)])

@@ -1,1 +1,1 @@
-"""Plans out of traps beside the shortest ways that a fine grid finds."""
+"""Comparison of plans out of traps with the shortest routes on a fine grid."""

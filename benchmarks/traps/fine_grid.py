@@ -1,9 +1,9 @@
-"""Shortest ways on the map by a fine grid of places, many courses and taut strings: what plans out of traps face.
+"""Find shortest routes on the map by a fine grid, many courses and taut strings, as a reference for plans out of traps.
 
-A place is open if some height between floor and ceiling clears the ground there.  Turns, slopes and what an autopilot
-strays are left out, so that the length is one that no flight reaches; a climb adds what it takes by plain sums.
-``python -m benchmarks.traps.fine_grid`` prints the table of the embedded ``trap-*`` scenarios, planned as the grid
-has them, for an autopilot that strays nowhere, and for ArduPlane, whose corners and climbs take room.
+A place is open if some height between floor and ceiling clears the ground there.  Turns, slopes and tracking errors are
+ignored, so that no flight reaches the length; the length of a climb is added by simple sums.
+``python -m benchmarks.traps.fine_grid`` prints the table of the embedded ``trap-*`` scenarios, planned for an autopilot
+without tracking error, as in the grid, and for ArduPlane, whose corners and climbs need room.
 """
 
 import math
@@ -25,12 +25,16 @@ from world.scenario import Scenario, embedded_names, load_scenario
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# Between places, m; the furthest that a step goes, in places; and between samples of the ground on a string, m.
-PITCH, REACH, SAMPLE = 50.0, 5, 10.0
+# Spacing of places, m.
+PITCH = 50.0
+# Largest step along an axis, in places.
+REACH = 5
+# Spacing of ground samples on a string, m.
+SAMPLE = 10.0
 
 
 def is_open(scenario: Scenario, places: Floats) -> Flags:
-    """Whether some height clears the ground at places (n, 2), outside of every missile's sphere at the ceiling."""
+    """Return True for places (n, 2) on the map where the ceiling clears the ground."""
     terrain = scenario.terrain
     assert terrain is not None
     lowest = terrain.height(places[:, 0], places[:, 1]) + scenario.limits.min_clearance_m
@@ -39,13 +43,16 @@ def is_open(scenario: Scenario, places: Floats) -> Flags:
 
 
 def string_is_open(scenario: Scenario, a: Floats, b: Floats) -> bool:
-    """Whether all of the line a-b on the map is open."""
+    """Return True if the whole line a-b on the map is open."""
     count = max(2, math.ceil(math.dist(a, b) / SAMPLE) + 1)
     return bool(is_open(scenario, np.linspace(a, b, count)).all())
 
 
 def shortest_on_map(scenario: Scenario) -> Floats:
-    """Points (k, 2) of a way from start to destination on the map that is about the shortest; (0, 2) for none."""
+    """Return points (k, 2) of a nearly shortest route on the map from start to destination.
+
+    (0, 2) without one.
+    """
     (west, east), (south, north) = scenario.bounds
     start, destination = scenario.start[:2], scenario.destination[:2]
     x = np.arange(start[0] - PITCH * math.floor((start[0] - west) / PITCH), east, PITCH)
@@ -78,7 +85,7 @@ def shortest_on_map(scenario: Scenario) -> Floats:
 
 
 def _shifted(free: Flags, i: int, j: int) -> Flags:
-    """Whether the place i, j further is open; not beyond the map."""
+    """Return the grid of flags shifted by i rows and j columns; False beyond the map."""
     out = np.zeros_like(free)
     rows, columns = free.shape
     a, b = slice(max(0, -i), min(rows, rows - i)), slice(max(0, -j), min(columns, columns - j))
@@ -92,32 +99,37 @@ def _shifted_numbers(number: NDArray[np.int64], i: int, j: int) -> NDArray[np.in
 
 
 def _taut(scenario: Scenario, points: Floats) -> Floats:
-    """A way without the points that it need not touch; each step is cut into pieces first, so that corners can move."""
+    """Return a route without unnecessary points.
+
+    Each step is cut into pieces first, so that corners can move.
+    """
     for _ in range(3):
         dense = np.concatenate([np.linspace(a, b, 9)[:-1] for a, b in pairwise(points)] + [points[-1:]])
         kept, here = [dense[0]], 0
         while here < len(dense) - 1:
-            to = next(k for k in range(len(dense) - 1, here, -1) if k == here + 1 or _sees(scenario, dense, here, k))
+            to = next(
+                k for k in range(len(dense) - 1, here, -1) if k == here + 1 or _is_visible(scenario, dense, here, k)
+            )
             kept.append(dense[to])
             here = to
         points = np.array(kept)
     return points
 
 
-def _sees(scenario: Scenario, points: Floats, a: int, b: int) -> bool:
+def _is_visible(scenario: Scenario, points: Floats, a: int, b: int) -> bool:
     return string_is_open(scenario, points[a], points[b])
 
 
 def map_length(points: Floats) -> float:
-    """Length of a way (k, 2) or of a path (k, 3) on the map, m."""
+    """Return the length of a route (k, 2) or of a path (k, 3) on the map, m."""
     steps = np.diff(points[:, :2], axis=0)
     return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
 
 
 def climbing_length(scenario: Scenario, way: Floats, climb: float, margin: float = 0.0) -> float:
-    """Length on the map that a way (k, 2) has at least, if no m of it climbs more than `climb` (a tangent).
+    """Return the smallest length on the map of a route (k, 2) that climbs no more than `climb` (a tangent).
 
-    The ground at each place is to be cleared when it is reached; what is missing is gone round for before.
+    The ground at each place must be cleared when it is reached; a missing height is gained by a longer path before it.
     margin: height above the scenario's clearance, m.
     """
     terrain = scenario.terrain
@@ -132,9 +144,9 @@ def climbing_length(scenario: Scenario, way: Floats, climb: float, margin: float
 
 
 def length_within(scenario: Scenario, limits: Limits, way: Floats) -> float:
-    """Length on the map that a way (k, 2) has at least within the slopes and the clearance of certificates.
+    """Return the smallest length on the map of a route (k, 2) within the slopes and the clearance of certificates.
 
-    The slope is the harmonic mean of those from the start's height to the highest place that is to be cleared.
+    The slope is the harmonic mean of the slopes from the altitude of the start to the highest place on the route.
     """
     terrain, data = scenario.terrain, make_problem(scenario, limits).certified
     assert terrain is not None
@@ -149,11 +161,11 @@ def length_within(scenario: Scenario, limits: Limits, way: Floats) -> float:
 
 
 def measure(autopilot: str, seed: int = 1) -> dict[str, float]:
-    """Lengths of default plans of the ``trap-*`` scenarios over those that the grid finds; prints them.
+    """Print the lengths of default plans of the ``trap-*`` scenarios relative to the grid's lengths.
 
-    The last column is the length over that of the same way within what certificates want (`length_within`).
+    The last column is relative to the length of the same route within the limits of certificates (`length_within`).
 
-    autopilot: that they are planned for, as a scenario's ``[flight] autopilot`` names it.
+    autopilot: autopilot of the plans, a name of a scenario's ``[flight] autopilot``.
     """
     ratios = {}
     for name in embedded_names():

@@ -1,7 +1,8 @@
-"""Published small aircraft as numbers, and their folders in ``aircraft/``: model, gains, ArduPlane's parameters.
+"""Write the folders of published small aircraft in ``aircraft/``: model, gains, ArduPlane's parameters.
 
-``python -m benchmarks.tuning.published_aircraft`` writes each folder's ``NAME.xml``, ``gains.toml``, ``ardupilot.parm``
-and ``ardupilot.toml`` anew from the numbers here and from ``NAME.toml``.  The folders' READMEs name each source.
+``python -m benchmarks.tuning.published_aircraft`` writes ``NAME.xml``, ``gains.toml``, ``ardupilot.parm`` and
+``ardupilot.toml`` of each folder again, from the numbers here and from ``NAME.toml``.  The folders' READMEs name each
+source.
 """
 
 import math
@@ -14,10 +15,10 @@ from flight.dynamics.fdm import Fdm
 from flight.guidance.model_gains import gains_of_model, gains_text
 from planfly.data_sheets import arduplane_parameters, performance_of, servo_text
 
-# Beard and McLain, first edition, appendix E.1.  The table's drag by elevator is linear (0.30 a radian) and would drive
-# an aircraft that trims with its elevons up; it is left out, as is the table's drag by angle of attack, which the
-# book's parabola replaces.  With the table's Cn_beta of -0.0004 and Cn_r of -0.00434 nothing but a rudder could hold a
-# bank: the zero of roll by ailerons lies at +0.55 rad/s.  Both are the X8's here.
+# Beard and McLain, first edition, appendix E.1.  The table's drag due to elevator is linear (0.30 a radian) and would
+# propel an aircraft that trims with its elevons up; it is left out, as is the table's drag due to angle of attack,
+# which the book's parabola replaces.  With the table's Cn_beta of -0.0004 and Cn_r of -0.00434 only a rudder could hold
+# a bank: the zero from ailerons to roll is at +0.55 rad/s.  Both are replaced by the values of the X8.
 _ZAGI_ASPECT = 1.4224**2 / 0.2589
 ZAGI = ModelNumbers(
     title="Zagi flying wing (Beard and McLain)",
@@ -113,7 +114,7 @@ FOLDER = Path(__file__).parents[2] / "aircraft"
 
 
 def write(name: str) -> None:
-    """Write the made files of an aircraft's folder, whose ``NAME.toml`` is there."""
+    """Write the generated files of an aircraft's folder, which already has ``NAME.toml``."""
     folder = FOLDER / name
     (folder / f"{name}.xml").write_text(model_xml(name, PUBLISHED[name]), encoding="utf-8")
     aircraft = load_aircraft(name)

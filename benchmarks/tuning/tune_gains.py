@@ -1,11 +1,11 @@
 """Choose an aircraft's gains by coordinate search on one set of missions, and report on others.
 
-``python -m benchmarks.tuning.tune_gains [AIRCRAFT] [--rounds N] [--seed N] [--write]`` takes what can be read off
-the linear model from there, searches the rest from round figures (`START`), prints what each round brings and, at the
-end, how the chosen gains fly the standard mission and random missions that the search has not seen.  ``--write`` puts
-the result into ``aircraft/<name>/gains.toml``; limits that are not searched stay as they stand there.  The missions
-come from the seed (`benchmarks.tuning.tuning_missions`); the standard mission is none of them.  Two minutes a round
-on two cores.
+``python -m benchmarks.tuning.tune_gains [AIRCRAFT] [--rounds N] [--seed N] [--write]`` computes some gains from the
+linear model, searches the others from round figures (`START`), and prints the result of each round.  At the end it
+prints how the chosen gains fly the standard mission and random missions that the search has not seen.  ``--write``
+writes the result to ``aircraft/<name>/gains.toml``, and keeps the limits in it that are not searched.  The missions
+depend on the seed (`benchmarks.tuning.tuning_missions`); the standard mission is not among them.  A round takes two
+minutes on two cores.
 """
 
 import argparse
@@ -28,33 +28,43 @@ from flight.simulation import simulate as simulation
 from flight.simulation.simulate import SimulatedFlight, simulate
 from tests.setups import MakeSetup, setup_maker, standard
 
-# Where every search starts: round figures, of the size that earlier searches of the Aerosonde found.
+# Start of every search: round figures, of the size that earlier searches of the Aerosonde found.
 START = ROUND_FIGURES
+# Names of the gains that are searched.
 SEARCHED = tuple(START)
-# Missions that are searched on and reported on, numbered apart under the one seed.
-TRAINED, REPORTED = {"aerosonde": range(16), "c172x": range(8)}, range(1000, 1024)
-# The first factor that a gain is changed by, and the least share of the cost that a change must save.
-FIRST_STEP, WORTH_TAKING = 1.5, 0.001
-# What a figure counts as one: the aims of `benchmarks.flight` in wind, of the cross-track's RMS in calm air; and, of
-# the aircraft that the aims are for, of its largest too.
+# Numbers of the missions of the search, by aircraft.
+TRAINED = {"aerosonde": range(16), "c172x": range(8)}
+# Numbers of the missions of the report, distinct from the missions of the search.
+REPORTED = range(1000, 1024)
+# First factor by which a gain is changed.
+FIRST_STEP = 1.5
+# Smallest reduction of the cost for which a change is kept, as a fraction.
+WORTH_TAKING = 0.001
+# Scales of the errors in the cost, m: the aims of `benchmarks.flight` in wind; for the RMS of the cross-track error in
+# calm air, and for the Aerosonde, to which the aims apply, also of the largest error.
 SCALES = {"aerosonde": (0.05, 0.4, 0.2, 0.8), "c172x": (0.05, 0.6, 0.2, 0.8)}
-# What the cross-track's RMS on straight legs counts as one, m, and how far from corners, m, at 25 m/s.
-STRAIGHT, CLEAR = 0.02, 250.0
-# What the airspeed's error over second halves of legs counts as one, m/s; the verdict lets a leg be that far off.
+# Scale of the RMS cross-track error on straight legs, m.
+STRAIGHT = 0.02
+# Distance from corners from which a leg is straight, m, at 25 m/s.
+CLEAR = 250.0
+# Scale of the airspeed error over the second halves of legs, m/s, which is the tolerance of the verdict.
 SPEED = 1.0
-# Weights of the surfaces' mean rate as a share of what they can, and of each degree of bank beyond the command's limit.
-EFFORT, BEYOND = 0.5, 0.2
+# Weight of the surfaces' mean rate as a fraction of their maximum rate.
+EFFORT = 0.5
+# Weight of each degree of bank beyond the limit of the command.
+BEYOND = 0.2
+# Cost of a failed flight.
 FAILED = 1000.0
-# Bank that guidance may add in what is searched and reported here, rad; flights have
-# `flight.simulation.simulate.BANK_RESERVE`.
+# Bank that guidance may add in the search and the report, rad; flights use `flight.simulation.simulate.BANK_RESERVE`.
 RESERVE = math.radians(2.7)
+# Significant digits of the gains.
 DIGITS = 3
-# No lag or smoothing is shorter than a tick at 60 Hz, s.
+# Shortest lag or smoothing: a tick at 60 Hz, s.
 TICK = 0.017
 
 
 def fly(aircraft: Aircraft, gains: Gains, case: Case) -> SimulatedFlight:
-    """Fly a case with these gains, and a little less bank than flights have, not to lean on the last of it."""
+    """Fly a case with these gains, and with slightly less bank reserve than flights have, so that some is left."""
     module: Any = simulation
     usual = module.BANK_RESERVE
     module.BANK_RESERVE = RESERVE
@@ -66,10 +76,10 @@ def fly(aircraft: Aircraft, gains: Gains, case: Case) -> SimulatedFlight:
 
 
 def cost(aircraft: Aircraft, gains: Gains, case: Case) -> float:
-    """What a flight costs; `FAILED` where it fails.
+    """Return the cost of a flight; `FAILED` if it fails.
 
-    Its errors in units of their aims, those on straight legs once more, its airspeed's, its surfaces' rates, and its
-    bank beyond the command's limit.
+    The cost includes the errors in units of their aims, the errors on straight legs once more, the airspeed error, the
+    rates of the surfaces, and the bank beyond the limit of the command.
     """
     flown = fly(aircraft, gains, case)
     if flown.ended != "completed":
@@ -87,7 +97,7 @@ def cost(aircraft: Aircraft, gains: Gains, case: Case) -> float:
 
 
 def speed_error(case: Case, flown: SimulatedFlight) -> float:
-    """RMS over the legs of how far the mean airspeed of a leg's second half is from the command, m/s."""
+    """Return the RMS over the legs of the mean airspeed error in the second half of a leg, m/s."""
     track, errors = flown.track, []
     for leg, command in enumerate(case.setup.route.airspeed):
         airspeed = track.airspeed[track.leg == leg].astype(np.float64)
@@ -96,15 +106,15 @@ def speed_error(case: Case, flown: SimulatedFlight) -> float:
 
 
 class Trial:
-    """What gains cost on the missions that are searched on, flown by all processors."""
+    """Cost of gains on the missions of the search, flown on all processors."""
 
     def __init__(self, aircraft: Aircraft, trained: Sequence[Case]) -> None:
-        """Start the processes.  Each has the missions from the start; a task names one."""
+        """Start the processes.  Each receives all missions at the start; a task names one of them."""
         self._count = len(trained)
         self._pool = multiprocessing.Pool(initializer=_begin, initargs=(aircraft, trained))
 
     def __enter__(self) -> "Trial":
-        """Itself."""
+        """Return itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -112,7 +122,7 @@ class Trial:
         self._pool.terminate()
 
     def __call__(self, gains: Gains) -> float:
-        """Root of the mean square of what the flights cost: bad ones count more, but no single one decides."""
+        """Return the root mean square of the flights' costs, which weights bad flights without letting one decide."""
         costs = self._pool.map(_cost, [(gains, k) for k in range(self._count)], chunksize=1)
         return math.sqrt(float(np.mean(np.square(costs))))
 
@@ -131,14 +141,14 @@ def _cost(task: tuple[Gains, int]) -> float:
 
 
 def rounded(gains: Gains) -> Gains:
-    """The gains as the file will hold them, lags and smoothing no shorter than a tick."""
+    """Return the gains rounded as in the file, with lags and smoothing no shorter than a tick."""
     least = {name: TICK for name in SEARCHED if name.endswith(("lag", "smoothing"))}
     values = {name: max(least.get(name, 0.0), getattr(gains, name)) for name in SEARCHED}
     return replace(gains, **{name: float(f"{value:.{DIGITS}g}") for name, value in values.items()})
 
 
 def search(gains: Gains, trial: Callable[[Gains], float], rounds: int, seed: int) -> Gains:
-    """Change one gain at a time, in a seeded order, by a factor that shrinks where neither way helps."""
+    """Change one gain at a time, in a seeded order, by a factor that shrinks if neither direction helps."""
     best = rounded(gains)
     lowest = trial(best)
     print(f"start: {lowest:.4f}", flush=True)
@@ -151,7 +161,7 @@ def search(gains: Gains, trial: Callable[[Gains], float], rounds: int, seed: int
                 found = trial(tried)
                 if found < (1.0 - WORTH_TAKING) * lowest:
                     best, lowest = tried, found
-                    # The way that helped comes first the next time.
+                    # Try the successful direction first the next time.
                     steps[name] = factor
                     break
             else:
@@ -161,7 +171,7 @@ def search(gains: Gains, trial: Callable[[Gains], float], rounds: int, seed: int
 
 
 def write(aircraft: Aircraft, gains: Gains, rounds: int, seed: int) -> None:
-    """Put the numbers into the aircraft's gains file, at the keys that stand there, and say where they come from."""
+    """Write the numbers to the existing keys of the aircraft's gains file, with a comment about their origin."""
     file = aircraft.folder / "gains.toml"
     chosen = "# Chosen by "
     said = (
@@ -185,7 +195,7 @@ def write(aircraft: Aircraft, gains: Gains, rounds: int, seed: int) -> None:
 
 
 def print_errors(name: str, found: Sequence[Errors]) -> None:
-    """One line: medians of the RMS, 95th percentiles of the largest."""
+    """Print one line: medians of the RMS errors, 95th percentiles of the largest errors."""
     rms = [float(np.median([getattr(item, key) for item in found])) for key in ("cross_rms", "height_rms")]
     most = [float(np.percentile([getattr(item, key) for item in found], 95)) for key in ("cross_max", "height_max")]
     done = sum(item.completed for item in found)
@@ -196,11 +206,11 @@ def print_errors(name: str, found: Sequence[Errors]) -> None:
 
 
 def report(aircraft: Aircraft, make: MakeSetup, gains: Gains, fresh: Sequence[Case]) -> None:
-    """How the gains fly what the search has not seen: the standard mission, and fresh random ones."""
+    """Print how the gains fly missions that the search has not seen: the standard mission and fresh random ones."""
     way = standard() * np.array([1.0, 1.0, 1.0])
     way[:, :2] *= (aircraft.airspeed / 25.0) ** 2
     if aircraft.name != "aerosonde":
-        # Half the slopes: the standard mission's are the Aerosonde's.
+        # Half the slopes, as the standard mission is made for the Aerosonde.
         way[:, 2] = 500.0 + 0.5 * (aircraft.airspeed / 25.0) ** 2 * (way[:, 2] - 500.0)
     winds: list[dict[str, Any]] = [{}] + [{"wind": (10.0, 45.0 * k), "turbulence": "moderate"} for k in range(8)]
     known = [Case(make(way, speeds=aircraft.airspeed, **wind), None, True) for wind in winds]
@@ -211,7 +221,7 @@ def report(aircraft: Aircraft, make: MakeSetup, gains: Gains, fresh: Sequence[Ca
 
 
 def main() -> None:
-    """Search, report, and write if asked to."""
+    """Search, report, and write the gains if requested."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.tuning.tune_gains")
     parser.add_argument("aircraft", nargs="?", default="aerosonde", choices=sorted(TRAINED))
     parser.add_argument("--rounds", type=int, default=6)

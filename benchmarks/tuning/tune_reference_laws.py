@@ -1,9 +1,9 @@
-"""Choose the settings of the other lateral laws that the bench compares ours with: the best that swing in no wind.
+"""Tune the other lateral laws of the benchmark: choose the best settings that oscillate in no wind.
 
-``python -m benchmarks.tuning.tune_reference_laws`` flies a grid of each law's settings, on the inner loops as they
-are, through winds and turbulence that the bench does not report on, and prints the settings with the least median RMS
-on straight legs of those that swing in none of them.  `benchmarks.flight.BEST_L1` and `BEST_FIELD` hold what it
-found.  A few minutes on one core.
+``python -m benchmarks.tuning.tune_reference_laws`` flies a grid of each law's settings, with the present inner loops,
+through winds and turbulence that the benchmark does not report on, and prints the settings with the smallest median RMS
+on straight legs among those without oscillation.  `benchmarks.flight.BEST_L1` and `BEST_FIELD` are its results.  A few
+minutes on one core.
 """
 
 import itertools
@@ -19,51 +19,55 @@ from flight.guidance.gains import load_gains
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 
-# Seeds of the training winds, 10 m/s with moderate turbulence from anywhere; the bench's are 0 and up.
+# Seeds of the training winds, 10 m/s with moderate turbulence from any direction; the benchmark uses seeds from 0.
 SEEDS = range(500, 506)
-# How many are flown first, to leave out what swings at once.
+# Number of winds that are flown first, to leave out settings that oscillate at once.
 SCREEN = 1
-# Grids: of L1 its period (s) and damping; of the field 1/m, 1/s and 1/s^2.
+# Grid of L1: period (s) and damping.
 L1 = {
     "l1_period": (3.0, 4.0, 5.0, 6.0, 8.0),
     "l1_damping": (0.75, 0.9, 1.05, 1.2, 1.4),
 }
+# Grid of the vector field: 1/m, 1/s and 1/s^2.
 FIELD = {
     "field_path": (0.06, 0.08, 0.1, 0.12, 0.15),
     "field_course": (4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.5),
     "field_course_integral": (0.2, 0.5),
 }
 LAWS: dict[str, dict[str, tuple[float, ...]]] = {"l1": L1, "vector-field": FIELD}
-# A law that swings is this many times as far off in one wind as it is in the median.
+# Ratio of the largest to the median error above which a law oscillates.
 SWINGS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A law's settings, and its RMS (m) on the straight legs in each training wind; none where a flight failed."""
+    """Settings of a law, and its RMS (m) on the straight legs in each training wind.
+
+    Empty if a flight failed.
+    """
 
     gains: dict[str, float]
     rms: tuple[float, ...]
 
     @property
     def median(self) -> float:
-        """Median of the RMS, m; infinite where a flight failed."""
+        """Median of the RMS, m; infinite if a flight failed."""
         return float(np.median(self.rms)) if self.rms else float("inf")
 
     @property
     def swings(self) -> bool:
-        """Whether it failed, or was far worse in one wind than in the others."""
+        """True if a flight failed, or was far worse in one wind than in the others."""
         return not self.rms or max(self.rms) > SWINGS * self.median
 
 
 def settings(law: str) -> Iterator[dict[str, float]]:
-    """Every point of the law's grid."""
+    """Yield every point of the law's grid."""
     for values in itertools.product(*LAWS[law].values()):
         yield dict(zip(LAWS[law], values, strict=True))
 
 
 def measure(law: str, chosen: dict[str, float], setups: list[FlightSetup]) -> Setting:
-    """Fly all of them."""
+    """Fly all setups with these settings of a law."""
     found = []
     with flown_with(replace(load_gains(aerosonde()), **cast("Any", chosen))):
         for setup in setups:
@@ -75,9 +79,9 @@ def measure(law: str, chosen: dict[str, float], setups: list[FlightSetup]) -> Se
 
 
 def search(law: str) -> Setting:
-    """Give the best setting of the grid that swings nowhere.
+    """Return the best setting of the grid that oscillates in no wind.
 
-    The first wind leaves out what swings in it, or is half as far again off as the best that did not.
+    After the first wind only settings within 1.5 times the smallest error continue.
     """
     setups = [windy(seed) for seed in SEEDS]
     first = [measure(law, chosen, setups[:SCREEN]) for chosen in settings(law)]

@@ -1,4 +1,4 @@
-"""Missions that gains are searched on and reported on: random, from a seed, in winds and by aircraft of their own."""
+"""Make random missions for the tuning of gains, each with its own wind and aircraft variation."""
 
 import math
 from collections.abc import Iterable
@@ -16,23 +16,35 @@ from tests.setups import MakeSetup, standard
 
 Floats = NDArray[np.float64]
 
-LEGS, START_AMSL = 7, 1000.0
-# Steepest climb and dive in calm air, in those that the aircraft can; and below which height, m, all legs climb.
-SLOPES, LOW = (0.5, 0.6), 700.0
-# Airspeeds of an open mission's legs, in the aircraft's own; a tight one is flown at that.
+# Number of legs.
+LEGS = 7
+# Altitude of the start, m AMSL.
+START_AMSL = 1000.0
+# Steepest climb and dive in calm air, as fractions of the aircraft's limits.
+SLOPES = (0.5, 0.6)
+# Altitude below which all legs climb, m AMSL.
+LOW = 700.0
+# Range of airspeeds on the legs of an open mission, relative to the aircraft's airspeed, which tight missions use.
 SPEEDS = (0.92, 1.12)
-# Turns of an open mission and of a tight one, rad.  Legs of an open one, m at 25 m/s; of a tight one, in the shortest
-# that fits its turns, and at least so long, m at 25 m/s.
-OPEN_TURNS, TIGHT_TURNS = (0.3, 0.85), (0.5, 2.0)
-OPEN_LEGS, TIGHT_LEGS, SHORTEST = (700.0, 1500.0), (1.0, 1.3), 60.0
+# Range of turns of an open mission, rad.
+OPEN_TURNS = (0.3, 0.85)
+# Range of turns of a tight mission, rad.
+TIGHT_TURNS = (0.5, 2.0)
+# Range of leg lengths of an open mission, m at 25 m/s.
+OPEN_LEGS = (700.0, 1500.0)
+# Range of leg lengths of a tight mission, relative to the shortest leg that holds its turns.
+TIGHT_LEGS = (1.0, 1.3)
+# Shortest leg of a tight mission, m at 25 m/s.
+SHORTEST = 60.0
+# Turbulence levels of the missions.
 TURBULENCE = ("none", "light", "moderate", "moderate")
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A mission and the aircraft that flies it, which guidance takes for the model.
+    """Mission and variation of the aircraft that flies it; guidance assumes the model.
 
-    straight: whether its legs are long enough to have straight stretches of their own.
+    straight: True if the legs are long enough to have straight stretches.
     """
 
     setup: FlightSetup
@@ -41,22 +53,22 @@ class Case:
 
 
 def cases(aircraft: Aircraft, make: MakeSetup, seed: int, numbers: Iterable[int]) -> list[Case]:
-    """Missions with turns, slopes, speeds, wind and turbulence of their own: a third tight, a fifth at 30 Hz."""
+    """Make missions with random turns, slopes, speeds, wind and turbulence: a third tight, a fifth at 30 Hz."""
     return [_case(aircraft, make, seed, number) for number in numbers]
 
 
 def _case(aircraft: Aircraft, make: MakeSetup, seed: int, number: int) -> Case:
     random = np.random.default_rng([seed, number])
-    # A turn's radius grows with the square of the speed.
+    # The radius of a turn is proportional to the square of the speed.
     scale = (aircraft.airspeed / 25.0) ** 2
     climb, dive = make(standard()).envelope.air_angles(aircraft.airspeed, START_AMSL)
     steepest = (-SLOPES[1] * abs(dive), min(math.radians(6.0), SLOPES[0] * climb))
-    # Periods without a common factor, so that each meets each.
+    # Periods without a common factor, so that all combinations occur.
     tight, hz = number % 3 == 2, 30 if number % 5 == 3 else 60
     turbulence = TURBULENCE[(number // 2) % len(TURBULENCE)]
     known = _variations(aircraft)
     variation = known[(number // 3) % len(known)]
-    # Half of the legs at the steepest: where the slope changes in a turn, the turn is hardest.
+    # Half of the legs at the steepest slope: turns with a change of slope are the hardest.
     slopes = np.clip(2.0 * random.uniform(*steepest, size=LEGS), *steepest)
     turns = random.uniform(*(TIGHT_TURNS if tight else OPEN_TURNS), size=LEGS) * random.choice((-1.0, 1.0), size=LEGS)
     courses = random.uniform(0.0, 2.0 * math.pi) + np.cumsum(turns)
@@ -75,7 +87,7 @@ def _case(aircraft: Aircraft, make: MakeSetup, seed: int, number: int) -> Case:
         )
 
     if tight:
-        # What the turns need, from level legs that are long enough for any.
+        # Lengths that the turns need, from level legs that are long enough for any turn.
         shape = route_requirements(made(np.full(LEGS, 4.0 * scale * OPEN_LEGS[1]), np.zeros(LEGS)))
         runs = np.maximum(shares * (shape.after[:-1] + shape.reversal + shape.before[1:]), scale * SHORTEST)
         # Room to settle before the first corner and after the last.
@@ -85,7 +97,10 @@ def _case(aircraft: Aircraft, make: MakeSetup, seed: int, number: int) -> Case:
 
 
 def _way(courses: Floats, slopes: Floats, runs: Floats, climb: float) -> Floats:
-    """(w, 3) waypoints of these legs; what has sunk far climbs (rad, at most), not into the ground."""
+    """Return the waypoints (w, 3) of these legs.
+
+    Below `LOW` legs climb (rad, at most), to stay above the ground.
+    """
     way = [np.array([0.0, 0.0, START_AMSL])]
     for course, slope, run in zip(courses, slopes, runs, strict=True):
         up = min(abs(slope), climb) if way[-1][2] < LOW else slope
@@ -94,11 +109,11 @@ def _way(courses: Floats, slopes: Floats, runs: Floats, climb: float) -> Floats:
 
 
 def _variations(aircraft: Aircraft) -> tuple[Variation | None, ...]:
-    """Aircraft that differ from the model; stronger surfaces show how near a loop is to its edge."""
+    """Return variations of the aircraft; stronger surfaces show how near a loop is to its stability limit."""
     if aircraft.name == "aerosonde":
         return (
             *(None, Variation(control=0.75), Variation(control=1.4)),
             *(Variation(mass=0.9), Variation(mass=1.1, drag=1.3)),
         )
-    # Its mass moves a light single's climb by as much as two tenths of the Aerosonde's.
+    # The Cessna's variation of mass changes its climb as much as two tenths change the Aerosonde's climb.
     return (None, Variation(mass=0.95), Variation(mass=1.05))

@@ -1,4 +1,4 @@
-"""The pictures of campaigns: failures by place, probability against wind, tracks, and the go/no-go chart."""
+"""Pictures of campaigns: failures by place, probability against wind, tracks, and the go/no-go chart."""
 
 import math
 import textwrap
@@ -29,14 +29,14 @@ INK, QUIET, GRID, PAPER = (theme.colour(name) for name in ("ink", "quiet", "grid
 # ----------------------------------------------------------------------
 # Failures by rule and place.
 
-# Most bars, of the most frequent.
+# Maximum number of bars; the most frequent failures are shown.
 MAX_BARS = 14
 
 
 def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figure:
-    """Bars of how many flights failed by which rule at which place, the most first.
+    """Draw bars of the number of failed flights by rule and place, the most frequent first.
 
-    counts: rule's title, place in words, flights.  flights: all of them.
+    counts: title of the rule, place in words, number of flights.  flights: number of all flights.
     """
     with clean_style():
         shown = sorted(counts, key=lambda one: -one[2])[:MAX_BARS]
@@ -66,16 +66,18 @@ def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figur
 
 
 # ----------------------------------------------------------------------
-# The probability against the wind's speed, and what the deciding margin depends on.
+# Probability against wind speed, and sensitivities of the deciding margin.
 
 
-# Speeds are put together in steps of so many m/s, or wider where that would make more than so many.
-_STEP, _MAX_BINS = 1.0, 20
+# Width of a bin of wind speeds, m/s; wider if there would be more than `_MAX_BINS`.
+_BIN_WIDTH_MPS = 1.0
+# Maximum number of bins.
+_MAX_BINS = 20
 
 
 @dataclass(frozen=True)
 class SpeedBin:
-    """Flights in a range of wind speeds (m/s), how many of them are flyable, and Wilson's interval of that share."""
+    """Number of flights and flyable flights in a range of wind speeds (m/s), and Wilson's interval of the share."""
 
     low: float
     high: float
@@ -86,7 +88,7 @@ class SpeedBin:
 
 @dataclass(frozen=True)
 class Bar:
-    """A quantity's title, its first-order index (0 to 1), and which way the margin goes with it (-1 to 1)."""
+    """Title of a quantity, its first-order index (0 to 1), and its rank correlation with the margin (-1 to 1)."""
 
     title: str
     index: float
@@ -94,14 +96,14 @@ class Bar:
 
 
 def speed_bins(speed: Floats, flyable: NDArray[np.bool_], confidence: float = 0.95) -> list[SpeedBin]:
-    """Flights by wind speed (n,) m/s; ranges without a flight are left out.
+    """Group flights by wind speed (n,) m/s; ranges without a flight are left out.
 
     >>> [one.flights for one in speed_bins(np.array([0.2, 0.7, 2.5]), np.array([True, False, True]))]
     [2, 1]
     """
     if not speed.size:
         return []
-    width = max(_STEP, float(np.ptp(speed)) / _MAX_BINS)
+    width = max(_BIN_WIDTH_MPS, float(np.ptp(speed)) / _MAX_BINS)
     group = np.floor(speed / width).astype(int)
     bins = []
     for number in np.unique(group):
@@ -112,7 +114,7 @@ def speed_bins(speed: Floats, flyable: NDArray[np.bool_], confidence: float = 0.
 
 
 def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
-    """P against wind speed, with its band and the number of flights in each range."""
+    """Draw P against wind speed, with its band and the number of flights in each range."""
     with clean_style():
         figure = new_figure(4.2)
         axes = figure.add_axes((0.08, 0.16, 0.89, 0.70))
@@ -140,12 +142,12 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
         axes.set_xlabel("mean wind at the start's height (m/s)")
         axes.set_ylabel("share of flyable flights")
         axes.set_title("Probability against wind speed: line its share, band Wilson's interval, below how many flew")
-        _light(axes)
+        _style_axes(axes)
     return figure
 
 
 def draw_tornado(bars: Sequence[Bar], of_what: str) -> Figure:
-    """What the deciding margin's variance comes from: to the right more of the quantity helps, to the left it harms."""
+    """Draw the quantities that explain the deciding margin's variance: more helps to the right, harms to the left."""
     with clean_style():
         tall = 1.2 + 0.3 * max(1, len(bars))
         figure = new_figure(tall)
@@ -172,7 +174,7 @@ def draw_tornado(bars: Sequence[Bar], of_what: str) -> Figure:
     return figure
 
 
-def _light(axes: object) -> None:
+def _style_axes(axes: object) -> None:
     if isinstance(axes, Axes):
         axes.grid(visible=True, color=GRID, linewidth=0.6)
         axes.set_axisbelow(True)
@@ -181,23 +183,24 @@ def _light(axes: object) -> None:
 
 
 # ----------------------------------------------------------------------
-# Where the flights went: how high above ground along the way, and where they crossed each waypoint.
+# Tracks of the flights: height above ground along the path, and crossings of each waypoint.
 
-# Of the flights, the shares between which a band is drawn, the widest first.
+# Bands of the flights: lower and upper quantile, and opacity; the widest first.
 _BANDS = ((0.0, 1.0, 0.18), (0.05, 0.95, 0.30), (0.25, 0.75, 0.45))
-# Chi-square of two degrees of freedom at 95 %: half axes of the ellipse, in standard deviations, squared.
+# Chi-square of two degrees of freedom at 95 %: squared half axes of the ellipse, in standard deviations.
 _CHI2 = -2.0 * math.log(0.05)
+# Number of panels in a row.
 _COLUMNS = 5
 
 
 def draw_clearance_fan(
     clearance: Floats, failed: NDArray[np.bool_], ground: Floats, length: float, least: float
 ) -> Figure:
-    """Height above ground along the way over all flights, over the ground's own profile.
+    """Draw the height above ground along the path for all flights, above the profile of the ground.
 
-    clearance: (n, s) least of each flight on each of s equal pieces of the way, m, NaN where it did not get.
-    failed: (n,) flights that are not flyable: at most 30 are drawn.  ground: (s,) m AMSL on the way.  length: m.
-    least: clearance required, m.
+    clearance: (n, s) smallest clearance of each flight on each of s equal pieces of the path, m, NaN if not reached.
+    failed: (n,) flights that are not flyable; at most 30 are drawn.  ground: (s,) m AMSL.  length: of the path, m.
+    least: required clearance, m.
     """
     with clean_style():
         figure = new_figure(5.4)
@@ -219,7 +222,7 @@ def draw_clearance_fan(
         top.axhline(least, color=LIMIT, linewidth=1.4, linestyle="--", label=f"required, {least:g} m")
         top.set_ylim(bottom=0.0)
         top.set_ylabel("above ground (m)")
-        # The legend is over the panel, where it covers no band, and the title over that.
+        # The legend is above the panel, where it covers no band, and the title above the legend.
         top.set_title("Clearance along the way, over all flights", pad=20.0)
         top.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, columnspacing=1.0, borderaxespad=0.2)
         top.tick_params(labelbottom=False)
@@ -237,9 +240,9 @@ def draw_clearance_fan(
 
 
 def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
-    """Where flights crossed the waypoints, seen along the way: a panel each, with the ellipse of 95 %.
+    """Draw the crossings of each waypoint in a panel, seen along the path, with the ellipse of 95 %.
 
-    crossings: (n, w, 2) right of and above each waypoint, m, NaN where a flight did not get.  failed: (n,).
+    crossings: (n, w, 2) to the right of and above each waypoint, m, NaN if not reached.  failed: (n,).
     """
     count = crossings.shape[1]
     columns = min(_COLUMNS, count)
@@ -259,13 +262,13 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
             good = np.isfinite(here).all(axis=1)
             axes.axhline(0.0, color=GRID, linewidth=0.6)
             axes.axvline(0.0, color=GRID, linewidth=0.6)
-            # Thousands of them, as pixels; their colour is one that shows on light and on dark paper.
+            # Thousands of points, drawn as pixels, in a colour that is visible on light and on dark paper.
             axes.plot(*here[good & ~failed].T, ".", color=PLANNED, markersize=2.6, alpha=0.8, rasterized=True)
             axes.plot(*here[good & failed].T, "x", color=FAIL, markersize=3.5)
             reach = _reach(here)
             if good.sum() > 2:
                 ellipse = covariance_ellipse(here[good])
-                # Its extents are in metres as long as it stands on no axes.
+                # Its extents are in metres until it is added to axes.
                 reach = max(reach, 1.05 * float(np.abs(ellipse.get_extents().get_points()).max()))
                 axes.add_patch(ellipse)
             axes.set_title(f"waypoint {k}", fontsize=8.5, pad=3.0)
@@ -279,7 +282,7 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
 
 
 def covariance_ellipse(points: Floats) -> Ellipse:
-    """The ellipse that holds 95 % of a normal distribution with these points' (n, 2) mean and covariance.
+    """Return the ellipse of 95 % of a normal distribution with the mean and covariance of points (n, 2).
 
     >>> points = np.array([[3.0, 0.0], [-3.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     >>> ellipse = covariance_ellipse(points)
@@ -300,17 +303,17 @@ def _reach(crossings: Floats) -> float:
 
 
 # ----------------------------------------------------------------------
-# The go/no-go chart: from each direction the largest wind in which a mission flies.
+# Go/no-go chart: the largest wind from each direction in which a mission flies.
 
 
 @dataclass(frozen=True)
 class Spoke:
-    """A direction of the chart.
+    """Direction of the chart.
 
-    from_deg: where the wind comes from.
-    boundary: largest wind with the probability asked for, m/s, as estimated; low, high: its interval.
-    reaches: whether the boundary lies beyond all that was looked at.
-    flights: wind speed, flights and flyable ones, for the marks.
+    from_deg: direction that the wind blows from.
+    boundary: estimated largest wind with the target probability, m/s; low, high: its interval.
+    reaches: True if the boundary is beyond the largest wind of the search.
+    flights: wind speed, number of flights and of flyable flights, for the marks.
     """
 
     from_deg: float
@@ -324,9 +327,9 @@ class Spoke:
 def draw_go_no_go(
     spokes: Sequence[Spoke], most: float, target: float, confidence: float, name: str, wind: tuple[float, float] | None
 ) -> Figure:
-    """A polar chart: north up, wind from the direction that a spoke points to, speed outwards to ``most`` m/s.
+    """Draw a polar chart: north up, wind from the direction of a spoke, speed outwards to ``most`` m/s.
 
-    wind: the scenario's own, speed m/s and degrees, drawn as a star.
+    wind: the scenario's wind, speed m/s and direction in degrees, drawn as a star.
     """
     with clean_style():
         figure = new_figure(7.6)
@@ -345,7 +348,7 @@ def draw_go_no_go(
         axes.fill_between(fine, 0.0, low, color=PLANNED, alpha=0.45, linewidth=0.0)
         axes.fill_between(fine, boundary, most, color=FAIL, alpha=0.13, linewidth=0.0)
         axes.fill_between(fine, low, high, color=INTERVAL, alpha=0.45, linewidth=0.0)
-        # The edge of what was looked at is no limit.
+        # The largest wind of the search is not a limit of the mission.
         axes.plot(fine, np.where(boundary < most - 1e-6, boundary, np.nan), color=INK, linewidth=1.8)
         for one in spokes:
             if one.reaches:
@@ -385,7 +388,7 @@ def draw_go_no_go(
 def _legend(
     figure: Figure, target: float, confidence: float, wind: tuple[float, float] | None, edge: float | None
 ) -> None:
-    """What stands for what.  edge: largest wind that was looked at, m/s, where some direction has no limit below it."""
+    """Draw the legend.  edge: largest wind of the search, m/s, if some direction has no limit below it."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -410,18 +413,28 @@ def _legend(
 
 
 # ----------------------------------------------------------------------
-# The same pictures for a phone: so narrow that their letters can still be read there.
+# The same pictures for a phone, narrow enough for their letters to stay readable there.
 
-# in: width; margin at an edge; height of a line of a legend.
-NARROW, _EDGE, _LEGEND_LINE = 5.0, 0.15, 0.34
-# Panels of a grid beside each other, and the size of each with its title and numbers, in.
-_NARROW_COLUMNS, _PANEL, _PANEL_STEP = 3, 1.1, 1.6
-# Width of a letter and distance of lines, each of its size.
-_LETTER, _LINE = 0.57, 1.3
+# Width of a picture, in.
+NARROW = 5.0
+# Margin at an edge, in.
+_EDGE_IN = 0.15
+# Height of a line of a legend, in.
+_LEGEND_LINE_IN = 0.34
+# Number of panels in a row.
+_NARROW_COLUMNS = 3
+# Size of a panel, in.
+_PANEL_IN = 1.1
+# Size of a panel with its title and numbers, in.
+_PANEL_STEP_IN = 1.6
+# Width of a letter, relative to the font size.
+_LETTER_WIDTH_RATIO = 0.57
+# Line spacing, relative to the font size.
+_LINE_SPACING_RATIO = 1.3
 
 
 def narrowed(figure: Figure) -> Figure:
-    """Lay a picture of this module out anew, `NARROW` inches wide: words in lines, legends below.  It is changed.
+    """Lay out a picture of this module again, in place, `NARROW` inches wide: text wrapped, legends below.
 
     >>> float(narrowed(draw_failures([("slopes", "leg 2", 3)], 9)).get_figwidth())
     5.0
@@ -429,34 +442,34 @@ def narrowed(figure: Figure) -> Figure:
     wide, tall = figure.get_size_inches().tolist()
     panels = [axes for axes in figure.axes if axes.axison]
     legends = [*figure.legends, *(found for axes in panels if (found := axes.get_legend()) is not None)]
-    foot = _LEGEND_LINE * sum(-(-len(found.get_texts()) // 2) for found in legends)
-    # in from the top: what the figure itself says.
-    head = _EDGE
+    foot = _LEGEND_LINE_IN * sum(-(-len(found.get_texts()) // 2) for found in legends)
+    # Height of the figure's own texts, in from the top.
+    head = _EDGE_IN
     said = []
     for text in figure.texts:
         said.append((text, head))
-        head += _in_lines(text, NARROW - 2.0 * _EDGE)
+        head += _wrap_text(text, NARROW - 2.0 * _EDGE_IN)
     boxes: list[tuple[float, float, float, float]] = []  # left, top from the picture's top, width, height, in
     if any(axes.name == "polar" for axes in panels):
         side = NARROW - 1.0
         boxes = [(0.5, head + 0.4, side, side)]
         height = head + side + 0.9 + foot
     elif any(axes.get_subplotspec() is not None for axes in panels):
-        step = (NARROW - _EDGE) / _NARROW_COLUMNS
+        step = (NARROW - _EDGE_IN) / _NARROW_COLUMNS
         for k in range(len(panels)):
             row, column = divmod(k, _NARROW_COLUMNS)
-            boxes.append((0.4 + step * column, head + 0.3 + _PANEL_STEP * row, _PANEL, _PANEL))
-        height = head + 0.3 + _PANEL_STEP * -(-len(panels) // _NARROW_COLUMNS)
+            boxes.append((0.4 + step * column, head + 0.3 + _PANEL_STEP_IN * row, _PANEL_IN, _PANEL_IN))
+        height = head + 0.3 + _PANEL_STEP_IN * -(-len(panels) // _NARROW_COLUMNS)
     else:
         more = below = 0.0
         for axes in figure.axes:
             box = axes.get_position()
             left = box.x0 * wide
-            width = NARROW - left - 2.0 * _EDGE
-            more = max(more, sum(_in_lines(one, width) for one in _title(axes)))
-            below = max(below, _in_lines(axes.xaxis.label, width))
+            width = NARROW - left - 2.0 * _EDGE_IN
+            more = max(more, sum(_wrap_text(one, width) for one in _title(axes)))
+            below = max(below, _wrap_text(axes.xaxis.label, width))
             if axes.patches and axes.get_xlim()[0] == 0.0:
-                # Behind the longest bar stands its number.
+                # Leave room for the number after the longest bar.
                 axes.set_xlim(0.0, 1.5 * axes.get_xlim()[1])
             boxes.append((left, (1.0 - box.y1) * tall, width, box.height * tall))
         boxes = [(left, top + more, width, high) for left, top, width, high in boxes]
@@ -465,7 +478,7 @@ def narrowed(figure: Figure) -> Figure:
     for axes, (left, top, width, high) in zip(panels or figure.axes, boxes, strict=True):
         axes.set_position((left / NARROW, 1.0 - (top + high) / height, width / NARROW, high / height))
     for text, top in said:
-        text.update({"x": _EDGE / NARROW, "y": 1.0 - top / height, "ha": "left", "va": "top"})
+        text.update({"x": _EDGE_IN / NARROW, "y": 1.0 - top / height, "ha": "left", "va": "top"})
     for found in legends:
         labels = [text.get_text() for text in found.get_texts()]
         handles = [one for one in found.legend_handles if one is not None]
@@ -476,14 +489,14 @@ def narrowed(figure: Figure) -> Figure:
 
 
 def _title(axes: Axes) -> list[Text]:
-    """The title of a panel, which stands at its left; none where it has none."""
+    """Return the left title of a panel in a list, empty without a title."""
     said = axes.get_title("left")
     return [one for one in axes.get_children() if isinstance(one, Text) and said and one.get_text() == said]
 
 
-def _in_lines(text: Text, width: float) -> float:
-    """Break a text into lines of a width, in; gives the height of them all, 0 of none, in."""
+def _wrap_text(text: Text, width: float) -> float:
+    """Break a text into lines of a width, in, and return the height of all lines, in; 0 for no line."""
     size = float(text.get_fontsize()) / 72.0
-    lines = textwrap.wrap(text.get_text(), max(10, int(width / (_LETTER * size))))
+    lines = textwrap.wrap(text.get_text(), max(10, int(width / (_LETTER_WIDTH_RATIO * size))))
     text.set_text("\n".join(lines))
-    return _LINE * size * len(lines)
+    return _LINE_SPACING_RATIO * size * len(lines)

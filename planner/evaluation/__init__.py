@@ -1,1 +1,1 @@
-"""What a candidate path is evaluated by: its encoding, the problem as arrays, the scores, and the certificate."""
+"""Evaluation of a candidate path: its encoding, the problem as arrays, the scores, and the certificate."""

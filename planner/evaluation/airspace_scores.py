@@ -47,7 +47,7 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 @compiled
 def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """`AIRSPACE_PIECE` records of the legs of a path (w, 3), followed by those of its corners."""
+    """Return `AIRSPACE_PIECE` records of the legs of a path (w, 3), followed by those of its corners."""
     pieces = tracked_pieces(data, waypoints) if data.tracking.has_error else _exact_pieces(data, waypoints)
     out = np.zeros(pieces.size, dtype=AIRSPACE_PIECE)
     space, lateral = data.airspace, np.zeros(2)
@@ -76,7 +76,7 @@ def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragm
 
 @inner
 def _exact_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """`TRACKED_PIECE` records of a path flown without tracking error: its legs, then the chords of its arcs."""
+    """Return `TRACKED_PIECE` records of a path flown without tracking error: its legs, then the chords of its arcs."""
     last, radii = waypoints.shape[0] - 1, fly_by_radii(data, waypoints)
     out = np.zeros(last + last * _MAX_PIECES, dtype=TRACKED_PIECE)
     for i in range(last):
@@ -105,7 +105,10 @@ def _exact_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma:
 
 @inner
 def _greatest_height(data: ProblemArrays, piece: Record) -> float:  # pragma: no cover - compiled
-    """Greatest height above ground along a piece and on both sides of it, m; NaN off the terrain."""
+    """Return the greatest height above ground along a piece and on both sides of it, m.
+
+    NaN off the terrain.
+    """
     dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
     run, greatest = max(1e-9, math.hypot(dx, dy)), -math.inf
     a, b = np.empty(3), np.empty(3)
@@ -177,7 +180,7 @@ def add_airspace_violations(
 def airspace_excess(
     data: ProblemArrays, a: Floats, b: Floats, below: float, above: float, enough: float
 ) -> float:  # pragma: no cover - compiled
-    """Zone penetration and excess height above ground of a single leg, integrated along it: m x km.
+    """Return the zone penetration and excess height above ground of a single leg, integrated along it: m x km.
 
     below, above: vertical tracking error, m. enough: what exceeds it is not integrated further.
     """
@@ -201,7 +204,7 @@ def _zone_excess(
 def _excess_height(
     data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, leg: Record, lag: Record, across: float
 ) -> float:  # pragma: no cover - compiled
-    """Excess over the maximum height above ground along a leg, with its height lag: m x km."""
+    """Return the excess over the maximum height above ground along a leg, with its height lag: m x km."""
     if not data.tracking.has_error:
         return _excess_height_around(data, required, a, b, 0.0, 0.0, math.inf)
     total, one, two = 0.0, np.empty(3), np.empty(3)
@@ -219,7 +222,7 @@ def _excess_height(
 def _excess_height_around(
     data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, lateral: float, above: float, enough: float
 ) -> float:  # pragma: no cover - compiled
-    """Largest excess over the maximum height above ground of a line and the lines offset to both sides: m x km.
+    """Return the largest excess over the maximum height of a line and the lines offset to both sides: m x km.
 
     A lower bound on it where it exceeds `enough`.
     """
@@ -248,7 +251,7 @@ def _cut(a: Floats, b: Floats, share: float, until: float, one: Floats, two: Flo
 
 
 def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
-    """Number of leg pieces, six per leg, of paths (n, w, 3) that violate a zone or the maximum height; (n,).
+    """Return the number of leg pieces, six per leg, of paths (n, w, 3) that violate a zone or the maximum height; (n,).
 
     The paper counts points, six per leg, and has no zones; a path could pass through a zone between two points, so
     pieces are tested along their full length.

@@ -34,7 +34,7 @@ _EPSILON = 1e-9
 
 
 def certify(problem: Problem, waypoints: Floats) -> Certificate:
-    """Certificate of a path (w, 3) against the margins of `Problem.certified`.
+    """Compute the certificate of a path (w, 3) against the margins of `Problem.certified`.
 
     Clearance is exact for the bilinear terrain, along the legs and along the chords of the fly-by arcs. Distances to
     missile spheres and zones, and the headroom below the maximum height above ground, are those of the same pieces.
@@ -54,13 +54,16 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
 
 
 def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
-    """Distance from the path to the surface of the nearest missile sphere, m: negative inside, inf without any."""
+    """Return the distance from the path to the nearest missile sphere, m.
+
+    Negative inside, inf without any.
+    """
     return float(missile_distance(data, np.array(waypoints, dtype=np.float64)))
 
 
 # How far inside its limit (negative: beyond), where, and what is wrong.
 _Fault = tuple[float, str, str]
-# Places that are named beside the worst.
+# Number of places that are named in addition to the worst.
 _NAMED = 6
 
 
@@ -75,7 +78,7 @@ def _worst_and_others(found: list[_Fault]) -> list[str]:
 
 
 def _turns(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Smallest margin of a turn to its limit, rad."""
+    """Return the smallest margin of a turn to its limit, rad."""
     allowed = data.max_turn if data.legs_hold_turns else data.max_turn + ANGLE_MARGIN
     wanted = 0.0 if data.legs_hold_turns else ANGLE_MARGIN
     margins = allowed - turning_angles(with_courses(data, waypoints))
@@ -91,7 +94,10 @@ def _turns(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float
 
 
 def _turn_lengths(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Smallest length of a leg that remains between its turns, m; inf where legs need not hold their turns."""
+    """Return the smallest length of a leg that remains between its turns, m.
+
+    Inf where legs need not hold their turns.
+    """
     problems += _worst_and_others(
         [
             (run, f"leg {i}", f"{run:.1f} m long, at least {CERTIFIED_LEG:g} m are wanted")
@@ -117,7 +123,7 @@ def _turn_lengths(data: ProblemArrays, waypoints: Floats, problems: list[str]) -
 
 
 def _arc_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Smallest slope margin along the arcs, which are shorter and hence steeper than the legs they replace, rad."""
+    """Return the smallest slope margin along the arcs, rad, which are shorter, hence steeper, than the legs."""
     smallest = math.inf
     by_numbers = not (math.isnan(data.max_climb) or math.isnan(data.max_dive))
     if not data.legs_hold_turns or data.fly_over or by_numbers:
@@ -143,7 +149,7 @@ def _arc_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> 
 
 
 def _leg_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Smallest slope margin of the legs, rad."""
+    """Return the smallest slope margin of the legs, rad."""
     smallest = math.inf
     limits = leg_slope_limits(data, waypoints)
     found: list[_Fault] = []
@@ -162,7 +168,7 @@ def _too_steep(slope: float, climb: float, dive: float, where: str = "") -> str:
 
 
 def _clearance(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Smallest height above the required clearance, m; NaN where the path leaves the terrain."""
+    """Return the smallest height above the required clearance, m; NaN where the path leaves the terrain."""
     smallest = math.inf
     low: dict[str, float] = {}
     for piece in heights_above_ground(data, waypoints):
@@ -185,7 +191,7 @@ def _clearance(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> f
 
 
 def _bounds(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Smallest distance of a waypoint from the edge of the map, the floor or the ceiling, m."""
+    """Return the smallest distance of a waypoint from the edge of the map, the floor or the ceiling, m."""
     low = np.array([data.west, data.south, data.floor])
     high = np.array([data.east, data.north, data.ceiling])
     margins = np.minimum(waypoints - low, high - waypoints).min(axis=1)
@@ -199,7 +205,10 @@ def _bounds(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> floa
 
 
 def _airspace(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple[float, float]:
-    """Smallest distance from zones and smallest headroom below the maximum height, m; inf without zones or maximum."""
+    """Return the smallest distance from zones and smallest headroom below the maximum height, m.
+
+    Inf without zones or maximum.
+    """
     data, space = problem.certified, problem.certified.airspace
     if not is_limited(space):
         return math.inf, math.inf
@@ -230,7 +239,7 @@ def _airspace(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple
 
 
 def _too_near(problem: Problem, distance: float, z: int) -> str:
-    """Message for a piece at this distance (m) from zone z, in the kernels' numbering."""
+    """Return the message for a piece at this distance (m) from zone z, in the kernels' numbering."""
     required = problem.certified.airspace.zones.required[z]
     zone = problem.scenario.zones[int(required["number"])]
     if distance < 0.0:

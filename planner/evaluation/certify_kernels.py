@@ -59,7 +59,7 @@ ENDS = 100.0
 
 @inner
 def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """`TRACKED_PIECE` records of the legs of a path (w, 3), followed by those of its corners."""
+    """Return `TRACKED_PIECE` records of the legs of a path (w, 3) and then of its corners."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     lags, wind, across = np.zeros(count - 1, dtype=HEIGHT_LAG), downwind(data.aircraft), data.tracking.across
@@ -105,7 +105,7 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma
 
 @inner
 def _cuts(decay: float, run: float) -> Floats:  # pragma: no cover - compiled
-    """Fractions of a leg at which its pieces end, increasing; the last is 1."""
+    """Return the fractions of a leg at which its pieces end, increasing; the last is 1."""
     cuts = np.ones(len(_CUTS) + 3)
     for k in range(len(_CUTS)):
         cuts[k] = min(1.0, _CUTS[k] / max(1e-9, decay))
@@ -132,7 +132,7 @@ def _set_below(lag: Record, share: float, after: float, piece: Record) -> None: 
 
 @inner
 def _lateral_deviation(data: ProblemArrays, place: Floats, across: float) -> float:  # pragma: no cover - compiled
-    """Lateral deviation of the flight at a point of the path, m: reduced near the fixed ends."""
+    """Return the lateral deviation of the flight at a point of the path, m: reduced near the fixed ends."""
     away = min(
         math.hypot(place[0] - data.start[0], place[1] - data.start[1]),
         math.hypot(place[0] - data.destination[0], place[1] - data.destination[1]),
@@ -153,8 +153,9 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 @compiled
 def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:  # pragma: no cover - compiled
-    """Distance from the flight of a path (w, 3) to the surface of the nearest missile sphere, m; inf without missiles.
+    """Return the distance of the flight of a path (w, 3) from the nearest missile sphere, m.
 
+    Inf without missiles.
     The flight is on the legs and arcs, or within the tracking error of them.
     """
     nearest = math.inf
@@ -178,7 +179,7 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:  # pragma
 
 @inner
 def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) -> float:  # pragma: no cover - compiled
-    """Distance from a-b to the surface of the nearest missile sphere, or `nearest` if that is smaller."""
+    """Return the distance from a-b to the surface of the nearest missile sphere, or `nearest` if that is smaller."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     length2 = dx * dx + dy * dy + dz * dz
     for k in range(threats.shape[0]):
@@ -196,7 +197,7 @@ def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) ->
 
 @compiled
 def with_courses(data: ProblemArrays, path: Floats) -> Floats:  # pragma: no cover - compiled
-    """Path extended by a distant point before the start and after the destination, on the courses prescribed there.
+    """Return the path with distant points before the start and after the destination on the prescribed courses.
 
     Without a prescribed course the point is on the extension of the leg, so that there is no turn.
     """
@@ -220,7 +221,7 @@ def with_courses(data: ProblemArrays, path: Floats) -> Floats:  # pragma: no cov
 
 @compiled
 def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Lengths of each leg (w - 1,) taken by its turns, and by the roll from one turn into the other, m."""
+    """Return the lengths of each leg (w - 1,) taken by its turns, and by the roll from one turn into the other, m."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     turns, rolls = np.zeros(count - 1), np.zeros(count - 1)
@@ -237,7 +238,7 @@ def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Float
 
 @compiled
 def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
-    """Steepest climb and dive of each leg (w - 1,), rad."""
+    """Return the steepest climb and dive of each leg (w - 1,), rad."""
     count = waypoints.shape[0] - 1
     climbs, dives = np.empty(count), np.empty(count)
     for i in range(count):
@@ -247,7 +248,7 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 
 @compiled
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """`CERTIFIED_PIECE` records of the legs of a path (w, 3), followed by those of its fly-by arcs or corners."""
+    """Return `CERTIFIED_PIECE` records of the legs of a path (w, 3) and then of its fly-by arcs or corners."""
     if data.tracking.has_error:
         return _tracked_heights(data, tracked_pieces(data, waypoints))
     last = waypoints.shape[0] - 1
@@ -266,7 +267,7 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # 
 
 @inner
 def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:  # pragma: no cover - compiled
-    """`CERTIFIED_PIECE` records of `TRACKED_PIECE` records: smallest heights along them and to both sides."""
+    """Return `CERTIFIED_PIECE` records of `TRACKED_PIECE` records: smallest heights along them and to both sides."""
     out = np.zeros(pieces.size, dtype=CERTIFIED_PIECE)
     for k in range(pieces.size):
         piece = pieces[k]
@@ -300,7 +301,7 @@ def _measure_piece(
 def required_buffer(
     data: ProblemArrays, buffer: float, end_buffers: tuple[float, float], a: Floats, b: Floats
 ) -> float:  # pragma: no cover - compiled
-    """Buffer required on a piece, m: smaller near a fixed end, growing with the distance from it.
+    """Return the buffer required on a piece, m: smaller near a fixed end, growing with the distance from it.
 
     buffer: m, away from the ends. end_buffers: at the start and the destination, m. The buffer grows half as fast as in
     a search, which allows for the ground between the search's samples.

@@ -88,7 +88,10 @@ def measure_corner(
     amsl: float,
     corner: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Fill the `CORNER` record of a turn between the unit courses u and v; zeros if `turning` is false (no turn)."""
+    """Fill the `CORNER` record of a turn between the unit courses u and v.
+
+    Zeros if `turning` is false (no turn).
+    """
     tangent, radius, excursion = 0.0, 0.0, 0.0
     if turning:
         tangent, radius = corner_tangent(aircraft, ux, uy, vx, vy, amsl, wind[0], wind[1])
@@ -107,7 +110,10 @@ def measure_corner(
 def courses_at(
     data: ProblemArrays, legs: Records, i: int
 ) -> tuple[float, float, float, float]:  # pragma: no cover - compiled
-    """Unit courses before and after waypoint i; at the ends the prescribed course, otherwise the leg's own."""
+    """Return the unit courses before and after waypoint i.
+
+    At the ends the prescribed course, otherwise the leg's own.
+    """
     last = legs.shape[0]
     after, before = min(i, last - 1), max(i - 1, 0)
     ux, uy, vx, vy = legs[before].east, legs[before].north, legs[after].east, legs[after].north
@@ -120,13 +126,19 @@ def courses_at(
 
 @compiled_inline
 def settling_length(need: float, run: float) -> float:  # pragma: no cover - compiled
-    """Length of a leg (m) kept straight between its turns so that the first settles; need: length of both turns."""
+    """Return the length of a leg (m) kept straight between its turns so that the first settles.
+
+    Need: length of both turns.
+    """
     return SETTLING_SHARE * run + min(SETTLING_LENGTH, need)
 
 
 @inlined
 def turn_length(fly_over: bool, corners: Records, i: int) -> float:  # pragma: no cover - compiled
-    """Length of leg i taken by its two turns, m; of fly-over turns only the first, whose track returns to the leg."""
+    """Return the length of leg i taken by its two turns, m.
+
+    Of fly-over turns only the first, whose track returns to the leg.
+    """
     if not fly_over:
         need: float = corners[i].after + corners[i + 1].before
         return need
@@ -142,7 +154,10 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:  # pragma: n
 def roll_length(
     aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind
 ) -> float:  # pragma: no cover - compiled
-    """Length of leg i taken by rolling from its first turn into its second, m; 0 if both turn the same way."""
+    """Return the length of leg i taken by rolling from its first turn into its second, m.
+
+    0 if both turn the same way.
+    """
     if i == 0 or i == legs.shape[0] - 1 or corners[i].tangent <= 0.0 or corners[i + 1].tangent <= 0.0:
         return 0.0
     ux, uy = legs[i].east, legs[i].north
@@ -163,7 +178,7 @@ ARC_STEP = math.radians(15.0)
 
 @inlined
 def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
-    """Half the length of the parabola that blends two slopes, m per unit of slope difference, with a full tailwind."""
+    """Return half the length of the parabola that blends two slopes, m per unit of slope, with a full tailwind."""
     speed = true_airspeed(aircraft, amsl) + wind_speed_at(aircraft, amsl)
     length: float = speed * speed / (2.0 * BLEND_ACCELERATION)
     return length
@@ -173,7 +188,7 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:  # prag
 def fly_by_vertices(
     aircraft: PerformanceTable, before: Floats, at: Floats, after: Floats, radius: float
 ) -> Floats:  # pragma: no cover - compiled
-    """Vertices (k, 3) of the flown path past the waypoint `at`; see `blended_vertices`."""
+    """Return vertices (k, 3) of the flown path past the waypoint `at`; see `blended_vertices`."""
     return blended_vertices(half_blend_length(aircraft, at[2]), before, at, after, radius)
 
 
@@ -181,7 +196,7 @@ def fly_by_vertices(
 def blended_vertices(
     blend: float, before: Floats, at: Floats, after: Floats, radius: float
 ) -> Floats:  # pragma: no cover - compiled
-    """Vertices (k, 3) of the flown path past the waypoint `at`, nowhere higher than the flight.
+    """Return vertices (k, 3) of the flown path past the waypoint `at`, nowhere higher than the flight.
 
     They are: a point on the leg where the blend of slopes begins, the fly-by arc of this radius from tangent point to
     tangent point, and a point on the next leg where the blend ends. Height is linear along the arc; where the slope
@@ -230,7 +245,7 @@ def blended_vertices(
 def legs_about(
     before: Floats, at: Floats, after: Floats, length_before: float, length_after: float
 ) -> Floats:  # pragma: no cover - compiled
-    """Parts of the legs before and after the waypoint `at` of these lengths (m), as vertices (3, 3)."""
+    """Return the parts of the legs before and after the waypoint `at` of these lengths (m), as vertices (3, 3)."""
     out = np.empty((3, 3))
     for row, other, length in ((0, before, length_before), (2, after, length_after)):
         run = math.hypot(at[0] - other[0], at[1] - other[1])
@@ -250,8 +265,9 @@ def _set(out: Floats, row: int, east: float, north: float, up: float) -> None:  
 
 @compiled
 def fly_by_radii(data: ProblemArrays, path: Floats) -> Floats:  # pragma: no cover - compiled
-    """Radius (m) of the fly-by arc at each waypoint (w,); 0 at the ends and where the path goes straight on.
+    """Return the radius (m) of the fly-by arc at each waypoint (w,).
 
+    0 at the ends and where the path goes straight on.
     Where a number alone limits turns, a leg may be shorter than its two turns. Such arcs cannot be flown and have
     radius 0: the corners are evaluated as drawn, and the simulated flight shows what the aircraft makes of them. A
     fly-over turn passes outside its corner and has radius 0 too.

@@ -46,7 +46,7 @@ class WaypointFrames(NamedTuple):
     edges: Floats
 
     def restore(self, points: ArrayLike) -> Floats:
-        """World positions (..., n, 3) of points in along, across, up.
+        """Return world positions (..., n, 3) of points in along, across, up.
 
         >>> frames = frames_along(np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0]]))
         >>> frames.restore([[60.0, 5.0, 9.0], [120.0, 5.0, 9.0]]).round(6).tolist()
@@ -61,7 +61,7 @@ class WaypointFrames(NamedTuple):
         return out
 
     def rotate(self, points: ArrayLike) -> Floats:
-        """Points in along, across, up of world positions (..., n, 3): the inverse of `restore`."""
+        """Return points in along, across, up of world positions (..., n, 3): the inverse of `restore`."""
         points = np.asarray(points, dtype=np.float64)
         east, north = points[..., 0] - self.east, points[..., 1] - self.north
         return np.stack(
@@ -88,14 +88,14 @@ def frames_along(route: Floats) -> WaypointFrames:
 
 
 def straight_frames(east: float, north: float, cosine: float, sine: float, edges: Floats) -> WaypointFrames:
-    """The same frame for all waypoints: its origin (m), its angle from east, and n + 1 edges along (m)."""
+    """Return the same frame for all waypoints: its origin (m), its angle from east, and n + 1 edges along (m)."""
     count = edges.size - 1
     one = np.ones(count)
     return WaypointFrames(east * one, north * one, cosine * one, sine * one, edges)
 
 
 def sample_route(route: Floats, count: int) -> tuple[Floats, Floats]:
-    """Points (count, 3) at equal distances along a route (k, 3), and their distances along it on the map (count,), m.
+    """Return points (count, 3) at equal distances along a route (k, 3), and their distances on the map, m.
 
     >>> points, along = sample_route(np.array([[0.0, 0.0, 10.0], [30.0, 0.0, 10.0], [30.0, 10.0, 10.0]]), 5)
     >>> along.tolist(), points[:, 0].tolist(), points[:, 1].tolist()
@@ -131,14 +131,14 @@ class RotatedFrame(NamedTuple):
     length: float
 
     def rotate(self, points: ArrayLike) -> Floats:
-        """Points in along, across, up of world positions (..., 3) (eq. 12)."""
+        """Return points in along, across, up of world positions (..., 3) (eq. 12)."""
         points = np.asarray(points, dtype=np.float64)
         east, north = points[..., 0] - self.east, points[..., 1] - self.north
         c, s = self.cosine, self.sine
         return np.stack([c * east + s * north, c * north - s * east, points[..., 2]], axis=-1)
 
     def restore(self, points: ArrayLike) -> Floats:
-        """World positions (..., 3) of points in along, across, up: the inverse of `rotate`."""
+        """Return world positions (..., 3) of points in along, across, up: the inverse of `rotate`."""
         points = np.asarray(points, dtype=np.float64)
         along, across = points[..., 0], points[..., 1]
         c, s = self.cosine, self.sine
@@ -150,7 +150,7 @@ class RotatedFrame(NamedTuple):
 
 
 def rotated_frame(start: Floats, destination: Floats) -> RotatedFrame:
-    """Frame of a mission. Raises ValueError if start and destination coincide on the map."""
+    """Return the frame of a mission. Raises ValueError if start and destination coincide on the map."""
     step = destination[:2] - start[:2]
     length = math.hypot(step[0], step[1])
     if length == 0.0:
@@ -248,20 +248,20 @@ def route_encoding(space: Space, route: Floats) -> Encoding:
 
 
 def frames_of(encoding: Encoding) -> WaypointFrames:
-    """The frames of an encoding's waypoints. Raises ValueError for an encoding without frames."""
+    """Return the frames of an encoding's waypoints. Raises ValueError for an encoding without frames."""
     if encoding.frames is None:
         raise ValueError(f"{encoding.name}: an encoding without frames along a way")
     return encoding.frames
 
 
 def rotated_vectors(space: Space, encoding: Encoding, paths: Floats) -> Floats:
-    """Vectors (n, d) of paths (n, w, 3) in the rotated encoding, clipped to its box."""
+    """Return vectors (n, d) of paths (n, w, 3) in the rotated encoding, clipped to its box."""
     inner = rotated_frame(space.start, space.destination).rotate(paths[:, 1:-1])
     return np.clip(inner.reshape(len(paths), -1), encoding.lower, encoding.upper)
 
 
 def _across_spans(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Floats, Floats]:
-    """Limits across (k,), (k,) of the map between consecutive edges (k + 1,) along.
+    """Return the limits across (k,), (k,) of the map between consecutive edges (k + 1,) along.
 
     -across and across if the space states a half-width.
     """
@@ -281,7 +281,7 @@ def _across_spans(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Flo
 
 
 def cartesian(space: Space, waypoints: int) -> Encoding:
-    """Absolute east, north, up of each inner waypoint, anywhere on the map."""
+    """Return absolute east, north, up of each inner waypoint, anywhere on the map."""
     low = np.array([space.bounds[0, 0], space.bounds[1, 0], space.up[0]])
     high = np.array([space.bounds[0, 1], space.bounds[1, 1], space.up[1]])
 

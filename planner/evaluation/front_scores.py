@@ -1,4 +1,4 @@
-"""What the plans of a front are compared by: length, exposure to radars, height above ground, time and energy.
+"""Values that compare the plans of a front: length, exposure to radars, height above ground, time and energy.
 
 Exposure is the paper's detection density (eq. 10 of Yang, Tang and Lozano, CEC 2014), integrated over the time of
 flight in the mean wind: seconds at full density. The least height above ground is that at samples of each leg.
@@ -34,8 +34,9 @@ class Value(IntEnum):
 
 
 def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) -> Floats:
-    """Values (n, 5) of paths (n, w, 3) by `Value`: m, s, m, s, J; energy NaN where `energy` is None.
+    """Return the values (n, 5) of paths (n, w, 3) by `Value`: m, s, m, s, J.
 
+    Energy NaN where `energy` is None.
     energy: the cost of energy, with whatever weight (`make_travel_cost`).
     """
     out = np.zeros((len(paths), len(Value)))
@@ -67,7 +68,7 @@ def _fill(
 
 @inner
 def _detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float) -> float:  # pragma: no cover - compiled
-    """Mean detection density along the leg d from a."""
+    """Return the mean detection density along the leg d from a."""
     total, length2 = 0.0, dx * dx + dy * dy + dz * dz
     if length2 < 1e-12:
         return 0.0
@@ -93,8 +94,9 @@ def _detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float) 
 def _lowest(
     data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float, lowest: float
 ) -> float:  # pragma: no cover - compiled
-    """Least height above ground at samples of the leg d from a and of legs before it, m; -inf off the terrain.
+    """Return the least height above ground at samples of the leg d from a and of legs before it, m.
 
+    -inf off the terrain.
     lowest: of the legs before. Samples are passed over that the ground's steepest slope hereabouts keeps above it.
     """
     run = math.sqrt(dx * dx + dy * dy)

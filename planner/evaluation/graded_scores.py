@@ -85,7 +85,7 @@ class PathScratch(NamedTuple):
 
 @inner
 def make_scratch(count: int) -> PathScratch:  # pragma: no cover - compiled
-    """Scratch for paths of `count` waypoints."""
+    """Return scratch for paths of `count` waypoints."""
     return PathScratch(
         np.zeros(count - 1, dtype=LEG),
         np.zeros(count, dtype=CORNER),
@@ -224,7 +224,7 @@ def score_airspace(
 
 
 def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
-    """Graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3), along legs and flown corners.
+    """Return graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3), along legs and flown corners.
 
     Violations by `planner.plan.Violation`: rad and 100 m of leg; m per m; m x km; m. Objectives by
     `planner.plan.Objective`: length ratio and kill exposure, which is the mean density along the path times the paper's
@@ -249,8 +249,9 @@ def _score_paths(
 
 @inlined
 def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) -> float:  # pragma: no cover - compiled
-    """Radius of the arc at waypoint i; 0 where a number alone limits turns and a leg is too short for its two turns.
+    """Return the radius of the arc at waypoint i.
 
+    0 where a number alone limits turns and a leg is too short for its two turns.
     The ends have no arc. `planner.evaluation.corners.fly_by_radii` gives the radii of a whole path.
     """
     radius: float = corners[i].radius
@@ -300,7 +301,10 @@ def _measure_exact(
 
 @inlined
 def _lag_about(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Largest deviation of the flight below and above the legs near a corner, m; lag, leg: of the leg after it."""
+    """Return the largest deviation of the flight below and above the legs near a corner, m.
+
+    Lag, leg: of the leg after it.
+    """
     here, settled = lag_at(lag, 0.0), lag_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
     return max(0.0, here, settled), max(0.0, -here, -settled)
 
@@ -324,7 +328,7 @@ def _corner_depth(
     more: float,
     vertices: Floats,
 ) -> float:  # pragma: no cover - compiled
-    """Depth below the required clearance plus `more` (m) along a flown corner (k, 3), m x km."""
+    """Return the depth below the required clearance plus `more` (m) along a flown corner (k, 3), m x km."""
     total = 0.0
     for k in range(vertices.shape[0] - 1):
         x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]
@@ -338,7 +342,10 @@ def _corner_depth(
 def _corner_kill(
     missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float
 ) -> float:  # pragma: no cover - compiled
-    """Kill density x length along a flown corner (k, 3); below, above: vertical tracking error, m."""
+    """Return the kill density x length along a flown corner (k, 3).
+
+    Below, above: vertical tracking error, m.
+    """
     total = 0.0
     for k in range(vertices.shape[0] - 1):
         x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]

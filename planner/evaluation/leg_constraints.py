@@ -141,8 +141,10 @@ def _horner(
 
 # Upper bound on the length of any roll between two turns, m: at 60 degrees of bank and 90 m/s over the ground.
 MAX_ROLL = 50.0
-# Shortest leg without a violation, in the graded scores and in the certificate, m.
-MIN_LEG, CERTIFIED_LEG = 10.0, 5.0
+# Shortest leg without a violation in the graded scores, m.
+MIN_LEG = 10.0
+# Shortest leg without a violation in the certificate, m.
+CERTIFIED_LEG = 5.0
 
 
 class PrecomputedLimits(NamedTuple):
@@ -168,7 +170,7 @@ class PrecomputedLimits(NamedTuple):
 
 @inner
 def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:  # pragma: no cover - compiled
-    """The limits that hold for all paths of a problem."""
+    """Return the limits that hold for all paths of a problem."""
     climb, dive = data.max_climb, data.max_dive
     by_aircraft = math.isnan(climb) or math.isnan(dive)
     if math.isnan(climb):
@@ -192,8 +194,9 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:  # pragma: no c
 
 @inlined
 def _slope_everywhere(data: ProblemArrays, air_angles: Floats) -> float:  # pragma: no cover - compiled
-    """Slope (rad) that the aircraft can fly on every course between floor and ceiling; -1 if there is none.
+    """Return the slope (rad) that the aircraft can fly on every course between floor and ceiling.
 
+    -1 if there is none.
     air_angles: (h,) flight-path angles relative to the air at the table's heights. The slope over the ground is
     smallest with the strongest tailwind.
     """
@@ -218,7 +221,7 @@ def _straight_distance(start: Floats, destination: Floats) -> float:  # pragma: 
 def _slope_limits_on(
     data: ProblemArrays, ux: float, uy: float, low: float, high: float, wind: Wind
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Steepest climb and dive, rad, on the unit course u between two heights."""
+    """Return the steepest climb and dive, rad, on the unit course u between two heights."""
     climb, dive = data.max_climb, data.max_dive
     if math.isnan(climb) or math.isnan(dive):
         wx, wy = wind
@@ -235,7 +238,7 @@ def _slope_limits_on(
 
 @compiled
 def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Steepest climb and dive of the leg a-b, rad: smallest over its ends and middle height, minus the margin."""
+    """Return the slope limits of the leg a-b, rad: smallest over its ends and middle altitude, minus the margin."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     run = math.sqrt(dx * dx + dy * dy)
     ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 1.0)
@@ -246,8 +249,9 @@ def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, floa
 def slope_excess(
     data: ProblemArrays, limits: PrecomputedLimits, ux: float, uy: float, run: float, low: float, high: float
 ) -> float:  # pragma: no cover - compiled
-    """Amount by which a leg is too steep, in m of height per m of run; 0 if it is not (eq. 3-4).
+    """Return the amount by which a leg is too steep, in m of height per m of run.
 
+    0 if it is not (eq. 3-4).
     u: its unit course. run: m. low, high: heights of its ends, m.
     """
     rise = high - low
@@ -263,7 +267,10 @@ def slope_excess(
 def _turn_excess(
     cosine: float, largest: float, ux: float, uy: float, vx: float, vy: float
 ) -> float:  # pragma: no cover - compiled
-    """Amount by which the turn between two unit courses exceeds the largest, rad; 0 if it does not (eq. 1-2)."""
+    """Return the amount by which the turn between two unit courses exceeds the largest, rad.
+
+    0 if it does not (eq. 1-2).
+    """
     dot = ux * vx + uy * vy
     if dot >= cosine or (ux == 0.0 and uy == 0.0) or (vx == 0.0 and vy == 0.0):
         return 0.0
@@ -358,7 +365,7 @@ def _add_turn_lengths(
 def _arc_excess(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, i: int, legs: Records, corners: Records
 ) -> float:  # pragma: no cover - compiled
-    """Amount by which the arc at waypoint i is steeper than the aircraft can fly on either course, m per m."""
+    """Return the excess of the arc's slope at waypoint i over the aircraft's limit on either course, m per m."""
     rise_in = (path[i, 2] - path[i - 1, 2]) / max(legs[i - 1].run, 1.0)
     rise_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1.0)
     slope = arc_slope(rise_in, rise_out, corners[i].tangent, corners[i].radius)
@@ -373,7 +380,7 @@ def _arc_excess(
 
 @inlined
 def _violation(over: float, graded: bool) -> float:  # pragma: no cover - compiled
-    """Violation added for an excess `over`: the excess itself if graded, otherwise 1."""
+    """Return the violation added for an excess `over`: the excess itself if graded, otherwise 1."""
     if graded:
         return over
     return 1.0 if over > 0.0 else 0.0

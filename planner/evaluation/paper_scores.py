@@ -49,7 +49,7 @@ POINTS = 6
 
 
 def paper_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
-    """Violation counts and objectives of paths (n, w, 3) at six points per leg and the destination (eq. 1-11).
+    """Score paths (n, w, 3) at six points per leg and the destination (eq. 1-11).
 
     Returns violations (n, 4) by `planner.plan.Violation` and objectives (n, 4) by `planner.plan.Objective`.
     """
@@ -101,7 +101,7 @@ def _score_paths(
 
 @inlined
 def _by_numbers(data: ProblemArrays, limits: PrecomputedLimits) -> bool:  # pragma: no cover - compiled
-    """Whether numbers alone limit turns and slopes, and no course is prescribed at the ends."""
+    """Return True if only numbers limit turns and slopes, and no course is prescribed at the ends."""
     courses = math.isnan(data.start_course) and math.isnan(data.destination_course)
     return courses and not data.legs_hold_turns and not limits.slopes_by_aircraft
 

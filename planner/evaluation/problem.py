@@ -134,7 +134,7 @@ class ProblemArrays(NamedTuple):
 
 
 def threat_records(threats: Threats) -> Records:
-    """Threats of a scenario as `THREAT` records (m,)."""
+    """Return threats of a scenario as `THREAT` records (m,)."""
     out = np.zeros(len(threats.position), dtype=THREAT)
     for axis, name in enumerate(("east", "north", "up")):
         out[name] = threats.position[:, axis]
@@ -145,7 +145,7 @@ def threat_records(threats: Threats) -> Records:
 
 
 def sphere_records(threats: Records) -> Records:
-    """`SPHERE` records (m,) of `THREAT` records."""
+    """Return `SPHERE` records (m,) of `THREAT` records."""
     out = np.zeros(len(threats), dtype=SPHERE)
     for name in ("east", "north", "up"):
         out[name] = threats[name]
@@ -159,15 +159,16 @@ def sphere_records(threats: Records) -> Records:
 
 
 def as_columns(records: Records) -> Floats:
-    """Records (n,) whose fields are all float64 as a table (n, fields)."""
+    """Return records (n,) whose fields are all float64 as a table (n, fields)."""
     return records.view(np.float64).reshape(len(records), -1)
 
 
 # --- Required clearance ---
 
-# Growth of the clearance buffer away from an end that starts without it, m per m; and at most this share of the slopes
-# that are left to an aircraft whose climb is kept in reserve.
-BUFFER_GROWTH, GROWTH_SHARE = 0.05, 0.5
+# Growth of the clearance buffer away from an end without it, m per m.
+BUFFER_GROWTH = 0.05
+# Upper limit of this growth as a fraction of the remaining slopes of an aircraft with a climb reserve.
+GROWTH_SHARE = 0.5
 
 
 class RequiredClearance(NamedTuple):
@@ -198,13 +199,13 @@ class RequiredClearance(NamedTuple):
 
 @inner
 def required_clearance(data: ProblemArrays) -> RequiredClearance:  # pragma: no cover - compiled
-    """The clearance that a problem requires."""
+    """Return the clearance that a problem requires."""
     return _required(data, data.clearance, data.buffer, data.start_buffer, data.destination_buffer)
 
 
 @inner
 def required_headroom(data: ProblemArrays) -> RequiredClearance:  # pragma: no cover - compiled
-    """The maximum height above ground as a required clearance, with the heights of path and ground negated."""
+    """Return the maximum height above ground as a required clearance, with the heights of path and ground negated."""
     space = data.airspace
     return _required(data, -space.max_height, space.buffer, space.start_buffer, space.destination_buffer)
 
@@ -233,7 +234,10 @@ def _required(
 
 @inlined
 def clearance_at(required: RequiredClearance, east: float, north: float) -> float:  # pragma: no cover - compiled
-    """Height above ground required at a point, m: the buffer grows away from fixed ends that have less of it."""
+    """Return the required height above ground at a point, m.
+
+    The buffer grows away from fixed ends with less.
+    """
     # Without branches, so that loops over many points become vector instructions: an end with the full buffer never
     # reduces it.
     dx, dy = east - required.start_east, north - required.start_north
@@ -250,16 +254,23 @@ def clearance_at(required: RequiredClearance, east: float, north: float) -> floa
 
 # Margin of plans to turn and slope limits, rad.
 ANGLE_MARGIN = math.radians(0.5)
-# Largest course change of a plan where no number limits it.
+# Largest course change of a plan if no number limits it, rad.
 AIRCRAFT_TURN = math.radians(150.0)
-# Heights above the required clearance and distances from kill spheres, m, that the search aims for and the certificate
-# requires. The difference covers the search's terrain samples and chords; the certificate's margin covers the height
-# error of a flight (1.3 m worst of 120 flights) and its cross-track error (2 m).
-SEARCH_BUFFER, CERTIFIED_BUFFER = 8.0, 5.0
-SEARCH_KILL_MARGIN, CERTIFIED_KILL_MARGIN = 15.0, 10.0
-# The same for zones and below a maximum height above ground. A search keeps no more than this share of the band between
-# the certificate's limits on either side.
-SEARCH_ZONE_MARGIN, CERTIFIED_ZONE_MARGIN = 15.0, 10.0
+# Margins of the search are larger than the certificate's margins by the effect of its terrain samples and chords; the
+# certificate's margins cover the altitude error of a flight (1.3 m worst of 120 flights) and its cross-track error (2
+# m). Height above the required clearance in a search, m.
+SEARCH_BUFFER = 8.0
+# Height above the required clearance in the certificate, m.
+CERTIFIED_BUFFER = 5.0
+# Distance from kill spheres in a search, m.
+SEARCH_KILL_MARGIN = 15.0
+# Distance from kill spheres in the certificate, m.
+CERTIFIED_KILL_MARGIN = 10.0
+# Distance from zones, and below a maximum height above ground, in a search, m.
+SEARCH_ZONE_MARGIN = 15.0
+# Distance from zones in the certificate, m.
+CERTIFIED_ZONE_MARGIN = 10.0
+# Largest margin of a search on either side of a band, as a fraction of the band between the certificate's limits.
 BAND_SHARE = 0.25
 # Share of the buffer available at a fixed end that the certificate requires.
 CERTIFIED_END_SHARE = 0.75
@@ -267,8 +278,10 @@ CERTIFIED_END_SHARE = 0.75
 ATTEMPT_BUFFER = 5.0
 # Share of the aircraft's steepest climb and dive that a plan uses; gusts take the rest.
 TURBULENCE_SHARE = {"none": 1.0, "light": 0.9, "moderate": 0.8}
-# Margins of a search to the map's edges and to floor and ceiling, m, where the fixed ends allow them.
-MAP_MARGIN, HEIGHT_MARGIN = 10.0, 4.0
+# Margin of a search to the map's edges, m, if the fixed ends allow it.
+MAP_MARGIN = 10.0
+# Margin of a search to floor and ceiling, m, if the fixed ends allow it.
+HEIGHT_MARGIN = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,7 +301,7 @@ class Problem:
 
 
 def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Problem:
-    """A scenario as arrays for compiled code. Raises ScenarioError if no path can be planned on it.
+    """Return a scenario as arrays for compiled code. Raises ScenarioError if no path can be planned on it.
 
     attempt: number of searches that have failed; each increases the clearance of the next.
     """
@@ -327,7 +340,7 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
 
 
 def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> ProblemArrays:
-    """Arrays with the margins of the certificate."""
+    """Return the arrays with the margins of the certificate."""
     units = threat_records(scenario.threats)
     radius = np.maximum(scenario.threats.kill_radius, scenario.threats.detection_radius)
     tracking = no_tracking() if limits.tracking is None else limits.tracking.record
@@ -377,7 +390,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
 def _search_airspace(
     scenario: Scenario, certified: ProblemArrays, attempt: int, up: float, limits: Limits
 ) -> PlannerAirspace:
-    """Airspace with the margins of a search."""
+    """Return the airspace with the margins of a search."""
     buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up
     margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN, buffer + limits.reserve_threats, 1.0)
     return make_airspace(
@@ -386,15 +399,16 @@ def _search_airspace(
 
 
 def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, share: float) -> ZoneMargins:
-    """Margins of zones, m, changed by the scenario's `zone_margin_m`; in height never reduced."""
+    """Return the margins of zones, m, changed by the scenario's `zone_margin_m`; in height never reduced."""
     asked = scenario.planner.zone_margin_m
     more = 0.0 if asked is None else asked - CERTIFIED_ZONE_MARGIN
     return ZoneMargins(horizontal + more, vertical + max(0.0, more), share)
 
 
 def _max_buffer(certified: ProblemArrays, at_edge: float) -> float:
-    """Largest margin of a search to an edge of a band of heights above ground, m; inf without a maximum height.
+    """Return the largest margin of a search to an edge of a band of heights above ground, m.
 
+    Inf without a maximum height.
     at_edge: that of the certificate, m.
     """
     space = certified.airspace
@@ -403,7 +417,7 @@ def _max_buffer(certified: ProblemArrays, at_edge: float) -> float:
 
 
 def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
-    """Performance of the aircraft, reduced in turbulence and for its autopilot, within the rates that this demands."""
+    """Return the aircraft's performance, reduced for turbulence and within the rates that the autopilot demands."""
     share, tracking = TURBULENCE_SHARE[scenario.wind.turbulence], limits.tracking
     if tracking is None:
         return derated(limits.performance(), share, share, limits.reserve_climb, limits.reserve_sink)
@@ -413,7 +427,7 @@ def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
 
 
 def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:
-    """Growth of the buffer away from an end without it, m per m, that the aircraft can follow in still air."""
+    """Return the growth of the buffer away from an end without it that the aircraft can follow, m per m."""
     if not (limits.reserve_height or limits.reserve_above):
         return BUFFER_GROWTH
     slopes = [
@@ -425,7 +439,7 @@ def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTabl
 
 
 def _edges(bounds: Floats) -> dict[str, float]:
-    """The edges of a map with these bounds (2, 2) by name."""
+    """Return the edges of a map with these bounds (2, 2) by name."""
     (west, east), (south, north) = bounds.tolist()
     return {"west": west, "east": east, "south": south, "north": north}
 
@@ -435,7 +449,7 @@ def _or_nan(value: float | None) -> float:
 
 
 def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, share: float = 1.0) -> float:
-    """Buffer at a fixed end, m: the full buffer, or a share of the height available there."""
+    """Return the buffer at a fixed end, m: the full buffer, or a share of the height available there."""
     above = float(point[2] - terrain.height(point[0], point[1]))
     left = above - limits.min_clearance - 0.01
     return buffer if left >= buffer else share * max(0.0, left)
@@ -453,7 +467,7 @@ def _slope_bounds(terrain: Terrain) -> SlopeBounds:
 
 
 def _inset(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:
-    """Arrays with map and heights shrunk by these margins (m), but never excluding the fixed ends."""
+    """Return the arrays with map and heights shrunk by these margins (m), but never excluding the fixed ends."""
     ends = np.stack([data.start, data.destination])
     low, high = ends.min(axis=0), ends.max(axis=0)
     return data._replace(

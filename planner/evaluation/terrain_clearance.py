@@ -47,7 +47,7 @@ def _left(lengths: float) -> float:  # pragma: no cover - compiled
 def lag_length(
     tracking: Record, aircraft: PerformanceTable, east: float, north: float, amsl: float, wind: Wind
 ) -> float:  # pragma: no cover - compiled
-    """Distance (m) that the aircraft covers over the ground during the lag, on a unit course."""
+    """Return the distance (m) that the aircraft covers over the ground during the lag, on a unit course."""
     (wx, wy), speed, airspeed = wind, wind_speed_at(aircraft, amsl), true_airspeed(aircraft, amsl)
     along = ground_speed(airspeed, speed * (east * wx + north * wy), speed * (east * wy - north * wx))
     # A course that cannot be held against the wind has no plan either.
@@ -87,7 +87,7 @@ def measure_lags(
 
 @inlined
 def lag_at(lag: Record, share: float) -> float:  # pragma: no cover - compiled
-    """Distance of the aircraft below a leg at a fraction of it, m; negative above."""
+    """Return the distance of the aircraft below a leg at a fraction of it, m; negative above."""
     below: float = lag.steady + lag.slant * (1.0 - share) + lag.rest * _left(share * lag.decay)
     return below
 
@@ -138,7 +138,7 @@ def _sample(
     rise: float,
     pitch: float,
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Height above the required clearance at a point of a line, and the fraction of the line to the next sample.
+    """Return the height above the required clearance at a point of a line, and the step to the next sample.
 
     tiles, tile_side: of `SlopeBounds`. growth: of `RequiredClearance`. need: required clearance. later: largest further
     requirement elsewhere on the line, m. run, rise: of the whole line, m. pitch: spacing of samples near the ground, as
@@ -169,8 +169,9 @@ def terrain_excess(
     bz: float,
     enough: float,
 ) -> float:  # pragma: no cover - compiled
-    """Depth below the required clearance along a-b, summed over samples (m x km); up to where it exceeds `enough`.
+    """Return the depth below the required clearance along a-b, summed over samples (m x km).
 
+    Up to where it exceeds `enough`.
     more: additional height required here, m. ends: columns and rows of a and b.
     """
     column, row, last_column, last_row = ends

@@ -172,7 +172,7 @@ class MissileIndex(NamedTuple):
 
 
 def make_missile_index(threats: Records, side: float | None = None) -> MissileIndex:
-    """Index of the missiles of records with fields east, north, up, kill_radius and kill_scale (m).
+    """Return the index of the missiles of records with fields east, north, up, kill_radius and kill_scale (m).
 
     side: of a cell, m; None for `MISSILES_A_CELL` missiles per cell.
     """
@@ -221,7 +221,7 @@ def kill_density(
     below: float,
     above: float,
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Mean kill density over the segment a-b, radii enlarged by the margin, and distances to the nearest spheres, m.
+    """Return the mean kill density over a-b with enlarged radii, and the distances to the nearest spheres, m.
 
     first, last: lengths (m) at a and at b from which the two distances are measured; a distance is exact if below
     `within`. below, above: vertical tracking error, m.
@@ -276,7 +276,7 @@ def _part(f: float, g: float) -> tuple[float, float]:  # pragma: no cover - comp
 
 @inlined
 def _nearer(z: float, rise: float, below: float, above: float) -> float:  # pragma: no cover - compiled
-    """Height of a segment's beginning above a missile (m), shifted by the vertical tracking error towards it.
+    """Return the height of a segment's start above a missile (m), shifted towards it by the tracking error.
 
     rise: of the segment up to its closest point.
     """
@@ -287,7 +287,7 @@ def _nearer(z: float, rise: float, below: float, above: float) -> float:  # prag
 
 @inlined
 def _cell(place: float, count: int) -> int:  # pragma: no cover - compiled
-    """Index of the cell along one axis; -1 and `count` if outside."""
+    """Return the index of the cell along one axis; -1 and `count` if outside."""
     inside = place if place > -1.0 else -1.0
     number: int = math.floor(inside if inside < count else count)
     return number
@@ -308,7 +308,7 @@ def _closest2(
 
 @inlined
 def _dose(along: float, start2: float, length2: float, radius: float, scale: float) -> float:  # pragma: no cover
-    """Mean kill density of a segment that enters a sphere; see `window_exposure`."""
+    """Return the mean kill density of a segment that enters a sphere; see `window_exposure`."""
     if length2 < 1e-12:
         return window_exposure(0.0, 1.0, length2, along, start2, scale)
     middle = -along / length2

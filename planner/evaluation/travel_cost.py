@@ -1,4 +1,4 @@
-"""What a leg costs: its length, its time in the mean wind, or the energy that its flight takes.
+"""Cost of a leg: its length, its time in the mean wind, or the energy of its flight.
 
 The air carries the aircraft along. A leg d that is held at true airspeed V in the wind w takes the time T for which
 |d - w T| = V T: the wind triangle, in three dimensions, whose larger part is horizontal (Zermelo's problem in a steady
@@ -27,10 +27,12 @@ Floats = NDArray[np.float64]
 UP = 2
 # Half-step of the finite difference in height, m.
 HEIGHT_STEP = 2.0
-# A leg that cannot be held counts as flown over the ground at this share of the airspeed, so that a search leaves it.
+# Ground speed that is assumed on a leg that cannot be held, as a fraction of the airspeed, so that a search leaves it.
 UNFLYABLE_SHARE = 0.01
-# Simpson's rule: shares of a leg and their weights.
-_SHARES, _WEIGHTS = (0.0, 0.5, 1.0), (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+# Fractions of a leg for Simpson's rule.
+_SHARES = (0.0, 0.5, 1.0)
+# Weights of Simpson's rule.
+_WEIGHTS = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 
 
 @by_reference
@@ -61,9 +63,9 @@ LENGTH = TravelCost(1.0, 0.0, 0.0, _NONE, _NONE, _NONE, _NONE, _NONE)
 
 
 def make_travel_cost(objective: Objective, envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
-    """The cost of a path by an objective, in m: its length, or time or energy over those of a metre in level flight.
+    """Make the cost of an objective, in m: length, or time or energy relative to a metre of level flight.
 
-    None where energy is asked for and the aircraft's power is unknown.
+    Returns None for energy if the aircraft's power is unknown.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -77,13 +79,14 @@ def make_travel_cost(objective: Objective, envelope: Envelope, table: Performanc
 
 
 def time_cost(table: PerformanceTable) -> TravelCost:
-    """The cost of a path's time, in m of level flight in still air."""
+    """Return the cost of a path's time, in m of level flight in still air."""
     return LENGTH._replace(length=0.0, time=float(table.airspeed))
 
 
 def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
-    """The cost of a path's energy, in m of level flight in still air; None where the aircraft's power is unknown.
+    """Return the cost of a path's energy, in m of level flight in still air.
 
+    None where the aircraft's power is unknown.
     Power is that of `Envelope.power`: the parabola through idle at the steepest descent, level flight and full
     throttle. At heights where there is no level flight it is that of the nearest with one.
     """
@@ -98,7 +101,10 @@ def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | Non
 
 
 def _parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
-    """Coefficients of power by the sine of the climb angle, and the bounds of this sine; NaN where power is unknown."""
+    """Coefficients of power by the sine of the climb angle, and the bounds of this sine.
+
+    NaN where power is unknown.
+    """
     climb, descent = envelope.air_angles(airspeed, amsl)
     low, high = -math.sin(descent), math.sin(climb)
     level = envelope.power(airspeed, amsl, 0.0)
@@ -111,7 +117,10 @@ def _parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, 
 
 
 class LegTime(NamedTuple):
-    """Time of a leg (s) and its derivatives by the leg (s/m); D of `leg_time`; and whether the leg can be held."""
+    """Time of a leg (s) and its derivatives by the leg (s/m); D of `leg_time`.
+
+    And whether the leg can be held.
+    """
 
     seconds: float
     by_east: float
@@ -184,7 +193,7 @@ def _at_height(travel: TravelCost, table: PerformanceTable, amsl: float) -> _At:
 def _timed_cost(
     travel: TravelCost, table: PerformanceTable, dx: float, dy: float, dz: float, amsl: float
 ) -> tuple[float, bool]:  # pragma: no cover - compiled
-    """Cost of the time and the energy of a leg flown at one height, and whether the leg can be held."""
+    """Return the cost of the time and the energy of a leg flown at one height, and whether the leg can be held."""
     here, (wx, wy) = _at_height(travel, table, amsl), downwind(table)
     time = leg_time(dx, dy, dz, here.wind * wx, here.wind * wy, here.airspeed)
     cost = travel.time * time.seconds
@@ -198,7 +207,7 @@ def _timed_cost(
 def leg_cost(
     travel: TravelCost, table: PerformanceTable, a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> float:  # pragma: no cover - compiled
-    """Cost of the leg a-b; inf where it cannot be held."""
+    """Return the cost of the leg a-b; inf where it cannot be held."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     total = travel.length * math.sqrt(dx * dx + dy * dy + dz * dz)
     if travel.time == 0.0 and travel.energy == 0.0:
@@ -213,7 +222,7 @@ def leg_cost(
 
 @compiled
 def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> float:  # pragma: no cover - compiled
-    """Cost of a path (w, 3) world m: that of its legs; inf where one cannot be held.
+    """Return the cost of a path (w, 3) world m: that of its legs; inf where one cannot be held.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -238,8 +247,9 @@ class LegModel(NamedTuple):
 def model_leg(
     travel: TravelCost, table: PerformanceTable, a: Floats, b: Floats, model: LegModel
 ) -> float:  # pragma: no cover - compiled
-    """Cost of the leg a-b, finite for any leg; fills its derivatives by a and b and its curvature.
+    """Return the cost of the leg a-b, finite for any leg.
 
+    Fills its derivatives by a and b and its curvature.
     The curvature is that of the length, of the time at each height, and of the power, all convex; what couples height
     and course is left out, so that the matrix has no negative eigenvalue.
     """

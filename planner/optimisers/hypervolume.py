@@ -22,7 +22,7 @@ SEED = 20
 
 
 def hypervolume(points: Floats, reference: Floats) -> float:
-    """Return the exact volume that points (n, m) dominate below a reference point (m,), by slices of the last objective.
+    """Return the exact volume that points (n, m) dominate below a reference (m,), by slices of the last objective.
 
     >>> hypervolume(np.array([[1.0, 3.0], [2.0, 1.0]]), np.array([4.0, 4.0]))  # 3 x 1 and 2 x 2 of it below
     7.0

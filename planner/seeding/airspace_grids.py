@@ -37,9 +37,10 @@ Codes = NDArray[np.int32]
 
 # Additional cost per m at the edges of the height band, relative to its middle: legs are longer than grid steps.
 EDGE_COST = 0.3
-# On a gentle grid: cost of a change of course, in grid steps per squared change of the lateral step; and share of the
-# steepest slopes that a route uses, because legs cut its corners.
-TURN_COST, SLOPE_SHARE = 0.15, 0.9
+# Cost of a change of course on a gentle grid, in grid steps per squared change of the lateral step.
+TURN_COST = 0.15
+# Fraction of the steepest slopes that a route on a gentle grid uses, because legs cut its corners.
+SLOPE_SHARE = 0.9
 # A grid column: its ground and the lowest and highest allowed height, m; lowest > highest for none.
 COLUMN = np.dtype([("ground", np.float64), ("lowest", np.float64), ("highest", np.float64)])
 
@@ -96,7 +97,10 @@ def _column(
 def _passage(
     zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float
 ) -> _Passage:  # pragma: no cover - compiled
-    """Heights that zones close to a horizontal step; lateral: lateral tracking error added to their margins, m."""
+    """Heights that zones close to a horizontal step.
+
+    Lateral: lateral tracking error added to their margins, m.
+    """
     low, high = math.inf, -math.inf
     for z in range(zones.inclusions):
         wanted = zones.required[z].horizontal + lateral
@@ -265,8 +269,9 @@ def cheapest_airspace_route(
     bound: float,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, float]:
-    """Points (stages + 1, 3) along, across, up of the cheapest route over a grid, and its cost; else (0, 3) and inf.
+    """Return points (stages + 1, 3) along, across, up of the cheapest route over a grid, and its cost.
 
+    Else (0, 3) and inf.
     extra: (stages + 1, across) added to the cost per m. bound: upper limit on the cost. pause: called after every
     `CELLS_AT_ONCE` cells; an exception raised there stops the search.
     """
@@ -283,7 +288,7 @@ def cheapest_airspace_route(
 def begin_airspace_route(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid
 ) -> AirspaceSearch:  # pragma: no cover - compiled
-    """A search that is at the start."""
+    """Return a search that is at the start."""
     stages, wide, step = grid.stages, grid.across.size, frame.length / grid.stages
     home = int(np.argmin(np.abs(grid.across)))
     columns = np.zeros((stages + 1, wide), dtype=COLUMN)
@@ -313,7 +318,7 @@ def continue_airspace_route(
     search: AirspaceSearch,
     more: int,
 ) -> AirspaceSearch:  # pragma: no cover - compiled
-    """The search after up to `more` further stages, or at the last one if no route comes further."""
+    """Return the search after up to `more` further stages, or at the last one if no route comes further."""
     stages, wide, step = grid.stages, grid.across.size, frame.length / grid.stages
     obstacles, columns, cells, cost, after, price, home, reached = search
     last_stage, ahead = min(stages, reached + more), np.empty(wide)
@@ -359,7 +364,7 @@ def continue_airspace_route(
 def end_airspace_route(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, search: AirspaceSearch
 ) -> tuple[Floats, float]:  # pragma: no cover - compiled
-    """Points (stages + 1, 3) of the route found, and its cost; (0, 3) and inf if there is none."""
+    """Return points (stages + 1, 3) of the route found, and its cost; (0, 3) and inf if there is none."""
     stages, step, columns, y = grid.stages, frame.length / grid.stages, search.columns, search.home
     z = _layer(grid, columns[stages, y], data.destination[2])
     total = search.cost[y, z]
@@ -377,7 +382,7 @@ def end_airspace_route(
 
 @inner
 def _layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:  # pragma: no cover - compiled
-    """Index of the layer nearest to a height, m."""
+    """Return the index of the layer nearest to a height, m."""
     first = column.lowest if grid.follows else grid.floor
     layer: int = min(grid.layers - 1, max(0, round((amsl - first) / grid.pitch)))
     return layer
@@ -390,8 +395,10 @@ FINER = 2
 # Bound on the cost of a first route, over that of the first on the grid before it. A finer grid's may cost a little
 # more, for it is freer to turn; the bound spares work and does not change the route.
 FINER_COST = 1.05
-# Minimum and maximum number of layers of a band of heights above ground.
-MIN_LAYERS, MAX_LAYERS = 8, 24
+# Minimum number of layers of a band of heights above ground.
+MIN_LAYERS = 8
+# Maximum number of layers of a band of heights above ground.
+MAX_LAYERS = 24
 # Minimum pitch of layers that do not follow the ground, as a share of the step along.
 MIN_PITCH = 0.05
 # Maximum number of cells of a grid: stages x across x layers.
@@ -399,7 +406,7 @@ MAX_CELLS = 1_200_000
 
 
 def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> AirspaceGrid:
-    """A grid with this many stages, or fewer where it would become too large.
+    """Return a grid with this many stages, or fewer where it would become too large.
 
     span: limits across, m.
     """
@@ -436,7 +443,7 @@ def airspace_routes(
     *,
     finer_only: bool = False,
 ) -> Iterator[GridRoute]:
-    """Routes in the order found, for each grid (stages, number of different routes), with `FINER` times its stages.
+    """Yield routes for each grid (stages, number of different routes), with `FINER` times its stages.
 
     Routes of gentle grids are easier to fly. The first grid is also searched without that restriction, because narrow
     gaps can require steep or curved routes. pause: as in `cheapest_airspace_route`.
@@ -470,7 +477,7 @@ def _route(
     expected: float,
     pause: Callable[[], None],
 ) -> GridRoute | None:
-    """Cheapest route over a grid away from those used, None if there is none. expected: first bound to try."""
+    """Return the cheapest route over a grid away from used ones, or None. expected: first bound to try."""
     extra = proximity_cost(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, used)
     for bound in (expected, math.inf):
         points, cost = cheapest_airspace_route(data, frame, grid, extra, bound, pause)

@@ -14,8 +14,10 @@ Floats = NDArray[np.float64]
 
 # Share of a seeded first population that is sampled around the seeds.
 AROUND_SEEDS = 1.0
-# Limits of the spread around a seed, as a share of the unseeded spread; sampled log-uniformly.
-MIN_SPREAD, MAX_SPREAD = 0.003, 0.3
+# Smallest spread around a seed, as a fraction of the unseeded spread; sampled log-uniformly.
+MIN_SPREAD = 0.003
+# Largest spread around a seed, as a fraction of the unseeded spread.
+MAX_SPREAD = 0.3
 
 
 def bridge_modes(inner: int) -> tuple[Floats, Floats]:
@@ -43,8 +45,9 @@ def bridge_basis(inner: int) -> Floats:
 def first_samples(
     space: Space, encoding: Encoding, population: int, starts: Floats, rng: np.random.Generator
 ) -> Floats:
-    """First population (n, d): the starts and smooth paths around them; without starts, around the straight line.
+    """First population (n, d): the starts and smooth paths around them.
 
+    Without starts, around the straight line.
     starts: vectors (s, d) to start from.
     """
     inner = encoding.waypoints - 2
@@ -55,7 +58,7 @@ def first_samples(
     spread[1:] *= np.sqrt((inner + 1) / 2.0)
 
     def bridges(count: int) -> Floats:
-        """Smooth displacements (count, inner, 2) of across and up."""
+        """Return smooth displacements (count, inner, 2) of across and up."""
         weights = rng.normal(size=(count, inner, 2)) * deviations[:, None] * spread[1:]
         return np.asarray(np.einsum("nka,ik->nia", weights, modes, optimize=False))
 

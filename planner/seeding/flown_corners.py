@@ -27,16 +27,22 @@ Floats = NDArray[np.float64]
 # Samples of a corner: with tracking error along two legs, on both sides of each.
 ON_LEG = 4
 SAMPLES = 4 * ON_LEG
-# Corners that leave their legs by less, m, or come no nearer to the height that is required, m, are not sampled.
-MIN_DEPARTURE, NEAR_GROUND = 2.0, 60.0
+# Smallest distance between a sampled corner and its legs, m.
+MIN_DEPARTURE = 2.0
+# Largest height of a sampled corner above the required height, m.
+NEAR_GROUND = 60.0
 # The largest turn that is sampled, rad: at a half turn the tangent is infinite.
 MAX_TURN = 3.0
-# Half-steps of finite differences: of the ground, and of the place of a sample, m.
-GROUND_STEP, CORNER_STEP = 8.0, 0.5
-# Arcs that are flatter than this share of what can be flown are not constrained.
+# Half-step of finite differences of the ground, m.
+GROUND_STEP = 8.0
+# Half-step of finite differences of the place of a sample, m.
+CORNER_STEP = 0.5
+# Slope of an arc, as a fraction of the slope limit, below which it is not constrained.
 STEEP = 0.8
-# Length of an arc that is kept beside what it needs to climb or sink, m, and as a share of the additional margin.
-ARC_MARGIN, ARC_SHARE = 1.0, 0.4
+# Length of an arc in addition to the length for its climb or descent, m.
+ARC_MARGIN = 1.0
+# The same as a fraction of the additional margin.
+ARC_SHARE = 0.4
 
 
 class FlownCorners(NamedTuple):
@@ -67,7 +73,7 @@ def no_corners(count: int, margin: float) -> FlownCorners:  # pragma: no cover -
 def corners_near_ground(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, corners: Records, lags: Records, margin: float
 ) -> FlownCorners:  # pragma: no cover - compiled
-    """The corners of a path (w, 3) that are flown near the ground; margin: additional, m."""
+    """Return the corners of a path (w, 3) that are flown near the ground; margin: additional, m."""
     count = path.shape[0]
     found, point = no_corners(count, margin), np.empty(3)
     lowered = found.lowered
@@ -129,7 +135,7 @@ def _find_steep_arcs(
 def arc_room(
     before: Floats, at: Floats, after: Floats, radius: float, sign: float, steepest: float
 ) -> float:  # pragma: no cover - compiled
-    """Length of the arc past the waypoint `at`, minus what it needs to climb (sign 1) or sink (-1) as it does, m.
+    """Return the arc's length past the waypoint `at` minus the length of its climb (sign 1) or descent (-1), m.
 
     Slopes are those of `aircraft.path_limits.arc_slope`; steepest: tangent of what can be flown.
     """
@@ -143,7 +149,7 @@ def arc_room(
 
 @inner
 def leg_of(sample: int) -> int:  # pragma: no cover - compiled
-    """Whether a sample belongs to the leg before (0) or after (1) its corner."""
+    """Return the leg of a sample: 0 for before its corner, 1 for after it."""
     leg: int = 2 * sample // SAMPLES
     return leg
 
@@ -157,7 +163,7 @@ def _run(a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
 def height_above_required(
     data: ProblemArrays, limits: PrecomputedLimits, point: Floats
 ) -> float:  # pragma: no cover - compiled
-    """Height of a point (3,) above the lowest that is allowed there, m; NaN off the terrain."""
+    """Return the height of a point (3,) above the lowest that is allowed there, m; NaN off the terrain."""
     column, row = polymap(data.to_pixel, point[0], point[1])
     ground: float = pixel_height(data.heights, column, row)
     height: float = point[2] - ground - clearance_at(limits.required, point[0], point[1])

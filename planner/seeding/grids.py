@@ -33,9 +33,11 @@ Codes = NDArray[np.int32]
 
 # Additional cost per m inside a kill sphere, in m of path.
 KILL_COST = 40.0
-# On grids with steps longer than this (m), kill spheres are enlarged by this share of a step, for what lies between the
-# cells. Finer grids use their true size and find the narrow gaps.
-COARSE, COARSE_GROWTH = 250.0, 0.15
+# Step of a grid above which kill spheres are enlarged, m, to cover the space between the cells. Finer grids use their
+# true size and find the narrow gaps.
+COARSE = 250.0
+# Enlargement of the spheres, as a fraction of a step.
+COARSE_GROWTH = 0.15
 # Share of a step around a cell over which the highest ground is taken.
 GROUND_SPREAD = 0.4
 # A threat in the rotated frame, with the radius that routes avoid, m.
@@ -89,8 +91,9 @@ def _lowest_height(
     across: float,
     steps: _PixelSteps,
 ) -> float:  # pragma: no cover - compiled
-    """Lowest height allowed in a cell: highest ground of 3 x 3 samples plus the clearance; inf outside the map.
+    """Return the lowest height allowed in a cell: highest ground of 3 x 3 samples plus the clearance.
 
+    Inf outside the map.
     steps: 0 along for the middle sample alone.
     """
     east, north = position_of(frame, along, across)
@@ -130,7 +133,10 @@ def _pixel_steps(
 def find_obstacles(
     data: ProblemArrays, frame: RotatedFrame, step: float, shrink: float = 0.0
 ) -> Records:  # pragma: no cover - compiled
-    """`OBSTACLE` records of the missiles for a grid with this step between stages; shrink: see `Grid`."""
+    """Return `OBSTACLE` records of the missiles for a grid with this step between stages.
+
+    Shrink: see `Grid`.
+    """
     growth = COARSE_GROWTH * step if step > COARSE else 0.0
     if shrink > 0.0:
         growth = -shrink * step
@@ -220,7 +226,7 @@ SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 def layers_per_step(
     data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float
 ) -> Records:  # pragma: no cover - compiled
-    """`STEP_LAYERS` records (sideways, layers): climb and descent of a step on its course and at its height."""
+    """Return `STEP_LAYERS` records (sideways, layers): climb and descent of a step on its course and at its height."""
     pitch = layers[1] - layers[0] if layers.size > 1 else 1.0
     out = np.zeros((2 * SIDEWAYS + 1, layers.size), dtype=STEP_LAYERS)
     a, b = np.zeros(3), np.zeros(3)
@@ -249,7 +255,10 @@ def relax(
     count: int,
     length: float,
 ) -> None:  # pragma: no cover - compiled
-    """Relax `count` adjacent cells to as many of the next stage, with cell costs from `priced`; all arrays flat."""
+    """Relax `count` adjacent cells to as many of the next stage, with cell costs from `priced`.
+
+    All arrays flat.
+    """
     for k in range(count):
         # Unsigned indices (numba checks signed ones for wrap-around) and no branches: this innermost loop is
         # vectorised.
@@ -298,7 +307,7 @@ def relax_stage(
 def distance_to_goal(
     columns: int, home: int, left: int, step: float, ratio: float, out: Floats
 ) -> None:  # pragma: no cover - compiled
-    """Shortest horizontal distance from each position across to the destination, `left` stages away, m."""
+    """Return the shortest horizontal distance from each position across to the destination, `left` stages away, m."""
     for y in range(columns):
         aside = abs(y - home)
         if aside > SIDEWAYS * left:
@@ -314,8 +323,9 @@ def distance_to_goal(
 def prune(
     after: Floats, spans: Records, ahead: Floats, rises: Floats, bound: float, low: int, high: int
 ) -> None:  # pragma: no cover - compiled
-    """Drop cells low..high from which no route reaches the destination within the bound; note the remaining spans.
+    """Drop cells low..high from which no route reaches the destination within the bound.
 
+    Note the remaining spans.
     spans: `SPAN` records (layers,) to fill. ahead: (across,) horizontal distance to the destination, m. rises:
     (layers,) height difference to it, m.
     """
@@ -363,8 +373,9 @@ def cheapest_route(
     bound: float,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Records, float]:
-    """`ROUTE_CELL` records (stages + 1,) of the cheapest route over a grid, and its cost; empty if there is none.
+    """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route over a grid, and its cost.
 
+    Empty if there is none.
     extra: (stages + 1, across) added to the cost per m. bound: upper limit on the cost; more expensive routes are not
     searched. pause: called after every `CELLS_AT_ONCE` cells; an exception raised there stops the search.
     """
@@ -379,7 +390,7 @@ def cheapest_route(
 
 @compiled
 def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSearch:  # pragma: no cover - compiled
-    """A search that is at the start."""
+    """Return a search that is at the start."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     home, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
@@ -408,7 +419,7 @@ def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSea
 def continue_route(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, extra: Floats, bound: float, search: GridSearch, more: int
 ) -> GridSearch:  # pragma: no cover - compiled
-    """The search after up to `more` further stages, or at the last one if no route comes further."""
+    """Return the search after up to `more` further stages, or at the last one if no route comes further."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
@@ -435,7 +446,7 @@ def continue_route(
 
 @compiled
 def end_route(search: GridSearch) -> tuple[Records, float]:  # pragma: no cover - compiled
-    """`ROUTE_CELL` records (stages + 1,) of the route found, and its cost; empty if there is none."""
+    """Return `ROUTE_CELL` records (stages + 1,) of the route found, and its cost; empty if there is none."""
     goal, home, cost = search.goal, search.home, search.cost
     if search.spans[goal].first > home or search.spans[goal].last < home or cost[goal, home] == np.inf:
         return np.zeros(0, dtype=ROUTE_CELL), np.inf
@@ -444,7 +455,10 @@ def end_route(search: GridSearch) -> tuple[Records, float]:  # pragma: no cover 
 
 @inner
 def trace_back(parents: Codes, layer: int, across: int) -> Records:  # pragma: no cover - compiled
-    """`ROUTE_CELL` records from the start to this cell of the last stage; parents: (stages + 1, layers, across)."""
+    """Return `ROUTE_CELL` records from the start to this cell of the last stage.
+
+    Parents: (stages + 1, layers, across).
+    """
     wide = parents.shape[2]
     cells = np.zeros(parents.shape[0], dtype=ROUTE_CELL)
     for stage in range(parents.shape[0] - 1, -1, -1):
@@ -461,13 +475,18 @@ def trace_back(parents: Codes, layer: int, across: int) -> Records:  # pragma: n
 # Pitch of the layers as a share of the step along: the gentler slope limit's climb per step over LAYERS_PER_STEP,
 # within these limits.
 LAYERS_PER_STEP = 2.5
-LOW_LAYER, HIGH_LAYER = 0.05, 0.12
+# Smallest pitch of the layers, as a fraction of the step along.
+LOW_LAYER = 0.05
+# Largest pitch of the layers, as a fraction of the step along.
+HIGH_LAYER = 0.12
 # Maximum number of cells of a grid: stages x across x layers.
 MAX_CELLS = 1_200_000
 # Expected cost of the first route over the straight line; with few courses, grid routes are too long by about this.
 EXPECTED = 1.12
-# Different routes: within this distance of an earlier one (m, or steps if larger) a route costs up to twice as much.
-APART, APART_STEPS = 800.0, 3.0
+# Distance from an earlier route within which a route costs up to twice as much, m.
+APART = 800.0
+# The same in steps, if that is larger.
+APART_STEPS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -479,7 +498,7 @@ class GridRoute:
 
 
 def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> Grid:
-    """A grid with this many stages, square in the plane, with a layer at the start's height.
+    """Return a grid with this many stages, square in the plane, with a layer at the start's height.
 
     span: limits across, m. The number of stages is reduced where the grid would become too large.
     """
@@ -506,7 +525,7 @@ def grid_route(
     expected: float = math.inf,
     pause: Callable[[], None] = lambda: None,
 ) -> GridRoute | None:
-    """Cheapest route over a grid; None if terrain and ceiling leave none.
+    """Return the cheapest route over a grid; None if terrain and ceiling leave none.
 
     used: earlier routes, near which the cost is higher, so that the next route takes another side. expected: cost bound
     to try first, such as the cost on a coarser grid; a search without a bound follows if it fails. pause: as in
@@ -527,7 +546,7 @@ def grid_route(
 
 
 def proximity_cost(along: Floats, across: Floats, used: tuple[GridRoute, ...]) -> Floats:
-    """Additional cost per m near earlier routes, at positions along (s,) and across (y,), m: (s, y)."""
+    """Return the additional cost per m near earlier routes, at positions along (s,) and across (y,), m: (s, y)."""
     extra = np.zeros((along.size, across.size))
     width = max(APART, APART_STEPS * along[-1] / (along.size - 1))
     for route in used:
@@ -543,7 +562,7 @@ def grid_routes(
     grids: tuple[tuple[int, int], ...],
     pause: Callable[[], None] = lambda: None,
 ) -> Iterator[GridRoute]:
-    """Routes in the order found, for each grid (stages, number of different routes). pause: as in `cheapest_route`."""
+    """Yield routes for each grid (stages, number of different routes). pause: as in `cheapest_route`."""
     expected = EXPECTED * math.dist(data.start, data.destination)
     for stages, each in grids:
         grid = make_grid(data, frame, span, stages)

@@ -83,7 +83,7 @@ def _set_position(
 
 @compiled
 def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:  # pragma: no cover - compiled
-    """Maximum climb and descent (8, 2) of a step on each course, in layers."""
+    """Return the maximum climb and descent (8, 2) of a step on each course, in layers."""
     out, a, b = np.zeros((8, 2), dtype=np.int64), np.zeros(3), np.zeros(3)
     _set_position(frame, lattice, lattice.behind, lattice.right, lattice.start_layer, a)
     for course in range(8):
@@ -168,7 +168,7 @@ class LatticeSearch(NamedTuple):
 
 
 def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> LatticeSearch:
-    """The search for a route from start to destination before its first step."""
+    """Return the search for a route from start to destination before its first step."""
     rises = _climb_layers(data, frame, lattice)
     size = lattice.along * lattice.across * lattice.layers * 8
     width = int(rises.max(axis=0).sum()) + 1
@@ -188,7 +188,7 @@ def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Latt
 def _reach_start(
     data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable
 ) -> Codes:  # pragma: no cover - compiled
-    """The states of the start, (k,), which are then reached."""
+    """Return the states of the start, (k,), which are then reached."""
     first = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
     prescribed = _nearest_course(frame, data.start_course)
     states = np.arange(first, first + 8) if prescribed < 0 else np.array([first + prescribed])
@@ -201,8 +201,9 @@ def _reach_start(
 def continue_lattice_search(
     data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, courses: int, search: LatticeSearch, max_expansions: int
 ) -> LatticeSearch:  # pragma: no cover - compiled
-    """The search continued by up to `max_expansions` expansions; it has failed if the open list is empty.
+    """Return the search continued by up to `max_expansions` expansions.
 
+    It has failed if the open list is empty.
     courses: largest turn per step, in units of 45 degrees.
     """
     limits, table, seen = precompute_limits(data), search.table, search.seen
@@ -229,7 +230,7 @@ def continue_lattice_search(
 
 @inner
 def _nearest_course(frame: RotatedFrame, course: float) -> int:  # pragma: no cover - compiled
-    """Index of the lattice course nearest to a course (rad, clockwise from north); -1 for NaN."""
+    """Return the index of the lattice course nearest to a course (rad, clockwise from north); -1 for NaN."""
     if math.isnan(course):
         return -1
     angle = 0.5 * math.pi - course - math.atan2(frame.sine, frame.cosine)
@@ -239,14 +240,14 @@ def _nearest_course(frame: RotatedFrame, course: float) -> int:  # pragma: no co
 
 @inner
 def _inside(data: ProblemArrays, point: Floats) -> bool:  # pragma: no cover - compiled
-    """Whether a point (3,) is on the map and between floor and ceiling."""
+    """Return True if a point (3,) is on the map and between floor and ceiling."""
     inside: bool = data.west <= point[0] <= data.east and data.south <= point[1] <= data.north
     return inside and data.floor <= point[2] <= data.ceiling
 
 
 @compiled
 def trace_route(parents: Numbers, found: int, lattice: Lattice) -> Records:  # pragma: no cover - compiled
-    """`LATTICE_CELL` records from the start to a state."""
+    """Return `LATTICE_CELL` records from the start to a state."""
     count, state = 0, found
     while state >= 0:
         count, state = count + 1, parents[state] - 1
@@ -264,7 +265,7 @@ def trace_route(parents: Numbers, found: int, lattice: Lattice) -> Records:  # p
 
 @compiled
 def simplify_route(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no cover - compiled
-    """Route (j, 3) with as many points of a route (k, 3) as possible dropped: greedy line-of-sight simplification.
+    """Simplify a route (k, 3) to as few points (j, 3) as possible by greedy line of sight.
 
     From each remaining point the leg goes to the furthest point that it reaches without a violation.
     """
@@ -288,19 +289,23 @@ def simplify_route(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no
 
 # --- Lattices and routes ---
 
-# Minimum step, and upper limit on the step that two right-angled turns require, m.
-MIN_STEP, MAX_STEP = 100.0, 2000.0
+# Minimum step, m.
+MIN_STEP = 100.0
+# Upper limit on the step that two right-angled turns require, m.
+MAX_STEP = 2000.0
 # Layers that the gentler slope limit climbs or descends in a step along.
 LAYERS_PER_STEP = 2
-# Maximum number of states of a lattice, and of expanded states of all lattices of a search together: of 600 scenarios
-# none had a route over a finer lattice where the first had taken them all.
-MAX_LATTICE_STATES, MAX_EXPANDED = 4_000_000, 60_000
+# Maximum number of states of a lattice.
+MAX_LATTICE_STATES = 4_000_000
+# Maximum number of expanded states of all lattices of a search together: of 600 scenarios none had a route over a finer
+# lattice if the first had used them all.
+MAX_EXPANDED = 60_000
 # States expanded between two calls of `pause`: some 10 ms.
 STATES_AT_ONCE = 2000
 
 
 def turning_step(data: ProblemArrays) -> float:
-    """Length of a leg between two right-angled turns to the same side, m: their lengths and settling between them."""
+    """Return the length of a leg between two right-angled turns to the same side, m, including settling."""
     if not data.legs_hold_turns:
         return MIN_STEP
     long = MAX_STEP
@@ -312,7 +317,7 @@ def turning_step(data: ProblemArrays) -> float:
 
 
 def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Lattice:
-    """A lattice over the whole map with points at both ends and steps of at most this length.
+    """Return a lattice over the whole map with points at both ends and steps of at most this length.
 
     step: m. The step is increased where the lattice would have more than `MAX_LATTICE_STATES` states.
     """
@@ -345,7 +350,7 @@ def cheapest_lattice_route(
     max_states: int,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Records, int]:
-    """`LATTICE_CELL` records of the cheapest route from start to destination, empty if there is none, and states seen.
+    """Return `LATTICE_CELL` records of the cheapest route, empty without one, and the number of states seen.
 
     courses: largest turn per step, in units of 45 degrees. max_states: maximum number of expanded states.
     """
@@ -367,9 +372,9 @@ def lattice_route(
     pause: Callable[[], None] = lambda: None,
     max_states: int = MAX_EXPANDED,
 ) -> tuple[Floats, int]:
-    """World points (k, 3) of a route from start to destination over a lattice of this step (m), and states expanded.
+    """Return world points (k, 3) of a route over a lattice of this step (m), and the number of states expanded.
 
-    (0, 3) if there is none. pause: called after every `STATES_AT_ONCE` states; an exception raised there stops the
+    (0, 3) without a route. pause: called after every `STATES_AT_ONCE` states; an exception raised there stops the
     search. max_states: maximum number of expanded states.
     """
     lattice = make_lattice(data, frame, step)
@@ -388,7 +393,7 @@ def lattice_route(
 def ceiling_route(
     data: ProblemArrays, frame: RotatedFrame, step: float, closer: float, pause: Callable[[], None] = lambda: None
 ) -> Floats:
-    """World points (k, 3) of a route at the height of the ceiling, where spheres on the ground are smallest.
+    """Return world points (k, 3) of a route at the height of the ceiling, where spheres on the ground are smallest.
 
     It climbs to the ceiling at its start and leaves it at its destination, however steeply: a lattice of a single layer
     is searched in milliseconds. step: m. closer: how far it may enter missiles' spheres, m. pause: as in

@@ -30,12 +30,24 @@ from world.kernels import Record, Records, compiled, copy_into, inner
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Prices of violations, in length ratios per unit of turn (rad), slope, terrain (m x km), bounds (m) and exposure.
-TURN_PRICE, SLOPE_PRICE, TERRAIN_PRICE, BOUNDS_PRICE, EXPOSURE_PRICE = 2.0, 20.0, 0.5, 1.0, 5.0
+# Price of a turn violation, length ratio per rad.
+TURN_PRICE = 2.0
+# Price of a slope violation, length ratio per unit of slope.
+SLOPE_PRICE = 20.0
+# Price of a terrain violation, length ratio per m x km.
+TERRAIN_PRICE = 0.5
+# Price of a bounds violation, length ratio per m.
+BOUNDS_PRICE = 1.0
+# Price of exposure, length ratio per unit of exposure.
+EXPOSURE_PRICE = 5.0
 # Price of any exposure at all: a sphere that is barely entered has almost none.
 EXPOSED = 0.002
-# Initial steps: along and across as shares of the interval between waypoints; up in m.
-FIRST_ALONG, FIRST_ACROSS, FIRST_UP = 0.2, 0.15, 25.0
+# Initial step along, as a fraction of the interval between waypoints.
+FIRST_ALONG = 0.2
+# Initial step across, as a fraction of the interval between waypoints.
+FIRST_ACROSS = 0.15
+# Initial step up, m.
+FIRST_UP = 25.0
 # Smallest step of a move, as a share of its initial step.
 MIN_STEP = 0.002
 
@@ -116,7 +128,7 @@ def search_patterns(
 
 
 def merits(scores: Floats) -> Floats:
-    """Merits (n,), which the search minimises, of scores (n, 8) by `planner.plan.Violation` and `Objective`."""
+    """Return merits (n,), which the search minimises, of scores (n, 8) by `planner.plan.Violation` and `Objective`."""
     prices = np.array([TURN_PRICE, SLOPE_PRICE, TERRAIN_PRICE, BOUNDS_PRICE])
     count = len(prices)
     ratio, exposure = scores[:, count + Objective.LENGTH_RATIO], scores[:, count + Objective.KILL_EXPOSURE]
@@ -126,7 +138,10 @@ def merits(scores: Floats) -> Floats:
 
 @cache
 def _triangular_basis(inner: int) -> tuple[Floats, Ints]:
-    """Moves (k, 3 inner): triangles with half-widths of 1, 2, 4, ... waypoints; and the axis (k,) of each."""
+    """Return moves (k, 3 inner): triangles with half-widths of 1, 2, 4, ... waypoints.
+
+    And the axis (k,) of each.
+    """
     rows: list[Floats] = []
     axes: list[int] = []
     place = np.arange(inner, dtype=np.float64)
@@ -163,7 +178,7 @@ def _merit(
     best: float,
     shortest: float,
 ) -> tuple[float, bool]:  # pragma: no cover - compiled
-    """Length ratio plus priced violations, and whether the path is feasible.
+    """Return the length ratio plus priced violations, and whether the path is feasible.
 
     Parts of a path's evaluation only add to its merit: it ends as soon as that reaches `best`, and `shortest` if the
     path is still feasible. What is returned then is no less than these, either.
@@ -211,7 +226,7 @@ def _price(violations: Record, objectives: Record) -> tuple[float, bool]:  # pra
 def _begin_search(
     data: ProblemArrays, frames: WaypointFrames, start: Floats, steps: Floats
 ) -> _State:  # pragma: no cover - compiled
-    """The search at a vector (d,), with moves of these initial steps (k,), which it modifies."""
+    """Return the search at a vector (d,), with moves of these initial steps (k,), which it modifies."""
     limits, candidate = precompute_limits(data), _make_candidate(data, start.size // 3 + 2)
     best, fit = _merit(data, limits, frames, start, candidate, math.inf, math.inf)
     feasible = np.full(start.size, np.inf)
@@ -241,7 +256,7 @@ def _continue_search(
     until: int,
     max_evaluations: int,
 ) -> _State:  # pragma: no cover - compiled
-    """The search, with moves (k, d) of initial steps `first` (k,), until at least so many evaluations are made."""
+    """Continue a search, with moves (k, d) of initial steps `first` (k,), for at least `max_evaluations`."""
     here, best, feasible, shortest, before, steps, move, alive, made, _ = state
     limits, candidate, trial = precompute_limits(data), _make_candidate(data, here.size // 3 + 2), here.copy()
     while made < max_evaluations:

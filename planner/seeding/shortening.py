@@ -37,8 +37,16 @@ Floats = NDArray[np.float64]
 DAMPING = 2e-4
 # Longest step of a waypoint along an axis, m.
 MAX_STEP = 80.0
-# Penalties of the first and the last round, 1 / m; number of rounds, of steps per round, and of halvings per step.
-FIRST_PENALTY, LAST_PENALTY, ROUNDS, STEPS, HALVINGS = 0.1, 1.0, 9, 5, 5
+# Penalty of the first round, 1 / m.
+FIRST_PENALTY = 0.1
+# Penalty of the last round, 1 / m.
+LAST_PENALTY = 1.0
+# Number of rounds.
+ROUNDS = 9
+# Number of steps per round.
+STEPS = 5
+# Number of halvings per step.
+HALVINGS = 5
 # A round ends with a step that moves no waypoint further than this, m.
 STILL = 0.05
 
@@ -87,7 +95,7 @@ class Shortening(NamedTuple):
 def begin_shortening(
     data: ProblemArrays, path: Floats, samples: int, extra_margin: float, corners_too: bool
 ) -> Shortening:  # pragma: no cover - compiled
-    """The shortening of a path (w, 3) m before its first round.
+    """Return the shortening of a path (w, 3) m before its first round.
 
     samples: of the ground on each leg. extra_margin: additional margin to spheres and ground, m. corners_too: see
     `active_constraints`.
@@ -111,7 +119,7 @@ class _Descent(NamedTuple):
 def continue_shortening(
     data: ProblemArrays, under_way: Shortening, extra_margin: float, max_rounds: int
 ) -> Shortening:  # pragma: no cover - compiled
-    """The shortening after up to `max_rounds` further rounds."""
+    """Return the shortening after up to `max_rounds` further rounds."""
     here, active, multipliers, number, made, corners_too = under_way
     limits, size = precompute_limits(data), 3 * (here.shape[0] - 2)
     descent = _Descent(
@@ -148,7 +156,10 @@ def _descend(
     penalty: float,
     descent: _Descent,
 ) -> int:  # pragma: no cover - compiled
-    """Minimise over a path (w, 3), in place, and fill the constraints' values at the end; models evaluated."""
+    """Minimise over a path (w, 3), in place, and fill the constraints' values at the end.
+
+    Models evaluated.
+    """
     low, high, model, step, trial = descent.low, descent.high, descent.model, descent.step, descent.trial
     merit, made = lagrangian(data, limits, active, here, multipliers, values, penalty, model), 1
     for _ in range(STEPS):
@@ -177,8 +188,12 @@ def _descend(
 
 # --- Shortening a path ---
 
-# Spacing of ground samples on the mean leg (m), and limits on their number per leg.
-SAMPLE_PITCH, MIN_SAMPLES, MAX_SAMPLES = 30.0, 6, 48
+# Spacing of ground samples on the mean leg, m.
+SAMPLE_PITCH = 30.0
+# Minimum number of ground samples per leg.
+MIN_SAMPLES = 6
+# Maximum number of ground samples per leg.
+MAX_SAMPLES = 48
 # Additional margin to spheres and ground, m: the accuracy that the last steps reach.
 EXTRA_MARGIN = 0.1
 # Maximum number of models per shortening.
@@ -195,9 +210,9 @@ def shorten_path(
     corners_too: bool = False,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, int]:
-    """A path (w, 3) world m, shorter or with smaller violations than this one, and the number of models evaluated.
+    """Shorten a path (w, 3) world m, or reduce its violations; also return the number of models evaluated.
 
-    A model counts as an evaluation. extra_margin: additional margin to spheres and ground, m. pause: called after some
+    A model is one evaluation. extra_margin: additional margin to spheres and ground, m. pause: called after some
     milliseconds of work; an exception raised there stops it. Zones and the maximum height above ground are ignored.
     corners_too: whether corners as flown are held clear of the ground and below the steepest slopes, which is slower.
 
@@ -225,7 +240,7 @@ def shorten_path(
 
 
 def resample(route: Floats, count: int) -> Floats:
-    """Waypoints (count, 3) at equal distances along a route (k, 3).
+    """Return waypoints (count, 3) at equal distances along a route (k, 3).
 
     >>> resample(np.array([[0.0, 0.0, 5.0], [30.0, 40.0, 5.0], [30.0, 90.0, 5.0]]), 5).tolist()
     [[0.0, 0.0, 5.0], [15.0, 20.0, 5.0], [30.0, 40.0, 5.0], [30.0, 65.0, 5.0], [30.0, 90.0, 5.0]]

@@ -58,9 +58,12 @@ Ints = NDArray[np.int64]
 
 # A sphere constrains the legs that come within this distance of its surface, m.
 NEAR = 250.0
-# Turns below the minimum are measured at it; above the maximum the tangent of half the turn is taken at the maximum
-# (rad). MAX_TURN_LENGTH: upper limit on the length that a turn takes of a leg, m.
-MIN_TURN, MAX_TURN, MAX_TURN_LENGTH = 0.2, 3.0, 1e4
+# Smallest turn, rad; smaller turns are measured at it.
+MIN_TURN = 0.2
+# Largest turn whose tangent of half the turn is taken, rad.
+MAX_TURN = 3.0
+# Upper limit on the length that a turn takes of a leg, m.
+MAX_TURN_LENGTH = 1e4
 
 
 class ActiveConstraints(NamedTuple):
@@ -154,7 +157,7 @@ def _turn_shares(
 def _near_missiles(
     data: ProblemArrays, path: Floats, corners: Records, lags: Records, extra_margin: float
 ) -> tuple[Ints, Floats]:  # pragma: no cover - compiled
-    """Legs and the missiles near them (p, 2), and the distances (p,) required from the missiles' centres, m."""
+    """Return legs and the missiles near them (p, 2), and the distances (p,) required from the missiles' centres, m."""
     missiles = data.missiles.missiles
     pairs, distances = [(0, 0) for _ in range(0)], [0.0 for _ in range(0)]
     for k in range(missiles.shape[0]):
@@ -185,7 +188,7 @@ def _near_missiles(
 
 @inner
 def constraint_count(active: ActiveConstraints) -> int:  # pragma: no cover - compiled
-    """Number of constraints of `lagrangian`."""
+    """Return the number of constraints of `lagrangian`."""
     legs = active.low.size
     count: int = active.pairs.shape[0] + legs * (active.samples + 4) + (legs + 1) * (3 + SAMPLES)
     return count
@@ -195,7 +198,7 @@ def constraint_count(active: ActiveConstraints) -> int:  # pragma: no cover - co
 def carry_multipliers(
     old: ActiveConstraints, multipliers: Floats, new: ActiveConstraints
 ) -> Floats:  # pragma: no cover - compiled
-    """Multipliers for new active constraints; those of new pairs of leg and missile start at 0."""
+    """Return the multipliers for new active constraints; those of new pairs of leg and missile start at 0."""
     out, many, before = np.zeros(constraint_count(new)), new.pairs.shape[0], old.pairs.shape[0]
     copy_into(out[many:], multipliers[before:])
     k = 0
@@ -219,12 +222,17 @@ BAND = 12
 TURN_LENGTH = 200.0
 # Shortest leg, m: slightly more than the scores require.
 SHORTEST_LEG = 15.0
-# Additional margin of slopes (m of height) and of leg lengths between turns, m: the accuracy that the last steps reach.
-SLOPE_MARGIN, TURN_MARGIN = 0.2, 1.0
+# Additional margin of slopes, m of height: the accuracy that the last steps reach.
+SLOPE_MARGIN = 0.2
+# Additional margin of leg lengths between turns, m: the accuracy that the last steps reach.
+TURN_MARGIN = 1.0
 
 
 class LagrangianModel(NamedTuple):
-    """Gradient (n,) and Hessian band (n, BAND) over the inner waypoints; and derivatives (4, 3) of one constraint."""
+    """Gradient (n,) and Hessian band (n, BAND) over the inner waypoints.
+
+    And derivatives (4, 3) of one constraint.
+    """
 
     gradient: Floats
     band: Floats
@@ -235,8 +243,9 @@ class LagrangianModel(NamedTuple):
 def _add(
     value: float, first: int, points: int, multiplier: float, penalty: float, model: LagrangianModel
 ) -> float:  # pragma: no cover - compiled
-    """Add a constraint on `points` waypoints from waypoint `first` to the model; returns its contribution to the merit.
+    """Add a constraint on `points` waypoints from waypoint `first` to the model.
 
+    Returns its contribution to the merit.
     Its derivatives with respect to these waypoints are in `model.slopes`.
     """
     push = multiplier - penalty * value
@@ -310,7 +319,10 @@ def _add_missiles(
     penalty: float,
     model: LagrangianModel,
 ) -> float:  # pragma: no cover - compiled
-    """Add the distances of legs from missiles, the first constraints; returns their contribution to the merit."""
+    """Add the distances of legs from missiles, the first constraints.
+
+    Returns their contribution to the merit.
+    """
     merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
     for p in range(active.pairs.shape[0]):
         i, missile = active.pairs[p, 0], missiles[active.pairs[p, 1]]
@@ -342,7 +354,10 @@ def _add_ground(
     model: LagrangianModel,
     at: int,
 ) -> float:  # pragma: no cover - compiled
-    """Add the heights of leg samples above the required height, constraints from `at`; see `_add_missiles`."""
+    """Add the heights of leg samples above the required height, constraints from `at`.
+
+    See `_add_missiles`.
+    """
     merit, slopes, heights, to_pixel = 0.0, model.slopes, data.heights, data.to_pixel
     for i in range(path.shape[0] - 1):
         for k in range(active.samples):
@@ -375,7 +390,10 @@ def _add_corners(
     model: LagrangianModel,
     at: int,
 ) -> float:  # pragma: no cover - compiled
-    """Add the heights of flown corners above the required height, and lengths of steep arcs; see `_add_missiles`."""
+    """Add the heights of flown corners above the required height, and lengths of steep arcs.
+
+    See `_add_missiles`.
+    """
     merit, point, up, corner = 0.0, np.empty(3), np.empty(3), np.empty((3, 3))
     for i in range(1, path.shape[0] - 1):
         radius = flown.radii[i]

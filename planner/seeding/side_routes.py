@@ -50,8 +50,9 @@ PASSING = np.dtype(
 
 
 class GridCosts(NamedTuple):
-    """Costs of the cheapest partial routes over a grid, (stages + 1, layers, across); inf if none is within the bound.
+    """Costs of the cheapest partial routes over a grid, (stages + 1, layers, across).
 
+    Inf if none is within the bound.
     reached: from the start; parents: the previous cell, as layer x width + across.
     left: to the destination; successors: the next cell.
     """
@@ -129,7 +130,7 @@ CELLS_AT_ONCE = 100_000
 def grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, pause: Callable[[], None] = lambda: None
 ) -> GridCosts:
-    """Costs of the cheapest partial routes over a grid, from its start and to its destination, up to a bound.
+    """Return the costs of the cheapest partial routes over a grid, from start and to destination, up to a bound.
 
     pause: called after every `CELLS_AT_ONCE` cells; an exception raised there stops the search.
     """
@@ -143,7 +144,7 @@ def grid_costs(
 
 @compiled
 def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> SideSearch:  # pragma: no cover - compiled
-    """A search that is at the start."""
+    """Return a search that is at the start."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     shape = (stages + 1, high, wide)
@@ -169,7 +170,7 @@ def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> Si
 def continue_grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, search: SideSearch, more: int
 ) -> SideSearch:  # pragma: no cover - compiled
-    """The search after up to `more` further stages, or ended if no route comes further."""
+    """Return the search after up to `more` further stages, or ended if no route comes further."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step, required = frame.length / stages, required_clearance(data)
     pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
@@ -208,7 +209,7 @@ def continue_grid_costs(
 
 @inlined
 def side_of(aside: float, above: float) -> int:  # pragma: no cover - compiled
-    """Side of a point given its offsets to the left of an obstacle's centre and above it."""
+    """Return the side of a point given its offsets to the left of an obstacle's centre and above it."""
     if abs(aside) >= abs(above):
         return LEFT if aside >= 0.0 else RIGHT
     return OVER if above > 0.0 else UNDER
@@ -218,7 +219,7 @@ def side_of(aside: float, above: float) -> int:  # pragma: no cover - compiled
 def cheapest_passings(
     costs: GridCosts, grid: Grid, obstacles: Records, step: float
 ) -> Records:  # pragma: no cover - compiled
-    """`PASSING` records (obstacles, 4) of the cheapest route past each `OBSTACLE` on each side, by `side_of`.
+    """Return `PASSING` records (obstacles, 4) of the cheapest route past each `OBSTACLE` on each side, by `side_of`.
 
     A route passes an obstacle at the stage nearest to its centre; obstacles beyond the ends have none.
     """
@@ -242,7 +243,7 @@ def cheapest_passings(
 
 @compiled
 def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Records:  # pragma: no cover - compiled
-    """`ROUTE_CELL` records (stages + 1,) of the cheapest route through a cell."""
+    """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route through a cell."""
     last, wide = costs.successors.shape[0] - 1, costs.successors.shape[2]
     cells = np.zeros(last + 1, dtype=ROUTE_CELL)
     before = trace_back(costs.parents[: stage + 1], layer, across)
@@ -262,8 +263,9 @@ SAME_WAY = 100.0
 
 
 def sides_passed(points: Floats, obstacles: Records) -> Ints:
-    """Sides (k,) on which a route's points (s, 3) along, across, up pass `OBSTACLE` records; -1 beyond its ends.
+    """Return sides (k,) on which a route's points (s, 3) along, across, up pass `OBSTACLE` records.
 
+    -1 beyond its ends.
     Routes with the same sides can be deformed into each other without touching an obstacle. Routes with different sides
     are assumed not to be, although a route over a sphere on the ground can be moved to either side.
     """
@@ -285,7 +287,7 @@ def side_routes(
     max_routes: int,
     pause: Callable[[], None] = lambda: None,
 ) -> list[GridRoute]:
-    """Up to `max_routes` routes with different sides and a cost of at most `bound`, cheapest first.
+    """Return up to `max_routes` routes with different sides and a cost of at most `bound`, cheapest first.
 
     Each is the cheapest that passes one obstacle on one side; the first is the cheapest of all. Of routes close to each
     other only the cheapest is returned. pause: as in `grid_costs`.
@@ -325,7 +327,7 @@ def optimistic_grid(
     spread: float,
     ratio: float,
 ) -> Grid:
-    """A grid with reduced kill spheres and ground taken from a smaller area around each cell: see `Grid`.
+    """Return a grid with reduced kill spheres and ground taken from a smaller area around each cell: see `Grid`.
 
     Its highest layer is the ceiling, where spheres on the ground are smallest.
     """

@@ -61,7 +61,7 @@ class WaypointChains(NamedTuple):
     legs: int
 
     def path_through(self, waypoint: int, candidate: int) -> Ints:
-        """The candidates (w,) of the best path through one."""
+        """Return the candidates (w,) of the best path through one."""
         out = np.empty(len(self.cost), dtype=np.int64)
         out[waypoint] = candidate
         for i in range(waypoint, 0, -1):
@@ -78,8 +78,9 @@ def waypoint_chains(
     pause: Callable[[], None] = lambda: None,
     max_legs: int = ALL_LEGS,
 ) -> WaypointChains:
-    """Best paths through candidates (w, k, 3) world m; of the ends only the first candidate is used.
+    """Return the best paths through candidates (w, k, 3) world m.
 
+    Of the ends only the first candidate is used.
     bound: upper limit on the cost of a path, m; pruning by it saves time. pause: called after every `LEGS_AT_ONCE`
     legs; an exception raised there stops the work. max_legs: there are no paths where more have to be evaluated.
     """
@@ -136,7 +137,10 @@ def _advance(
 def _through(
     data: ProblemArrays, candidates: Floats, bound: float, sweeps: _Sweeps
 ) -> Floats:  # pragma: no cover - compiled
-    """Cost of the best path through each candidate, its turn there included; inf above the bound."""
+    """Return the cost of the best path through each candidate, its turn there included.
+
+    Inf above the bound.
+    """
     limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
     cost = sweeps.forward + sweeps.backward
     for i in range(1, candidates.shape[0] - 1):
@@ -164,8 +168,9 @@ def _extend(
     lower_bounds: Floats,
     corners: Records,
 ) -> int:  # pragma: no cover - compiled
-    """Extend partial paths with costs (w, k) to candidate k of waypoint i; returns the number of legs evaluated.
+    """Extend partial paths with costs (w, k) to candidate k of waypoint i.
 
+    Returns the number of legs evaluated.
     step: 1 for paths from the start, -1 from the destination. link: (w, k) neighbouring candidate of each partial path.
     max_cost: upper limit on the cost of a partial path. open_ends: candidates of the previous waypoint with partial
     paths. lower_bounds, corners: scratch.
@@ -206,7 +211,7 @@ def _extend(
 
 @inlined
 def _lowest(values: Floats, count: int) -> int:  # pragma: no cover - compiled
-    """Index of the lowest of the first `count` values."""
+    """Return the index of the lowest of the first `count` values."""
     lowest = 0
     for k in range(1, count):
         lowest = k if values[k] < values[lowest] else lowest
@@ -222,7 +227,7 @@ def _distance(a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
 def _corner_cost(
     data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, c: Floats, corners: Records
 ) -> float:  # pragma: no cover - compiled
-    """Cost of the turn at b between a and c: its excess over the limit, and the lack of leg length for it.
+    """Return the cost of the turn at b between a and c: its excess over the limit, and the lack of leg length for it.
 
     corners: scratch, one record.
     """
@@ -245,7 +250,7 @@ def _corner_cost(
 
 @compiled
 def free_points(data: ProblemArrays, points: Floats) -> Flags:  # pragma: no cover - compiled
-    """Whether points (n, 3), world m, are on the map, above the required clearance and outside all kill spheres, (n,).
+    """Return True for points (n, 3), world m, on the map, above the clearance and outside all kill spheres.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem

@@ -35,8 +35,9 @@ ROUNDING = 1e-3
 def leg_cost(
     data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, enough: float
 ) -> float:  # pragma: no cover - compiled
-    """Cost of one leg, in m of path: its length and its violations; a lower bound on it where that exceeds `enough`.
+    """Return the cost of one leg, in m of path: its length and its violations.
 
+    A lower bound on it where that exceeds `enough`.
     The rest is not evaluated then.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
@@ -94,7 +95,10 @@ def leg_cost(
 def _below(
     data: ProblemArrays, limits: PrecomputedLimits, east: float, north: float, run: float, low: float, high: float
 ) -> float:  # pragma: no cover - compiled
-    """Largest distance of the aircraft below a long leg, m; negative above. east, north: its unit course."""
+    """Return the largest distance of the aircraft below a long leg, m.
+
+    Negative above. east, north: its unit course.
+    """
     rise = high - low
     if abs(rise) < data.tracking.step:
         return -rise
@@ -104,7 +108,10 @@ def _below(
 
 @compiled
 def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:  # pragma: no cover - compiled
-    """Candidates (w, c, 3) chosen at each waypoint to minimise the sum of leg costs; number of legs evaluated."""
+    """Return candidates (w, c, 3) chosen at each waypoint to minimise the sum of leg costs.
+
+    Number of legs evaluated.
+    """
     count, width, _ = candidates.shape
     parents = np.zeros((count, width), dtype=np.int64)
     cost = np.full(width, np.inf)
@@ -154,8 +161,12 @@ class WaypointFit:
     diagonal: bool
 
 
-# Initial moves of a waypoint: shares of the interval along and across, and m up; and their reduction per round.
-FIRST_MOVES, SHRINK, LAST_SHRINK = (0.25, 0.2, 40.0), 0.7, 0.6
+# Initial moves of a waypoint: fractions of the interval along and across, and m up.
+FIRST_MOVES = (0.25, 0.2, 40.0)
+# Reduction of the moves per round.
+SHRINK = 0.7
+# Reduction of the moves in the last rounds.
+LAST_SHRINK = 0.6
 CLOSE_FIT, QUICK_FIT = (
     WaypointFit(9, (0.0, 20.0, 60.0), 2, diagonal=True),
     WaypointFit(5, (0.0, 20.0, 60.0), 2, diagonal=False),
@@ -168,7 +179,7 @@ _AXIS_NEIGHBOURS = _NEIGHBOURS[np.abs(_NEIGHBOURS).sum(axis=1) <= 1.0]
 def fit_waypoints(
     data: ProblemArrays, frame: RotatedFrame, route: Floats, waypoints: int, fit: WaypointFit = CLOSE_FIT
 ) -> Floats:
-    """Waypoints (w, 3) world m along a route (s, 3) in rotated axes, one per interval, chosen by whole legs."""
+    """Return waypoints (w, 3) world m along a route (s, 3) in rotated axes, one per interval, chosen by whole legs."""
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     span = edges[1] - edges[0]
     shares = np.linspace(0.1, 0.9, fit.candidates)
@@ -178,7 +189,7 @@ def fit_waypoints(
 
 
 def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit: WaypointFit = CLOSE_FIT) -> Floats:
-    """Waypoints (w, 3) world m: each one of its candidates (w - 2, k, 3) in its frame, then moved locally."""
+    """Return waypoints (w, 3) world m: each one of its candidates (w - 2, k, 3) in its frame, then moved locally."""
     inner, width, _ = points.shape
     candidates = np.zeros((inner + 2, width * len(fit.lifts), 3))
     candidates[1:-1] = np.tile(points, (1, len(fit.lifts), 1))
@@ -211,7 +222,10 @@ def _move(
     moves: Floats,
     shrink: float,
 ) -> tuple[Floats, int]:
-    """Waypoints (w, 3) in their frames after rounds of moves of up to `moves` along, across, up; legs evaluated."""
+    """Return waypoints (w, 3) in their frames after rounds of moves of up to `moves` along, across, up.
+
+    Legs evaluated.
+    """
     legs = 0
     low, high = frames.edges[:-1, None], frames.edges[1:, None]
     span = frames.edges[-1] / (len(chosen) - 2)
@@ -238,7 +252,7 @@ def _pick(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tu
 
 
 def _restore(frames: WaypointFrames, candidates: Floats) -> Floats:
-    """World positions of candidates (w, c, 3), those of the ends in the frame of the waypoint next to each."""
+    """Return world positions of candidates (w, c, 3), those of the ends in the frame of the waypoint next to each."""
     rows = np.clip(np.arange(len(candidates)) - 1, 0, len(candidates) - 3)
     east, north, cosine, sine = (values[rows] for values in frames[:4])
     of_rows = WaypointFrames(east, north, cosine, sine, frames.edges)

@@ -1,1 +1,1 @@
-"""What a number of flights says of the probability that one flies."""
+"""Estimation of the probability of a flyable flight from a number of flights."""

@@ -1,24 +1,25 @@
-"""Regressions on the wind and what was drawn: of who failed, and by how little others passed.
+"""Regressions of failures, and of the margins of passed flights, on the wind and the drawn quantities.
 
-The probability to fail is a link's function of a + b * wind + c . draws.  Three likelihoods are had of it:
+The probability of failure is a link function of a + b * wind + c . draws.  Three likelihoods are available:
 
-- of who failed alone, a binary regression;
-- of who failed and by how little others passed, by one law: the share of flights that pass by less than some margin is
-  the same function with k * margin added, k of it to a scale's length, so that the margin has the link's law and 1/k is
-  its scale.  Of a failed flight only that it failed counts, of one that passed by a scale or more only that, so that no
-  law is asked to hold far from failing: a regression censored on both sides (Tobin, "Estimation of relationships for
-  limited dependent variables", Econometrica 26, 1958; Rosett and Nelson, "Estimation of the two-limit probit regression
-  model", Econometrica 43, 1975);
-- of the margin alone, given that a flight passed: the same regression truncated at no margin.
+- of the failures alone, a binary regression;
+- of the failures and the margins of passed flights, with one distribution: the share of flights that pass by less than
+  a given margin is the same function with k * margin added, so that the margin has the link's distribution with scale
+  1/k, in units of the margin's scale.  A failed flight only contributes that it failed, and a flight that passed by a
+  scale or more only that it did, so that the distribution need not hold far from failure: a regression censored on both
+  sides (Tobin, "Estimation of relationships for limited dependent variables", Econometrica 26, 1958; Rosett and Nelson,
+  "Estimation of the two-limit probit regression model", Econometrica 43, 1975);
+- of the margin alone, given that a flight passed: the same regression truncated at zero margin.
 
-Priors are weak and normal, of b's logarithm and of the others themselves.  Which flight tells most, and the evidence
-for a link and for how wide a prior the draws' coefficients have, follow from the posterior as normal about its mode
-(Gelman et al., Bayesian Data Analysis, 3rd edition, 2013, chapters 4.1, 7.4 and 16.3; MacKay, "Bayesian Interpolation",
-Neural Computation 4, 1992).  Where few flights failed it is far from that: the boundary rests on a sample of the
-posterior itself (`importance_sampling`).
+Priors are weak and normal, on the logarithm of b and on the other coefficients themselves.  The most informative
+flight, and the evidence for a link and for the prior width of the draws' coefficients, follow from a normal
+approximation of the posterior about its mode (Gelman et al., Bayesian Data Analysis, 3rd edition, 2013, chapters 4.1,
+7.4 and 16.3; MacKay, "Bayesian Interpolation", Neural Computation 4, 1992).  With few failures the posterior is far
+from normal: the boundary is computed from a sample of the posterior itself (`importance_sample`).
 
 statsmodels 0.15 has no regression censored on both sides and no priors: its Probit needs 1.6 to 1.7 times the flights
-for the same error of the boundary (64 for 40, 139 for 80), and of 20 flights gives none in one case of nine.
+for the same error of the boundary (64 instead of 40, 139 instead of 80), and gives no result for 20 flights in one case
+of nine.
 """
 
 from collections.abc import Callable
@@ -34,47 +35,49 @@ Bools = NDArray[np.bool_]
 
 
 # ----------------------------------------------------------------------
-# The links of a binary regression: the probability to fail as a function of a linear predictor.
+# Links of a binary regression: the probability of failure as a function of a linear predictor.
 #
-# `PROBIT` is that of a threshold which is distributed normally; `CLOGLOG` (complementary log-log) that of the least of
-# many thresholds, Gumbel's law for minima, whose tail towards little wind is the longer one (McCullagh and Nelder,
+# `PROBIT` corresponds to a normally distributed threshold; `CLOGLOG` (complementary log-log) to the smallest of many
+# thresholds, the Gumbel distribution for minima, with its longer tail towards low wind (McCullagh and Nelder,
 # Generalized Linear Models, 2nd edition, 1989, section 4.3).
 
 
-# exp of more than this is more than any number; and the least number that is not taken as none.
-_MAX_EXPONENT, _MIN_PROBABILITY = 700.0, 1e-300
+# Largest exponent for which exp does not overflow.
+_MAX_EXPONENT = 700.0
+# Lower limit of probabilities that are divided by.
+_MIN_PROBABILITY = 1e-300
 
 
 class BinaryLink(Protocol):
-    """All of predictors in an array of any shape, and each of the same shape."""
+    """Link function; all methods take predictors in an array of any shape and return the same shape."""
 
     def log_cdf(self, x: Floats) -> Floats:
-        """Logarithm of the probability to fail."""
+        """Return the logarithm of the probability of failure."""
 
     def log_survival(self, x: Floats) -> Floats:
-        """Logarithm of the probability to fly."""
+        """Return the logarithm of the probability of success."""
 
     def survival(self, x: Floats) -> Floats:
-        """Probability to fly."""
+        """Return the probability of success."""
 
     def density(self, x: Floats) -> Floats:
-        """Derivative of the probability to fail."""
+        """Return the derivative of the probability of failure."""
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
-        """Fisher's, of a flight about its predictor.
+        """Return the Fisher information of a flight about its predictor.
 
-        width: of predictors above its own; a flight that passed by less than this states its margin, so that 0 is
-        for one that states only whether it failed.
+        width: range of predictors above its own within which a passed flight gives its margin; 0 for a flight that
+        only gives pass or fail.
         """
 
     def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
-        """First and second derivative of the logarithm of the probability of what came out."""
+        """Return first and second derivative of the log-probability of the outcome."""
 
     def log_density(self, x: Floats) -> Floats:
-        """Logarithm of `density`."""
+        """Return the logarithm of `density`."""
 
     def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
-        """First and second derivative of `log_density`."""
+        """Return first and second derivative of `log_density`."""
 
 
 class _Probit:
@@ -101,7 +104,8 @@ class _Probit:
         from scipy.special import ndtr
 
         more = x + width
-        # Of one that fails and of one that passes by more, and between them the law's mean square there.
+        # Information of a failure and of a pass by more than the width, then of a pass between them (mean square
+        # score).
         ends = self.density(x) ** 2 / np.maximum(ndtr(x), _MIN_PROBABILITY) + self.density(more) ** 2 / np.maximum(
             ndtr(-more), _MIN_PROBABILITY
         )
@@ -114,7 +118,7 @@ class _Probit:
 
         sign = np.where(failed, 1.0, -1.0)
         z = sign * x
-        # By logarithms, for Phi is 0 long before its logarithm's derivative is.
+        # By logarithms, as Phi underflows to 0 long before the derivative of its logarithm does.
         ratio = np.exp(-0.5 * z * z - 0.5 * np.log(2.0 * np.pi) - log_ndtr(z))
         return sign * ratio, -ratio * (z + ratio)
 
@@ -129,7 +133,7 @@ class _Probit:
 class _ComplementaryLogLog:
     def log_cdf(self, x: Floats) -> Floats:
         with np.errstate(divide="ignore"):
-            # Where the rate is 0, the probability is the rate.
+            # For a tiny rate the probability equals the rate.
             out: Floats = np.where(x < -30.0, x, np.log(-np.expm1(self.log_survival(x))))
         return out
 
@@ -147,7 +151,7 @@ class _ComplementaryLogLog:
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
         rate, more = (np.exp(np.clip(at, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT)) for at in (x, x + width))
-        # As the probit's: of those that fail rate * ratio * exp(-rate), of the others by integrals over the rate.
+        # As for the probit: rate * ratio * exp(-rate) for failures, integrals over the rate for passes.
         fails = rate * _rate_ratio(rate) * np.exp(-rate)
         between = np.maximum(_square_above(rate) - _square_above(more), 0.0)
         out: Floats = fails + between + more * more * np.exp(-more)
@@ -169,13 +173,13 @@ class _ComplementaryLogLog:
 
 
 def _square_above(rate: Floats) -> Floats:
-    """Integral of (1 - r)^2 exp(-r) from a rate on."""
+    """Return the integral of (1 - r)^2 exp(-r) from a rate to infinity."""
     out: Floats = (rate * rate + 1.0) * np.exp(-rate)
     return out
 
 
 def _rate_ratio(rate: Floats) -> Floats:
-    """Rate / (exp(rate) - 1): near 1 for a small rate, 0 for a large one."""
+    """Return rate / (exp(rate) - 1): near 1 for a small rate, 0 for a large one."""
     with np.errstate(over="ignore"):
         out: Floats = rate / np.expm1(rate)
     return out
@@ -187,36 +191,39 @@ LINKS = (PROBIT, CLOGLOG)
 
 
 # ----------------------------------------------------------------------
-# A sample of a distribution of which only the density's logarithm, up to a constant, can be had.
+# Sample of a distribution of which only the log-density is known, up to a constant.
 #
 # Importance sampling (Robert and Casella, Monte Carlo Statistical Methods, 2nd edition, 2004, chapters 3.3 and 14.3):
-# the
-# points are those of a multivariate t distribution about the mode, whose tails are longer than a posterior's, evenly
-# spread by Sobol's sequence; each weighs by how much likelier it is than t has it.  They are then drawn again by their
-# weights, so that all that are left weigh the same: systematically in the order of the first coordinate (Kitagawa,
-# "Monte
-# Carlo filter and smoother for non-Gaussian nonlinear state space models", Journal of Computational and Graphical
-# Statistics 5, 1996), for in the order of the sequence, which repeats itself, every second point may be on one side.
+# the points are drawn from a multivariate t distribution about the mode, with longer tails than a posterior, evenly
+# spread by Sobol's sequence; the weight of each point is the ratio of the two densities.  The points are then resampled
+# by their weights, so that the remaining points have equal weights: systematically in the order of the first coordinate
+# (Kitagawa, "Monte Carlo filter and smoother for non-Gaussian nonlinear state space models", Journal of Computational
+# and Graphical Statistics 5, 1996), because in the order of the sequence, which repeats itself, every second point may
+# be on one side.
 
-# Degrees of freedom of the t distribution, and how many of its points are weighed for each that is left.
-_FREEDOM, _WEIGHED = 6.0, 2
+# Degrees of freedom of the t distribution.
+_DEGREES_OF_FREEDOM = 6.0
+# Number of weighted points for each resampled point.
+_POINTS_PER_SAMPLE = 2
+# Seed of the sequence and of the final order.
 _SEED = 1
 
 
 def importance_sample(
     log_density: Callable[[Floats], Floats], middle: Floats, covariance: Floats, count: int
 ) -> Floats:
-    """(count, k) points of a distribution, each as likely as the other, in no order; most even in the first coordinate.
+    """Return (count, k) equally likely points of a distribution, in random order.
 
-    log_density: of (n, k) points (n,), up to a constant; -inf where there is none.
-    middle, covariance: (k,) and (k, k), about those of the distribution.  count: a power of two.
-    Raises LinAlgError where the covariance is not positive definite.
+    The points are spread most evenly in the first coordinate.
+    log_density: log-density (n,) of points (n, k), up to a constant; -inf for zero density.
+    middle, covariance: (k,) and (k, k), approximate mean and covariance of the distribution.  count: a power of two.
+    Raises LinAlgError if the covariance is not positive definite.
 
     >>> sample = importance_sample(lambda x: -0.5 * x[:, 0] ** 2, np.ones(1), np.eye(1), 256)
     >>> round(float(sample.std()), 1)
     1.0
     """
-    standard, log_proposal = _t_points(middle.size, _WEIGHED * count)
+    standard, log_proposal = _t_points(middle.size, _POINTS_PER_SAMPLE * count)
     points = middle + standard @ np.linalg.cholesky(covariance).T
     logs = log_density(points) - log_proposal
     order = np.argsort(points[:, 0], kind="stable")
@@ -229,41 +236,57 @@ def importance_sample(
 
 @lru_cache
 def _t_points(size: int, count: int) -> tuple[Floats, Floats]:
-    """(count, size) points of the standard t distribution, and (count,) the logarithm of its density there."""
+    """Return (count, size) points of the standard t distribution, and the log-density (count,) there."""
     from scipy.stats import chi2, norm, qmc
 
-    # A power of two: the points of Sobol's sequence are balanced then.
+    # With a power of two points, Sobol's sequence is balanced.
     shares = qmc.Sobol(size + 1, seed=_SEED).random(count).clip(1e-12, 1.0 - 1e-12)
-    points = norm.ppf(shares[:, :size]) / np.sqrt(chi2.ppf(shares[:, size:], _FREEDOM) / _FREEDOM)
-    return points, -0.5 * (_FREEDOM + size) * np.log1p((points * points).sum(axis=1) / _FREEDOM)
+    points = norm.ppf(shares[:, :size]) / np.sqrt(chi2.ppf(shares[:, size:], _DEGREES_OF_FREEDOM) / _DEGREES_OF_FREEDOM)
+    return points, -0.5 * (_DEGREES_OF_FREEDOM + size) * np.log1p((points * points).sum(axis=1) / _DEGREES_OF_FREEDOM)
 
 
-# Standard deviation of the prior of the constant.  More wind never has fewer fail: the wind's coefficient, 1/(m/s), is
-# above 0, and its logarithm normal; it changes a probit by one within 0.3 to 14 m/s at 95 %.
-_CONSTANT, _WIND, _WIND_FACTOR = 20.0, 0.5, 1.0
-# Of the draws' coefficients, a draw being in units of its own standard deviation: of these the one that flights are
-# most evidence for.  Where draws decide little, a wide prior for them would have chance look like knowledge.
-_DRAWS = (0.1, 0.4, 1.5)
-# Of the margin's coefficient, 1/scale, of which only what is above 0 is meant.
-_MARGIN = 10.0
-# Where Newton's method begins: few fail, and more in more wind; and of the margin's coefficient.
-_START, _MARGIN_START = (-3.0, np.log(0.3)), 1.0
-_STEPS, _CONVERGED, _MIN_SHARE, _MIN_CURVATURE, _MAX_LOGARITHM = 100, 1e-8, 1e-9, 1e-9, 5.0
-_OF_THE_WAY = 0.9
-# Of a flight that passed, on either link's scale.
+# Standard deviation of the normal prior of the constant.
+_CONSTANT_SIGMA = 20.0
+# Median of the prior of the wind's coefficient, 1/(m/s).  More wind never causes fewer failures: the coefficient is
+# positive, with a normal prior of its logarithm; it changes a probit by one within 0.3 to 14 m/s at 95 %.
+_WIND_MEDIAN = 0.5
+# Standard deviation of the prior of the coefficient's logarithm.
+_WIND_LOG_SIGMA = 1.0
+# Standard deviations of the prior of the draws' coefficients, for draws in units of their own standard deviations; the
+# one with the most evidence is used.  If draws have little effect, a wide prior would mistake chance for knowledge.
+_DRAW_SIGMAS = (0.1, 0.4, 1.5)
+# Standard deviation of the prior of the margin's coefficient, 1/scale, which is truncated to positive values.
+_MARGIN_SIGMA = 10.0
+# Start of Newton's method, constant and log of the wind's coefficient: few failures, and more in more wind.
+_START = (-3.0, np.log(0.3))
+# Start of the margin's coefficient.
+_MARGIN_START = 1.0
+# Maximum number of Newton steps.
+_MAX_STEPS = 100
+# Largest component of a step at convergence.
+_STEP_TOLERANCE = 1e-8
+# Smallest fraction of a Newton step.
+_MIN_STEP_FRACTION = 1e-9
+# Lower limit of the absolute eigenvalues of the curvature.
+_MIN_CURVATURE = 1e-9
+# Upper limit of the logarithm of the wind's coefficient.
+_MAX_LOGARITHM = 5.0
+# Largest step of the margin's coefficient towards 0, as a fraction of its value.
+_MAX_MARGIN_STEP_FRACTION = 0.9
+# Largest predictor of a passed flight, for both links; beyond it a pass is practically impossible.
 _MAX_PREDICTOR = 30.0
-# Points of a posterior's sample.
-_SAMPLE = 512
+# Number of points in a sample of a posterior.
+_SAMPLE_SIZE = 512
 
 
 @dataclass(frozen=True, slots=True)
 class Outcomes:
-    """What came of n flights by one way.
+    """Outcomes of n flights for one failure mode.
 
-    terms: (n, 2 + d) of each flight: one, the wind from some origin, and what was drawn.
+    terms: (n, 2 + d) terms of each flight: one, the wind relative to some origin, and the draws.
     failed: (n,).
-    margin: (n,) by what share of a scale each passed: 1 for a scale or more, 0 for not known or failed.
-    given_passed: whether that a flight passed is given, and only by how much counts.
+    margin: (n,) margin of each passed flight as a fraction of a scale: 1 for a scale or more, 0 for unknown or failed.
+    given_passed: True to condition on a pass, so that only the margin is informative.
     """
 
     terms: Floats
@@ -273,26 +296,26 @@ class Outcomes:
 
     @property
     def narrow(self) -> Bools:
-        """(n,) which passed by less than a scale, and by how much."""
+        """Flights (n,) that passed by a known margin of less than a scale."""
         return (self.margin > 0.0) & (self.margin < 1.0)
 
     def without_margin(self) -> "Outcomes":
-        """Who failed alone."""
+        """Return the outcomes with pass or fail alone."""
         return Outcomes(self.terms, self.failed, np.zeros_like(self.margin))
 
     def only_margin(self) -> "Outcomes":
-        """Of those that passed with a margin that is known, by how much alone."""
+        """Return the outcomes of the flights with a known margin, given that they passed."""
         known = self.margin > 0.0
         return Outcomes(self.terms[known], self.failed[known], self.margin[known], given_passed=True)
 
 
 @dataclass(frozen=True)
 class RegressionFit:
-    """A posterior.
+    """Posterior of a regression.
 
-    mean, covariance: (2 + d,) and (2 + d, 2 + d) of the coefficients of the terms, as of a normal law about the mode.
-    log_evidence: of what came out.
-    by_margin: by how much the predictor falls for a scale of margin; 0 where no margin is known.
+    mean, covariance: (2 + d,) and (2 + d, 2 + d) of the terms' coefficients, as a normal approximation about the mode.
+    log_evidence: logarithm of the evidence of the outcomes.
+    by_margin: decrease of the predictor per scale of margin; 0 if no margin is known.
     """
 
     mean: Floats
@@ -303,14 +326,15 @@ class RegressionFit:
     _mode: Floats
 
     def sample(self) -> Floats:
-        """(s, 2 + d) coefficients of the terms, each as likely as the other, the wind's above 0."""
+        """Return (s, 2 + d) equally likely coefficients of the terms, with a positive coefficient of the wind."""
         return self._posterior.sample(self._mode)
 
 
 def fit_regression(outcomes: Outcomes, link: BinaryLink, near: RegressionFit | None = None) -> RegressionFit:
-    """The regression by the prior of the draws' coefficients that has the most evidence.
+    """Fit the regression with the prior of the draws' coefficients that has the most evidence.
 
-    near: another, of the same coefficients, whose mode is a place to look from, too; that of margin alone may have two.
+    near: a fit of the same coefficients, whose mode is an additional start; the posterior of margins alone may have two
+    modes.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> wind = np.linspace(-5.0, 5.0, 200)
@@ -320,8 +344,8 @@ def fit_regression(outcomes: Outcomes, link: BinaryLink, near: RegressionFit | N
     >>> round(float(-fit.mean[0] / fit.mean[1]), 1)
     2.0
     """
-    # Where nothing is known of what is drawn, its coefficients' prior is none's.
-    priors = _DRAWS if outcomes.terms.shape[1] > 2 else _DRAWS[:1]
+    # Without drawn quantities there are no coefficients to put a prior on: fit once.
+    priors = _DRAW_SIGMAS if outcomes.terms.shape[1] > 2 else _DRAW_SIGMAS[:1]
     fits = []
     for deviation in priors:
         posterior = _Posterior(outcomes, link, deviation)
@@ -332,26 +356,27 @@ def fit_regression(outcomes: Outcomes, link: BinaryLink, near: RegressionFit | N
 
 
 class _Posterior:
-    """Of coefficients, but that the wind's is its logarithm; the margin's is the last where some margin is known.
+    """Posterior of coefficients, with the logarithm of the wind's coefficient.
 
-    deviation: of the prior of the draws' coefficients.
+    The margin's is last, if any is known.
+    deviation: standard deviation of the prior of the draws' coefficients.
     """
 
     def __init__(self, outcomes: Outcomes, link: BinaryLink, deviation: float) -> None:
-        self._outcomes, self._link, self._narrow = outcomes, link, outcomes.narrow
-        self.by_margin = bool(self._narrow.any())
+        self._outcomes, self._link, self._narrow_passes = outcomes, link, outcomes.narrow
+        self.by_margin = bool(self._narrow_passes.any())
         self.size = outcomes.terms.shape[1]
         deviations = np.full(self.size, deviation)
-        deviations[:2] = _CONSTANT, _WIND_FACTOR
-        # The margin is a regressor of what passed: F(terms . beta + k * margin) is the share that passes by less.
+        deviations[:2] = _CONSTANT_SIGMA, _WIND_LOG_SIGMA
+        # The margin is a regressor of passed flights: F(terms . beta + k * margin) is the share that passes by less.
         self._terms = np.column_stack((outcomes.terms, outcomes.margin)) if self.by_margin else outcomes.terms
-        self.deviations = np.append(deviations, _MARGIN) if self.by_margin else deviations
+        self.deviations = np.append(deviations, _MARGIN_SIGMA) if self.by_margin else deviations
         self._precision = self.deviations**-2
         self._middle = np.zeros(self.deviations.size)
-        self._middle[1] = np.log(_WIND)
+        self._middle[1] = np.log(_WIND_MEDIAN)
 
     def start(self) -> Floats:
-        """Where to look first."""
+        """Return the start of Newton's method."""
         at = np.zeros(self.deviations.size)
         at[:2] = _START
         if self.by_margin:
@@ -359,40 +384,40 @@ class _Posterior:
         return at
 
     def coefficients(self, points: Floats) -> Floats:
-        """What terms are multiplied by, at any number of points."""
+        """Return the coefficients of the terms at any number of points."""
         beta = points.copy()
         beta[..., 1] = np.exp(np.minimum(points[..., 1], _MAX_LOGARITHM))
         return beta
 
     def log_density(self, points: Floats) -> Floats:
-        """(n,) at n points, but for what no coefficient changes."""
+        """Return the log-density (n,) at n points, up to a constant."""
         beta, off, failed = self.coefficients(points), points - self._middle, self._outcomes.failed
         x = self._terms @ beta.T
         bare = self._outcomes.terms @ beta[:, : self.size].T if self.by_margin else x
-        # As good as impossible, and of its logarithm's own size nothing is left of what is added to it.
+        # Practically impossible, and its logarithm is so large that the other terms would be lost to rounding.
         possible = (bare[~failed] < _MAX_PREDICTOR).all(axis=0)
         x, bare = np.where(possible, x, 0.0), np.where(possible, bare, 0.0)
         logs: Floats = -0.5 * (off * off) @ self._precision
         logs += self._link.log_cdf(x[failed]).sum(axis=0)
-        logs += self._link.log_survival(x[~failed & ~self._narrow]).sum(axis=0)
+        logs += self._link.log_survival(x[~failed & ~self._narrow_passes]).sum(axis=0)
         if self.by_margin:
             possible &= beta[:, -1] > 0.0
-            logs += self._link.log_density(x[self._narrow]).sum(axis=0)
-            logs += self._narrow.sum() * np.log(np.where(possible, beta[:, -1], 1.0))
+            logs += self._link.log_density(x[self._narrow_passes]).sum(axis=0)
+            logs += self._narrow_passes.sum() * np.log(np.where(possible, beta[:, -1], 1.0))
         if self._outcomes.given_passed:
             logs -= self._link.log_survival(bare).sum(axis=0)
         return np.where(possible, logs, -np.inf)
 
     def sample(self, mode: Floats) -> Floats:
-        """(s, size) coefficients of the terms, each as likely as the other.
+        """Return (s, size) equally likely coefficients of the terms.
 
-        Of few failures the wind's coefficient is known within factors, and the constant follows from it: points are
-        spread over the predictor in the wind in which it is best known, where it does not.
+        With few failures the wind's coefficient is uncertain by factors, and the constant depends strongly on it.  The
+        constant is therefore replaced by the predictor at the wind where it is best known, which does not.
         """
         eigenvalues, axes = np.linalg.eigh(self.slope_and_curvature(mode)[1])
         covariance = axes / np.maximum(np.abs(eigenvalues), _MIN_CURVATURE) @ axes.T
         best_known = -covariance[0, 1] / (covariance[1, 1] * np.exp(mode[1]))
-        # By the predictor there, or by the constant: the one's density is the other's.
+        # The change of variables from the constant to that predictor leaves the density unchanged.
         turn = np.eye(mode.size)
         turn[0, 1] = best_known * np.exp(mode[1])
         middle = mode.copy()
@@ -404,18 +429,21 @@ class _Posterior:
             return out
 
         points = importance_sample(
-            lambda points: self.log_density(constants(points)), middle, turn @ covariance @ turn.T, _SAMPLE
+            lambda points: self.log_density(constants(points)), middle, turn @ covariance @ turn.T, _SAMPLE_SIZE
         )
         return self.coefficients(constants(points))[:, : self.size]
 
     def slope_and_curvature(self, at: Floats) -> tuple[Floats, Floats]:
-        """First and second derivatives of the negative logarithm of the density."""
+        """Return the first and second derivatives of the negative log-density."""
         beta, scale = self.coefficients(at), np.ones(at.size)
         x, terms = self._terms @ beta, self._terms
         first, second = self._link.derivatives(x, self._outcomes.failed)
         if self.by_margin:
             of_first, of_second = self._link.density_derivatives(x)
-            first, second = np.where(self._narrow, of_first, first), np.where(self._narrow, of_second, second)
+            first, second = (
+                np.where(self._narrow_passes, of_first, first),
+                np.where(self._narrow_passes, of_second, second),
+            )
         slope, curvature = -terms.T @ first, -(terms * second[:, None]).T @ terms
         if self._outcomes.given_passed:
             bare = self._outcomes.terms
@@ -423,10 +451,10 @@ class _Posterior:
             slope[: self.size] += bare.T @ first
             curvature[: self.size, : self.size] += (bare * second[:, None]).T @ bare
         if self.by_margin:
-            count = int(self._narrow.sum())
+            count = int(self._narrow_passes.sum())
             slope[-1] -= count / beta[-1]
             curvature[-1, -1] += count / beta[-1] ** 2
-        # By the logarithm of the wind's coefficient.
+        # Chain rule for the logarithm of the wind's coefficient.
         scale[1] = beta[1]
         slope, curvature = scale * slope, scale[:, None] * curvature * scale
         curvature[1, 1] += slope[1]
@@ -437,11 +465,10 @@ class _Posterior:
 
 
 def _fit(posterior: _Posterior, at: Floats) -> RegressionFit:
-    """The posterior's mode, looked for from a point, and the inverse of its curvature there.
+    """Find the posterior's mode from a start, and the inverse of its curvature there.
 
-    By Newton's method with halved steps; where the loss is not convex, which that of margin alone need not be, by the
-    curvature's absolute eigenvalues (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006, sections 3.4 and
-    19.2).
+    Newton's method with halved steps, and with the absolute eigenvalues of the curvature where the loss is not convex,
+    as may be with margins alone (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006, sections 3.4 and 19.2).
     """
     size = posterior.size
 
@@ -449,17 +476,17 @@ def _fit(posterior: _Posterior, at: Floats) -> RegressionFit:
         return -float(posterior.log_density(point[None])[0])
 
     value = loss(at)
-    for _ in range(_STEPS):
+    for _ in range(_MAX_STEPS):
         slope, curvature = posterior.slope_and_curvature(at)
         eigenvalues, axes = np.linalg.eigh(curvature)
         step = axes @ (axes.T @ slope / np.maximum(np.abs(eigenvalues), _MIN_CURVATURE))
-        # The margin's coefficient is above 0: towards it only so much of the way, where halves would end at it.
+        # The margin's coefficient stays positive: limit the step towards 0, where halved steps would end otherwise.
         towards = step[-1] if posterior.by_margin else 0.0
-        share = min(1.0, _OF_THE_WAY * at[-1] / towards) if towards > 0.0 else 1.0
-        while not (tried := loss(at - share * step)) <= value and share > _MIN_SHARE:
+        share = min(1.0, _MAX_MARGIN_STEP_FRACTION * at[-1] / towards) if towards > 0.0 else 1.0
+        while not (tried := loss(at - share * step)) <= value and share > _MIN_STEP_FRACTION:
             share *= 0.5
         at, value = at - share * step, tried
-        if float(np.abs(share * step).max()) < _CONVERGED:
+        if float(np.abs(share * step).max()) < _STEP_TOLERANCE:
             break
     curvature, beta = posterior.slope_and_curvature(at)[1], posterior.coefficients(at)
     evidence = -value - np.log(posterior.deviations).sum() - 0.5 * float(np.linalg.slogdet(curvature)[1])

@@ -1,4 +1,4 @@
-"""What a campaign's flights say: whether its target is reached, and which drawn quantity explains a margin."""
+"""Decide from a campaign's flights if its target is reached, and which drawn quantity explains a margin."""
 
 import math
 from dataclasses import dataclass
@@ -9,23 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 # ----------------------------------------------------------------------
-# The probability of success behind a fixed number of flights: intervals and one-sided bounds.
+# Intervals and one-sided bounds of the probability of success for a fixed number of flights.
 #
-# They hold for a number of flights that was fixed beforehand; where flying stops by what came out,
-# the bounds of `StoppingBound` hold.
+# They are valid for a number of flights fixed beforehand; if the results decide when flying stops, the bounds of
+# `StoppingBound` apply.
 
 
 class Interval(NamedTuple):
-    """Of a probability."""
+    """Interval of a probability."""
 
     low: float
     high: float
 
 
 class Tally(NamedTuple):
-    """How many flights came out how.
+    """Numbers of flights by outcome.
 
-    lost: could not be flown; they count as failures where a lower bound is stated, and as successes in an upper one.
+    lost: flights that could not be simulated; treated as failures in lower bounds and as successes in upper bounds.
     """
 
     flyable: int
@@ -34,17 +34,17 @@ class Tally(NamedTuple):
 
     @property
     def flown(self) -> int:
-        """All flights, the lost among them."""
+        """Number of all flights, including lost flights."""
         return self.flyable + self.failed + self.lost
 
     @property
     def share(self) -> float:
-        """Share of flyable flights, the lost not counted as such; NaN for no flight."""
+        """Share of flyable flights, with lost flights as not flyable; NaN without a flight."""
         return self.flyable / self.flown if self.flown else math.nan
 
 
 def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
-    """The exact two-sided interval of Clopper and Pearson (Biometrika 26, 1934); it covers at least ``confidence``.
+    """Return the exact two-sided interval of Clopper and Pearson (Biometrika 26, 1934), of at least ``confidence``.
 
     >>> [round(bound, 4) for bound in clopper_pearson(299, 299)]
     [0.9877, 1.0]
@@ -53,7 +53,7 @@ def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> In
 
 
 def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
-    """Wilson's score interval (JASA 22, 1927), for pictures: its mean coverage is near ``confidence``.
+    """Return Wilson's score interval (JASA 22, 1927), for pictures: its mean coverage is near ``confidence``.
 
     >>> [round(bound, 4) for bound in wilson(8, 10)]
     [0.4902, 0.9433]
@@ -62,7 +62,7 @@ def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
 
 
 def lower_bound(tally: Tally, confidence: float = 0.95) -> float:
-    """Clopper and Pearson's one-sided lower bound: with 299 flights and no failure P is 0.99 at least, at 95 %.
+    """Return Clopper and Pearson's one-sided lower bound: 299 flights without failure give P >= 0.99 at 95 %.
 
     >>> round(lower_bound(Tally(299, 0)), 4), round(lower_bound(Tally(298, 0)), 4)
     (0.99, 0.99)
@@ -73,7 +73,7 @@ def lower_bound(tally: Tally, confidence: float = 0.95) -> float:
 
 
 def upper_bound(tally: Tally, confidence: float = 0.95) -> float:
-    """Clopper and Pearson's one-sided upper bound.
+    """Return Clopper and Pearson's one-sided upper bound.
 
     >>> round(upper_bound(Tally(0, 10)), 4)
     0.2589
@@ -93,7 +93,7 @@ def _interval(successes: int, trials: int, confidence: float, method: str) -> In
 
 
 # ----------------------------------------------------------------------
-# Bounds of a probability that hold however long one looks: the beta-binomial mixture of Robbins.
+# Bounds of a probability that are valid at every number of flights: the beta-binomial mixture of Robbins.
 #
 # For s successes and f failures the set of p with
 #
@@ -101,22 +101,23 @@ def _interval(successes: int, trials: int, confidence: float, method: str) -> In
 #
 # contains the true p at all times at once, with probability 1 - alpha: E is a martingale that begins at 1 (Robbins,
 # "Statistical methods related to the law of the iterated logarithm", Ann. Math. Stat. 41, 1970; Ville's inequality).
-# Whoever stops when it says enough is therefore not led astray, as with an interval for a fixed number of flights.
+# Stopping as soon as the bound suffices is therefore valid, unlike with an interval for a fixed number of flights.
 #
-# The mixture has two parts.  One, of nearly all the weight, lies so near to 1 that without a failure a target is
-# reached after as many flights as with a fixed number (299 for 0.99); the other, Jeffreys' Beta(1/2, 1/2), finds out
-# about probabilities far from the target.
+# The mixture has two parts.  One, of nearly all the weight, is so near to 1 that without a failure a target is reached
+# after as many flights as with a fixed number (299 for 0.99); the other, Jeffreys' Beta(1/2, 1/2), covers probabilities
+# far from the target.
 
-# Weight of the part that is far from the target.
-_FAR = 0.001
-# What the mixture may cost where nothing fails, in the logarithm of 1 / alpha: a flight at P = 0.99.
-_COST = 0.009
+# Weight of the part far from the target.
+_JEFFREYS_WEIGHT = 0.001
+# Loss of the mixture without a failure, in the logarithm of 1 / alpha: one flight at P = 0.99.
+_MIXTURE_LOSS = 0.009
+# Number of bisection steps.
 _BISECTIONS = 60
 
 
 @dataclass(frozen=True)
 class StoppingBound:
-    """The bound for a target probability (0 to 1) and a confidence.
+    """Bound that is valid at every number of flights, for a target probability (0 to 1) and a confidence.
 
     >>> bound = StoppingBound(0.99)
     >>> bound.fewest, bound.interval(299, 0).low >= 0.99, bound.interval(298, 0).low >= 0.99
@@ -128,8 +129,8 @@ class StoppingBound:
 
     @property
     def fewest(self) -> int:
-        """Flights that reach the target where none fails."""
-        return math.ceil((self._enough + _COST) / -math.log(self.target))
+        """Number of flights that reach the target without a failure."""
+        return math.ceil((self._enough + _MIXTURE_LOSS) / -math.log(self.target))
 
     @property
     def _enough(self) -> float:
@@ -143,26 +144,26 @@ class StoppingBound:
             middle = 0.5 * (low + high)
             evidence = _log_mixture(self._parts(scale, middle), self.fewest, 0) - self.fewest * math.log(self.target)
             low, high = (middle, high) if evidence >= self._enough else (low, middle)
-        # A hair less, for what rounding takes.
+        # Slightly less, to cover rounding.
         return self._parts(scale, 0.999 * low)
 
     @staticmethod
     def _parts(scale: float, failures: float) -> tuple[tuple[float, float, float], ...]:
-        return (1.0 - _FAR, scale, max(failures, 1e-9)), (_FAR, 0.5, 0.5)
+        return (1.0 - _JEFFREYS_WEIGHT, scale, max(failures, 1e-9)), (_JEFFREYS_WEIGHT, 0.5, 0.5)
 
     def evidence(self, successes: int, failures: int, p: float) -> float:
-        """Logarithm of E(p): p is excluded where it is ``-log(1 - confidence)`` or more."""
+        """Return the logarithm of E(p): p is excluded if it is ``-log(1 - confidence)`` or more."""
         likelihood = _times_log(successes, p) + _times_log(failures, 1.0 - p)
         return _log_mixture(self.parts, successes, failures) - likelihood
 
     def excludes(self, successes: int, failures: int, p: float, *, above: bool) -> bool:
-        """Whether p is excluded, and the flights' own share lies above it (or, where that is asked, below)."""
+        """Return True if p is excluded and the share of successes is above p (or below it if not ``above``)."""
         share = successes / max(1, successes + failures)
         beyond = share > p if above else share < p
         return beyond and self.evidence(successes, failures, p) >= self._enough
 
     def interval(self, successes: int, failures: int) -> Interval:
-        """All p that are not excluded: they lie about the share of successes, where E is least."""
+        """Return the interval of all p that are not excluded, around the share of successes, where E is smallest."""
         trials = successes + failures
         if not trials:
             return Interval(0.0, 1.0)
@@ -172,7 +173,7 @@ class StoppingBound:
         return Interval(low, high)
 
     def _edge(self, successes: int, failures: int, outside: float, inside: float) -> float:
-        """Where between p that is excluded and p that is not the border lies: the excluded side of it."""
+        """Find the edge between an excluded p and one that is not, by bisection; return its excluded side."""
         for _ in range(_BISECTIONS):
             middle = 0.5 * (outside + inside)
             if self.evidence(successes, failures, middle) >= self._enough:
@@ -182,7 +183,7 @@ class StoppingBound:
         return outside
 
     def bounds(self, tally: Tally) -> Interval:
-        """The interval of a tally: lost flights are failures for its low end, successes for its high one."""
+        """Return the interval of a tally: lost flights are failures for its low end, successes for its high end."""
         low = self.interval(tally.flyable, tally.failed + tally.lost).low
         high = self.interval(tally.flyable + tally.lost, tally.failed).high
         return Interval(low, high)
@@ -203,18 +204,18 @@ def _log_mixture(parts: tuple[tuple[float, float, float], ...], successes: int, 
 
 Answer = Literal["reached", "missed", "undecided", "none asked"]
 
-# Of a bound that nobody asked another of.
+# Default confidence of a bound.
 USUAL_CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
 class Goal:
-    """What is asked of a campaign.
+    """Goal of a campaign.
 
-    target: the probability to reach; None where it is only to be estimated.
-    stops: whether flying stops as soon as the answer is known (`--prove`); otherwise the number of flights is fixed.
-    flights: fixed number, or the most where it stops.
-    changed: whether another number was to be fixed first, and some of its flights were flown.
+    target: the probability to reach; None to estimate the probability only.
+    stops: True to stop flying as soon as the answer is known (`--prove`); otherwise the number of flights is fixed.
+    flights: fixed number of flights, or the maximum number if it stops.
+    changed: True if the fixed number was changed after some of the flights.
     """
 
     target: float | None
@@ -225,7 +226,7 @@ class Goal:
 
     @property
     def method(self) -> str:
-        """By which the bounds are had, for a person."""
+        """Description of the method of the bounds."""
         if self.stops:
             return "beta-binomial mixture, valid at every number of flights"
         if self.changed:
@@ -235,10 +236,11 @@ class Goal:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What is known of the probability.
+    """Estimate of the probability.
 
-    lower, upper: each holds with the goal's confidence; of a goal that stops, both at once and at all times.
-    interval: two-sided, with the goal's confidence.
+    lower, upper: bounds, each with the goal's confidence; for a goal that stops, both at once and at every number of
+    flights.
+    interval: two-sided interval, with the goal's confidence.
     """
 
     tally: Tally
@@ -249,7 +251,7 @@ class Estimate:
 
 
 class Estimator:
-    """Estimates of one goal, as flights come in."""
+    """Estimator of one goal during a campaign."""
 
     def __init__(self, goal: Goal) -> None:
         self._goal = goal
@@ -257,11 +259,11 @@ class Estimator:
 
     @property
     def fewest(self) -> int:
-        """Flights that may answer, at the least."""
+        """Smallest number of flights that may decide."""
         return self._bound.fewest if self._bound is not None else self._goal.flights
 
     def decides(self, tally: Tally) -> bool:
-        """Whether this many flights answer a goal that stops."""
+        """Return True if a tally decides a goal that stops."""
         target, bound = self._goal.target, self._bound
         if bound is None or target is None:
             return False
@@ -269,7 +271,7 @@ class Estimator:
         return reached or bound.excludes(tally.flyable + tally.lost, tally.failed, target, above=False)
 
     def estimate(self, tally: Tally) -> Estimate:
-        """What this many flights say."""
+        """Estimate the probability from a tally."""
         confidence = self._goal.confidence
         if self._bound is not None:
             interval = self._bound.bounds(tally)
@@ -292,19 +294,23 @@ class Estimator:
 Floats = NDArray[np.float64]
 
 # ----------------------------------------------------------------------
-# How much of a result's variance each drawn quantity explains, from the flights that were flown anyway.
+# Fraction of a result's variance that each drawn quantity explains, from the campaign's own flights.
 #
-# First-order index of variance, Var(E[y | x]) / Var(y), estimated from given data: flights are sorted into groups of
-# equal size by x, and the variance between the groups' means is compared with that of all (Plischke, Borgonovo, Smith,
-# "Global sensitivity measures from given data", EJOR 226, 2013).  What groups of a few differ by chance is subtracted,
-# as in Kelley's epsilon squared (PNAS 21, 1935), so that a quantity without effect comes to 0.
+# First-order variance index, Var(E[y | x]) / Var(y), estimated from given data: flights are sorted into groups of equal
+# size by x, and the variance between the groups' means is compared with the total variance (Plischke, Borgonovo, Smith,
+# "Global sensitivity measures from given data", EJOR 226, 2013).  The chance difference of small groups is subtracted,
+# as in Kelley's epsilon squared (PNAS 21, 1935), so that a quantity without effect has an index of 0.
 
+# Minimum number of flights for an index.
 MIN_FLIGHTS = 30
+# Maximum number of groups.
 _MAX_GROUPS = 64
 
 
 def first_order(x: Floats, y: Floats) -> float:
-    """First-order index of y (n,) to x (n,), 0 to 1; 0 for fewer than `MIN_FLIGHTS`, or where y does not vary.
+    """Return the first-order index of y (n,) to x (n,), 0 to 1.
+
+    0 below `MIN_FLIGHTS`, or if y does not vary.
 
     >>> random = np.random.default_rng(1)
     >>> x = random.random((4000, 2))
@@ -323,7 +329,7 @@ def first_order(x: Floats, y: Floats) -> float:
 
 
 def rank_slope(x: Floats, y: Floats) -> float:
-    """Spearman's rank correlation, -1 to 1: which way y goes with x; 0 where either does not vary.
+    """Return Spearman's rank correlation of x and y, -1 to 1; 0 if either does not vary.
 
     >>> rank_slope(np.arange(5.0), -np.arange(5.0) ** 3)
     -1.0

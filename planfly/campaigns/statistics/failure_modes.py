@@ -1,10 +1,10 @@
-"""The ways in which flights fail, one after another: a binary regression each on the wind and on what was drawn.
+"""Failure modes of flights: for each a binary regression on the wind and the drawn quantities.
 
-A flight that fails does so in some way, such as by the slope of leg 12.  What was drawn for it (drag, mass, ...) is
-known, and often decides: a slippery aircraft is too fast down one leg, a draggy one strays on another.  The probability
-of each way is a link's function of a + b * wind + c . draws.  The ways are put in order, and each is fitted to the
-flights that did not fail in one before it, so that the probability to fly is the product of their complements whether
-or not ways come together: the chain rule.
+A flight fails in some mode, such as the slope of leg 12.  Its drawn quantities (drag, mass, ...) are known and often
+decisive: an aircraft of low drag is too fast down one leg, an aircraft of high drag strays on another.  The probability
+of each mode is a link function of a + b * wind + c . draws.  The modes are ordered, and each is fitted to the flights
+that did not fail in an earlier mode, so that by the chain rule the probability of success is the product of their
+complements, even if modes are correlated.
 """
 
 from collections import Counter
@@ -21,27 +21,31 @@ Bools = NDArray[np.bool_]
 
 
 # ----------------------------------------------------------------------
-# The wind at which flights begin to fail, as one law: for flights that tell no more than whether they were flyable.
+# Distribution of the wind at which flights begin to fail, for flights with nothing known but pass or fail.
 #
-# Each flight has a wind of its own above which it fails.  Over flights that wind is taken to be distributed normally or
-# as the least of many (Gumbel's law for minima, whose tail is the longer one), each of mean and standard deviation
-# unknown and as likely as the other before the first flight.  The posterior is summed on a grid over law, mean and
-# standard deviation, so that it holds for few flights, too, and for none that failed.
+# Each flight has its own wind above which it fails.  The distribution of this wind over flights is assumed to be
+# normal, or Gumbel's distribution for minima with its longer tail, both equally likely a priori, with unknown mean and
+# standard deviation.  The posterior is summed on a grid over distribution, mean and standard deviation, so that it is
+# also valid for few flights, and for flights without a failure.
 
 
-# Of the standard deviation of the wind at which flights begin to fail, m/s: from a quarter of the accuracy wanted to
-# what would leave no boundary; each factor as likely as any other.
-_SPREADS = np.geomspace(0.1, 5.0, 30)
-# Grid of the mean, m/s, and how far it goes beyond the winds that are looked at.
-_STEP, _BELOW, _ABOVE = 0.1, 5.0, 10.0
+# Grid of the standard deviation of this wind, m/s, log-uniform: from a quarter of the required accuracy to a value that
+# would leave no boundary.
+_SIGMAS_MPS = np.geomspace(0.1, 5.0, 30)
+# Step of the grid of the mean, m/s.
+_MEAN_STEP_MPS = 0.1
+# Extent of the grid below zero wind, m/s.
+_GRID_BELOW_MPS = 5.0
+# Extent of the grid above the largest wind of the search, m/s.
+_GRID_ABOVE_MPS = 10.0
 
 
 @dataclass(frozen=True)
 class FailureLaws:
-    """The laws on the grid: (n,) arrays, normal ones first.
+    """Distributions on the grid: (n,) arrays, normal ones first.
 
-    location, scale: m/s; of the normal law its mean and standard deviation.
-    normals: how many are normal; the others are Gumbel's of the same means and standard deviations.
+    location, scale: m/s; mean and standard deviation of a normal distribution.
+    normals: number of normal distributions; the others are Gumbel distributions of the same means and deviations.
     """
 
     location: Floats
@@ -50,16 +54,16 @@ class FailureLaws:
 
     @classmethod
     def up_to(cls, most: float) -> "FailureLaws":
-        """For winds up to this, m/s."""
-        means = np.arange(-_BELOW, most + _ABOVE, _STEP)
-        mean, spread = (grid.ravel() for grid in np.meshgrid(means, _SPREADS, indexing="ij"))
-        # Of Gumbel's law for minima: mean = location - gamma * scale, variance = (pi * scale)^2 / 6.
+        """Make the grid for winds up to ``most``, m/s."""
+        means = np.arange(-_GRID_BELOW_MPS, most + _GRID_ABOVE_MPS, _MEAN_STEP_MPS)
+        mean, spread = (grid.ravel() for grid in np.meshgrid(means, _SIGMAS_MPS, indexing="ij"))
+        # Gumbel's distribution for minima: mean = location - gamma * scale, variance = (pi * scale)^2 / 6.
         scale = spread * np.sqrt(6.0) / np.pi
         location = mean + np.euler_gamma * scale
         return cls(np.concatenate((mean, location)), np.concatenate((spread, scale)), mean.size)
 
     def log_shares(self, speed: float) -> tuple[Floats, Floats]:
-        """(n,) logarithms of the probability to fail at a wind, m/s, and to fly."""
+        """Return the logarithms (n,) of the probabilities of failure and of success at a wind, m/s."""
         from scipy.special import log_ndtr
         from scipy.stats import gumbel_l
 
@@ -69,7 +73,7 @@ class FailureLaws:
         return fails, np.concatenate((log_ndtr(-normal), gumbel_l.logsf(gumbel)))
 
     def quantile(self, share: float) -> Floats:
-        """(n,) the wind at which this share of flights fails, m/s."""
+        """Return the wind (n,) at which this share of flights fails, m/s."""
         from scipy.special import ndtri
         from scipy.stats import gumbel_l
 
@@ -79,12 +83,12 @@ class FailureLaws:
         return out
 
     def quantile_at(self, share: float, speeds: Floats, flyable: NDArray[np.bool_], parts: Floats) -> Floats:
-        """(k,) the wind at which this share of flights fails, at these parts of its posterior, m/s.
+        """Return quantiles (k,) of the posterior of the wind at which this share of flights fails, m/s.
 
-        speeds, flyable: (m,) of the flights that were flown.  parts: (k,) 0 to 1.
+        speeds, flyable: (m,) winds and outcomes of the flights.  parts: (k,) probabilities of the quantiles, 0 to 1.
         """
         logs = np.zeros(self.location.size)
-        for speed, counts in _counted(speeds, flyable).items():
+        for speed, counts in _counts_by_wind(speeds, flyable).items():
             fails, flies = self.log_shares(speed)
             logs += counts[0] * fails + counts[1] * flies
         weights = np.exp(logs - logs.max())
@@ -95,8 +99,8 @@ class FailureLaws:
         return out
 
 
-def _counted(speeds: Floats, flyable: NDArray[np.bool_]) -> dict[float, tuple[int, int]]:
-    """How many failed and how many flew, by wind."""
+def _counts_by_wind(speeds: Floats, flyable: NDArray[np.bool_]) -> dict[float, tuple[int, int]]:
+    """Return the numbers of failed and of flyable flights, by wind."""
     return {
         float(speed): (int((~flyable[speeds == speed]).sum()), int(flyable[speeds == speed].sum()))
         for speed in np.unique(speeds)
@@ -104,23 +108,23 @@ def _counted(speeds: Floats, flyable: NDArray[np.bool_]) -> dict[float, tuple[in
 
 
 # ----------------------------------------------------------------------
-# One way of failing as a regression on the wind and what was drawn.
+# One failure mode as a regression on the wind and the draws.
 #
-# By how little flights passed tells of failing only where both are of one kind: an aircraft that is too fast down a leg
-# fails by degrees, whatever the gusts took of the slope of those that were not.  So of two hypotheses the one with more
-# evidence is taken: one law for failing and for the margin of those that passed (Tobin's), or one for each, where the
-# margin says nothing of failing (Cragg, "Some statistical models for limited dependent variables with application to
-# the demand for durable goods", Econometrica 39, 1971, of which the first is a special case).
+# The margins of passed flights are informative about failure only if both have the same cause.  For example, a flight
+# that is too fast down a leg may fail by degrees, while gusts determine the slope margin of the flights that pass.  So
+# the hypothesis with more evidence is chosen: one distribution for failures and margins (Tobin), or separate ones, in
+# which margins say nothing about failure (Cragg, "Some statistical models for limited dependent variables with
+# application to the demand for durable goods", Econometrica 39, 1971, of which the first is a special case).
 
 
 @dataclass(frozen=True, slots=True)
 class FailureMode:
-    """One way of failing.
+    """One failure mode.
 
-    mean, covariance: (2 + d,) and (2 + d, 2 + d) of its coefficients, as those of the terms it was fitted to.
-    sample: gives (s, 2 + d) of what the coefficients may be, each as likely as the other; rarely needed.
-    log_evidence: of what came out, by this link.
-    by_margin: by how much the predictor falls for a scale of margin; 0 where margins say nothing of failing.
+    mean, covariance: (2 + d,) and (2 + d, 2 + d) of the coefficients of its terms.
+    sample: returns (s, 2 + d) equally likely coefficients; rarely needed.
+    log_evidence: logarithm of the evidence of the outcomes, for this link.
+    by_margin: decrease of the predictor per scale of margin; 0 if margins say nothing about failure.
     """
 
     link: BinaryLink
@@ -132,10 +136,11 @@ class FailureMode:
 
 
 def fit_mode(terms: Floats, failed: Bools, margin: Floats, link: BinaryLink) -> FailureMode:
-    """One way of failing of n flights, by one law with their margin or by its own, whichever has more evidence.
+    """Fit a failure mode of n flights, jointly with their margins or alone, whichever has more evidence.
 
-    terms: (n, 2 + d) of each flight: one, the wind from some origin, and what was drawn.
-    failed: (n,).  margin: (n,) by what share of a scale each passed that did: 1 for a scale or more, 0 for not known.
+    terms: (n, 2 + d) terms of each flight: one, the wind relative to some origin, and the draws.
+    failed: (n,).  margin: (n,) margin of each passed flight as a fraction of a scale: 1 for a scale or more, 0 for
+    unknown.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> wind = np.linspace(-5.0, 5.0, 200)
@@ -148,25 +153,25 @@ def fit_mode(terms: Floats, failed: Bools, margin: Floats, link: BinaryLink) -> 
     outcomes = Outcomes(terms, failed, np.where(failed, 0.0, margin))
     one_law = fit_regression(outcomes, link)
     if not outcomes.narrow.any():
-        return _mode(link, one_law, one_law.log_evidence)
+        return _make_mode(link, one_law, one_law.log_evidence)
     alone, passes = fit_regression(outcomes.without_margin(), link), outcomes.only_margin()
-    # The margin's own law, of whichever link, says nothing of failing's.
+    # The separate distribution of the margins may have either link.
     two_laws = alone.log_evidence + max(fit_regression(passes, any_link, one_law).log_evidence for any_link in LINKS)
     if two_laws > one_law.log_evidence:
-        return _mode(link, alone, two_laws)
-    return _mode(link, one_law, one_law.log_evidence)
+        return _make_mode(link, alone, two_laws)
+    return _make_mode(link, one_law, one_law.log_evidence)
 
 
-def _mode(link: BinaryLink, fit: RegressionFit, log_evidence: float) -> FailureMode:
+def _make_mode(link: BinaryLink, fit: RegressionFit, log_evidence: float) -> FailureMode:
     return FailureMode(link, fit.mean, fit.covariance, fit.sample, log_evidence, fit.by_margin)
 
 
-# Winds are counted from here, m/s, where the constant's prior is meant.
+# Origin of the wind in the terms, m/s, to which the prior of the constant applies.
 ORIGIN = 10.0
 
 
 def regressors(speeds: Floats | float, draws: Floats) -> Floats:
-    """(n, 2 + d): one, the wind, and what was drawn.
+    """Return the terms (n, 2 + d) of flights: one, the wind relative to `ORIGIN`, and the draws.
 
     speeds: (n,) or one for all, m/s.  draws: (n, d) in standard deviations from their means.
     """
@@ -183,12 +188,12 @@ def fit_modes(
     link: BinaryLink,
     margin: Sequence[Mapping[Hashable, float] | None] = (),
 ) -> tuple[FailureMode, ...]:
-    """The ways of failing of n flights, in order: the one in which most failed, then in which most of the others did.
+    """Fit the failure modes of n flights, the most frequent first, then the most frequent among the other flights.
 
     terms: (n, 2 + d), of `regressors`.
-    failed: the ways in which each failed; none where it was flyable.
-    margin: the ways that each passed narrowly, and by what share of a scale, 0 to 1, or 0 where it passed all the same;
-    others were passed by a scale or more.  None of a flight of which that is not known.
+    failed: modes in which each flight failed; empty if it was flyable.
+    margin: modes that each flight passed narrowly, with the margin as a fraction of a scale, 0 to 1, or 0 for a pass of
+    unknown margin; other modes were passed by a scale or more.  None for a flight without known margins.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> speeds = np.linspace(0.0, 20.0, 200)
@@ -201,7 +206,7 @@ def fit_modes(
     margins = margin or [None] * len(failed)
     left = np.ones(len(failed), dtype=bool)
     while counts := Counter(way for here, ways in zip(left, failed, strict=True) if here for way in ways):
-        # By name where as many failed, as the order of a set is not the same in every process.
+        # Ties are broken by name, as the order of a set differs between processes.
         common = min(counts, key=lambda way: (-counts[way], repr(way)))
         so = np.array([common in ways for ways in failed])
         passed_by = np.array([0.0 if some is None else some.get(common, 1.0) for some in margins])
@@ -211,7 +216,7 @@ def fit_modes(
 
 
 def fail_shares(modes: Sequence[FailureMode], terms: Floats) -> Floats:
-    """(n,) probability to fail, in any way, of flights (n, 2 + d), by the modes' means."""
+    """Return the failure probability (n,), in any mode, of flights (n, 2 + d), by the means of the modes."""
     flies: Floats = np.ones(len(terms))
     for mode in modes:
         flies *= mode.link.survival(terms @ mode.mean)
@@ -219,7 +224,7 @@ def fail_shares(modes: Sequence[FailureMode], terms: Floats) -> Floats:
 
 
 def boundary_speed(modes: Sequence[FailureMode], draws: Floats, share: float, most: float) -> float:
-    """The wind from 0 to ``most`` in which this share of draws (m, d) is expected to fail, m/s, found by bisection."""
+    """Find the wind from 0 to ``most`` in which this share of draws (m, d) is expected to fail, m/s, by bisection."""
     still = [(mode.link, regressors(ORIGIN, draws) @ mode.mean, float(mode.mean[1])) for mode in modes]
 
     def fails(speed: float) -> bool:
@@ -239,9 +244,9 @@ def boundary_speed(modes: Sequence[FailureMode], draws: Floats, share: float, mo
 
 @dataclass(frozen=True)
 class FailingShare:
-    """The share of flights that fail in a wind, and its derivatives.
+    """Share of flights that fail in a wind, and its derivatives.
 
-    slopes: (2 + d,) by each mode's coefficients.  by_wind: 1/(m/s).
+    slopes: (2 + d,) derivatives by the coefficients of each mode.  by_wind: derivative by the wind, 1/(m/s).
     """
 
     share: float
@@ -250,7 +255,7 @@ class FailingShare:
 
 
 def failing_share(modes: Sequence[FailureMode], draws: Floats, speed: float) -> FailingShare:
-    """The share of draws (m, d) that is expected to fail in a wind, m/s."""
+    """Return the share of draws (m, d) that is expected to fail in a wind, m/s."""
     terms = regressors(speed, draws)
     predictors = [terms @ mode.mean for mode in modes]
     flies = [mode.link.survival(x) for mode, x in zip(modes, predictors, strict=True)]
@@ -263,10 +268,10 @@ def failing_share(modes: Sequence[FailureMode], draws: Floats, speed: float) -> 
 
 
 def boundary_slopes(modes: Sequence[FailureMode], draws: Floats, speed: float) -> list[Floats]:
-    """(2 + d,) the boundary's derivatives by each mode's coefficients, m/s: the implicit function theorem.
+    """Return the boundary's derivatives (2 + d,) by each mode's coefficients, m/s, by the implicit function theorem.
 
     draws: (m, d).  speed: the boundary, m/s.
     """
     at = failing_share(modes, draws, speed)
-    # Where no more fail in more wind, nothing is known of the boundary.
+    # If more wind does not cause more failures, nothing is known about the boundary.
     return [-one / max(at.by_wind, 1e-9) for one in at.slopes]

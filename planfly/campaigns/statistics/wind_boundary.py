@@ -1,9 +1,9 @@
-"""The largest wind in which a mission flies with a given probability, from flights in winds chosen as one goes.
+"""Estimate the largest wind in which a mission flies with a given probability, from flights in chosen winds.
 
-Where some flights flew and some failed, the share of flights that fail in a wind is the mean of `failure_modes` over
-what may be drawn, and the boundary the wind in which that share is 1 - P (`boundary_posterior`).  Each of the `links`
-is as likely as the other before the first flight, and weighs by its evidence then.  Where all flew, or all failed, one
-law of `failure_laws` has to do.
+If some flights were flyable and some failed, the share of flights that fail in a wind is the mean of the failure modes
+over the possible draws, and the boundary is the wind in which that share is 1 - P (`boundary_quantiles`).  The links
+are equally likely a priori, and are weighted by their evidence.  If all flights were flyable, or all failed, one
+distribution of `FailureLaws` is used.
 """
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
@@ -29,22 +29,25 @@ Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
-# Where the boundary lies: the wind in which 1 - P of flights fail, of each sample of what the failure modes may be.
+# The boundary: the wind in which a share 1 - P of flights fails, for each sample of the failure modes' coefficients.
 #
-# The share that fails in a wind is the mean of the failure modes over what may be drawn.  More wind never has fewer
-# fail, in no sample (`censored_regression`), so that each has one boundary.
+# The share that fails in a wind is the mean of the failure modes over the possible draws.  In every sample more wind
+# never causes fewer failures (`censored_regression`), so that each sample has one boundary.
 
 
-# Each sample's boundary is first found over so few of what may be drawn, to so many m/s; the logarithm of the share
-# that fails, over all of it, is then nearly straight in the wind: so many steps of the secant method follow.
-_FEW, _NEAR, _SECANTS = 256, 0.1, 2
-# The smallest probability that counts as more than zero.
+# Number of draws with which each sample's boundary is first bracketed.
+_BRACKET_DRAWS = 256
+# Width of this bracket, m/s; within it the logarithm of the failing share is nearly linear in the wind.
+_BRACKET_WIDTH_MPS = 0.1
+# Number of secant steps that follow, with all draws.
+_SECANT_STEPS = 2
+# Lower limit of probabilities whose logarithm is taken.
 _MIN_PROBABILITY = 1e-12
 
 
 @dataclass(frozen=True)
 class WeightedModes:
-    """The modes by one link, and its weight among all."""
+    """Failure modes for one link, and the link's weight."""
 
     modes: tuple[FailureMode, ...]
     weight: float
@@ -53,10 +56,10 @@ class WeightedModes:
 def boundary_quantiles(
     fits: Sequence[WeightedModes], draws: Floats, share: float, most: float, probabilities: Sequence[float]
 ) -> list[float]:
-    """The wind, from 0 to most, m/s, that the boundary lies below with each of these probabilities, 0 to 1.
+    """Return quantiles of the boundary's posterior, m/s, from 0 to ``most``, at these probabilities, 0 to 1.
 
-    draws: (m, d) of what may be drawn, spread evenly however few of the first are taken.
-    share: of flights that fail at the boundary, above 0 and below 1.
+    draws: (m, d) possible draws, evenly spread also if only the first few are used.
+    share: share of flights that fail at the boundary, above 0 and below 1.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> sample = np.column_stack((np.linspace(-0.1, 0.1, 101), np.full(101, 0.5)))
@@ -76,22 +79,22 @@ def boundary_quantiles(
 
 
 def _boundaries(modes: Sequence[FailureMode], draws: Floats, share: float, most: float) -> Floats:
-    """(n,) of each sample, m/s."""
-    # The modes are known apart from each other: any one's samples go with any of another's.
+    """Return the boundary (n,) of each sample, m/s."""
+    # The posteriors of the modes are independent: samples of different modes can be combined in any order.
     samples = [
         np.random.default_rng(number).permutation(mode.sample()) if number else mode.sample()
         for number, mode in enumerate(modes)
     ]
-    few, every = (_Shares(modes, samples, some) for some in (draws[:_FEW], draws))
+    few, every = (_Shares(modes, samples, some) for some in (draws[:_BRACKET_DRAWS], draws))
     low, high = np.zeros(len(samples[0])), np.full(len(samples[0]), most)
-    while (high - low).max() > _NEAR:
+    while (high - low).max() > _BRACKET_WIDTH_MPS:
         middle = 0.5 * (low + high)
         fails = few.logarithms(middle) > np.log(share)
         low, high = np.where(fails, low, middle), np.where(fails, middle, high)
     speed: Floats = 0.5 * (low + high)
-    before = speed - _NEAR
+    before = speed - _BRACKET_WIDTH_MPS
     off_before = every.logarithms(before) - np.log(share)
-    for _ in range(_SECANTS):
+    for _ in range(_SECANT_STEPS):
         off = every.logarithms(speed) - np.log(share)
         by_wind = np.maximum((off - off_before) / np.where(speed == before, 1.0, speed - before), 1e-9)
         before, off_before, speed = speed, off, np.clip(speed - off / by_wind, 0.0, most)
@@ -99,14 +102,14 @@ def _boundaries(modes: Sequence[FailureMode], draws: Floats, share: float, most:
 
 
 class _Shares:
-    """The share that fails, of each sample; draws: (m, d)."""
+    """Failing share of each sample; draws: (m, d)."""
 
     def __init__(self, modes: Sequence[FailureMode], samples: list[Floats], draws: Floats) -> None:
         self._modes, self._samples = modes, samples
         self._at_origin = [regressors(ORIGIN, draws) @ sample.T for sample in samples]
 
     def logarithms(self, speeds: Floats) -> Floats:
-        """(n,) of the shares, each at its own wind, m/s."""
+        """Return the logarithms (n,) of the failing shares, each at its own wind, m/s."""
         flies = np.ones_like(self._at_origin[0])
         for mode, sample, x in zip(self._modes, self._samples, self._at_origin, strict=True):
             flies *= mode.link.survival(x + sample[:, 1] * (speeds - ORIGIN))
@@ -116,10 +119,10 @@ class _Shares:
 
 @dataclass
 class DrawnNumbers:
-    """What varies from flight to flight but the wind that is asked about, in standard deviations from the means.
+    """Draws of the quantities that vary between flights, other than the wind, in standard deviations from the means.
 
-    population: (m, d) spread evenly over what may be drawn; each stands for the same share of flights.
-    drawn: gives (stop - start, d) of the draws from one index to before another, as they are flown.
+    population: (m, d) evenly spread possible draws; each represents the same share of flights.
+    drawn: returns (stop - start, d) draws of the flights from one index to before another.
     """
 
     population: Floats
@@ -127,7 +130,7 @@ class DrawnNumbers:
     _known: list[Floats] = field(default_factory=list)
 
     def first(self, count: int) -> Floats:
-        """(count, d) of the draws from 0 on; computed once."""
+        """Return the first `count` draws (count, d), which are computed once."""
         have = sum(len(block) for block in self._known)
         if have < count:
             self._known.append(self.drawn(have, max(count, have + 500)))
@@ -138,10 +141,10 @@ class DrawnNumbers:
 
 @dataclass(frozen=True)
 class WindBoundary:
-    """The largest wind with the probability asked for, m/s.
+    """Largest wind with the target probability, m/s.
 
-    estimate: the posterior's median.  low, high: its two-sided interval.
-    beyond: whether the estimate lies beyond all that was looked at.
+    estimate: median of the posterior.  low, high: its two-sided interval.
+    beyond: True if the estimate is beyond the largest wind of the search.
     """
 
     estimate: float
@@ -151,16 +154,16 @@ class WindBoundary:
 
     @property
     def width(self) -> float:
-        """Of the interval, m/s."""
+        """Width of the interval, m/s."""
         return self.high - self.low
 
 
 @dataclass(frozen=True)
 class FailureFit(WeightedModes):
-    """What the flights of a direction tell of its boundary by one link.
+    """Fit of the flights of a direction for one link.
 
-    speed: of the boundary, m/s, up to the largest wind that is looked at.
-    slopes: its derivatives by each mode's coefficients.
+    speed: the boundary, m/s, at most the largest wind of the search.
+    slopes: derivatives of the boundary by each mode's coefficients.
     """
 
     speed: float
@@ -170,9 +173,9 @@ class FailureFit(WeightedModes):
 class Direction:
     """Flights in wind from one direction.
 
-    most: wind up to which is looked, m/s.  target, confidence: above 0 and below 1.
-    speeds: m/s, in which they were flown.  draws: index of each one's draw.  failed: the ways in which each failed.
-    margin: the ways that each passed narrowly, and by what share of a scale, 0 to 1; None where that is not known.
+    most: largest wind of the search, m/s.  target, confidence: above 0 and below 1.
+    speeds: wind of each flight, m/s.  draws: index of each flight's draw.  failed: failure modes of each flight.
+    margin: modes that each flight passed narrowly, with the margin as a fraction of a scale, 0 to 1; None if unknown.
     """
 
     def __init__(self, most: float, target: float, numbers: DrawnNumbers, confidence: float = 0.95) -> None:
@@ -186,9 +189,9 @@ class Direction:
     def add(
         self, speed: float, draw: int, failed: frozenset[Hashable], margin: Mapping[Hashable, float] | None = None
     ) -> None:
-        """Take a flight in, of a wind from 0 to `most`, m/s; failed: none for one that was flyable.
+        """Add a flight in a wind from 0 to `most`, m/s; failed: empty if it was flyable.
 
-        margin: None where nothing is known of how narrowly it passed.  Raises ValueError for another wind.
+        margin: None if its margins are unknown.  Raises ValueError for a wind out of range.
         """
         if not 0.0 <= speed <= self.most:
             raise ValueError(f"speed: {speed}: 0 to {self.most:g} m/s is expected")
@@ -199,16 +202,16 @@ class Direction:
 
     @property
     def all_flew(self) -> bool:
-        """Whether no flight failed."""
+        """True if no flight failed."""
         return not any(self.failed)
 
     @property
     def all_failed(self) -> bool:
-        """Whether every flight did."""
+        """True if every flight failed."""
         return all(self.failed)
 
     def fits(self) -> tuple[FailureFit, ...]:
-        """The ways of failing by each link; for a direction in which some flew and some did not."""
+        """Return the failure modes for each link, for a direction with both failed and flyable flights."""
         if self._fits is None or self._fits[0] != len(self.speeds):
             terms = regressors(np.array(self.speeds), self.numbers.first(max(self.draws) + 1)[self.draws])
             every = [fit_modes(terms, self.failed, link, self.margin) for link in LINKS]
@@ -227,7 +230,7 @@ class Direction:
         return FailureFit(modes, weight, speed, boundary_slopes(modes, draws, speed))
 
     def boundary(self) -> WindBoundary:
-        """What is known of the boundary.
+        """Return the estimate and interval of the boundary.
 
         >>> numbers = DrawnNumbers(np.zeros((8, 0)), lambda start, stop: np.zeros((stop - start, 0)))
         >>> direction = Direction(20.0, 0.99, numbers)
@@ -253,7 +256,7 @@ class Direction:
 
 
 def needs_more(found: WindBoundary, flights: int, accuracy: float, fewest: int) -> bool:
-    """Whether a direction is to be flown in further: too few flights, or an interval wider than twice the accuracy.
+    """Return True if a direction needs more flights: too few, or an interval wider than twice the accuracy.
 
     >>> needs_more(WindBoundary(9.0, 8.8, 9.2, False), 40, 0.5, 30)
     False
@@ -262,36 +265,41 @@ def needs_more(found: WindBoundary, flights: int, accuracy: float, fewest: int) 
 
 
 # ----------------------------------------------------------------------
-# Which flights of a direction tell most of its boundary: their winds, and which draws.
+# Choice of the most informative flights of a direction: their winds and their draws.
 #
-# First by bisection, until some flew and some failed.  Then each flight is the one after which the boundary's variance
-# is expected to be least: the look one step ahead of adaptive psychometric testing (King-Smith et al., Vision Research
-# 34, 1994), by the information that a binary regression has of a flight (Chaloner and Verdinelli, "Bayesian
-# Experimental Design", Statistical Science 10(3), 1995, section 4).  What is drawn for a flight is known before it is
-# flown, so the draw is chosen too; every third is the next that has not been flown, whatever it is, so that a way of
-# failing that has not been seen is not avoided.  Only the likelihood of what was flown enters the fit: the choice does
-# not bias it.
+# First bisection, until there are both flyable and failed flights.  Then each flight is the one that minimises the
+# expected variance of the boundary: the one-step look-ahead of adaptive psychometric testing (King-Smith et al., Vision
+# Research 34, 1994), by the information of a flight in a binary regression (Chaloner and Verdinelli, "Bayesian
+# Experimental Design", Statistical Science 10(3), 1995, section 4).  The draw of a flight is known before the flight,
+# so that the draw is chosen, too; every third flight takes the next draw in order, so that an unseen failure mode is
+# not avoided.  Only the likelihood of the flights enters the fit: the choice does not bias it.
 
-# Winds are flown in steps of this, m/s.
+# Step of the winds that are flown, m/s.
 GRID = 0.1
-# The share of all that may be drawn that is expected to fail in the winds that are compared, and how many winds.  What
-# holds about the middle of a law need not hold in its tail, where the boundary is.
-_MIN_SHARE, _MAX_SHARE, _WINDS = 1e-3, 0.2, 10
-# Draws that are compared, of those not flown; of how many the extreme ones are sought.
-_COMPARED, _SOUGHT = 1000, 2000
-# Every so many flights takes the next draw.
-_PLAIN = 3
-# Nearer to the largest wind that is looked at than this, by bisection, it is that wind, m/s.
-_END = 0.3
+# Smallest expected failing share of the compared winds.  A fit near the centre of a distribution need not be valid in
+# its tail, where the boundary is.
+_MIN_FAILING_SHARE = 1e-3
+# Largest expected failing share of the compared winds.
+_MAX_FAILING_SHARE = 0.2
+# Number of compared winds.
+_WIND_COUNT = 10
+# Number of compared draws that have not been flown.
+_COMPARED_DRAWS = 1000
+# Number of draws among which the extreme ones are selected.
+_EXTREME_DRAW_POOL = 2000
+# Every n-th flight takes the next draw in order.
+_NEXT_DRAW_INTERVAL = 3
+# Distance from the largest wind of the search within which bisection takes the largest wind, m/s.
+_LARGEST_WIND_TOLERANCE_MPS = 0.3
 
 
 def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
-    """Wind, m/s, and draw of the flights that tell most, so many."""
+    """Return wind, m/s, and draw of the `count` most informative flights."""
     if direction.all_flew or direction.all_failed:
         speed = _by_bisection(direction)
         draws = _extreme_draws(direction) if speed == direction.most else []
         return [(speed, draw) for draw in (draws + _next_draws(direction, count, draws))[:count]]
-    return _most_telling(direction, count)
+    return _most_informative(direction, count)
 
 
 def _by_bisection(direction: Direction) -> float:
@@ -301,11 +309,11 @@ def _by_bisection(direction: Direction) -> float:
     if direction.all_failed:
         return _rounded(0.5 * min(direction.speeds), most)
     top = max(direction.speeds)
-    return _rounded(0.5 * (top + most), most) if top < most - _END else most
+    return _rounded(0.5 * (top + most), most) if top < most - _LARGEST_WIND_TOLERANCE_MPS else most
 
 
 def _next_draws(direction: Direction, count: int, others: list[int]) -> list[int]:
-    """The draws of least index that are neither flown nor among others."""
+    """Return the first draws that are neither flown nor among others."""
     taken = {*direction.draws, *others}
     out: list[int] = []
     index = 0
@@ -317,26 +325,26 @@ def _next_draws(direction: Direction, count: int, others: list[int]) -> list[int
 
 
 def _extreme_draws(direction: Direction) -> list[int]:
-    """Of each quantity the draw with the most of it and the one with the least, but for those that were flown."""
-    numbers = direction.numbers.first(_SOUGHT)
+    """Return the draws with the largest and the smallest value of each quantity, without flown draws."""
+    numbers = direction.numbers.first(_EXTREME_DRAW_POOL)
     wanted = [int(pick(numbers[:, k])) for k in range(numbers.shape[1]) for pick in (np.argmax, np.argmin)]
     return [draw for draw in dict.fromkeys(wanted) if draw not in set(direction.draws)]
 
 
-def _most_telling(direction: Direction, count: int) -> list[tuple[float, int]]:
+def _most_informative(direction: Direction, count: int) -> list[tuple[float, int]]:
     fits, most, flown = direction.fits(), direction.most, len(direction.draws)
     least, largest = (
         [boundary_speed(fit.modes, direction.numbers.population, share, most) for fit in fits]
-        for share in (_MIN_SHARE, _MAX_SHARE)
+        for share in (_MIN_FAILING_SHARE, _MAX_FAILING_SHARE)
     )
-    speeds = np.unique([_rounded(wind, most) for wind in np.linspace(min(least), max(largest), _WINDS)])
+    speeds = np.unique([_rounded(wind, most) for wind in np.linspace(min(least), max(largest), _WIND_COUNT)])
     beliefs = [_Belief(fit) for fit in fits]
-    # Where nothing is known of what is drawn, one draw is as good as any.
-    compared = _COMPARED if direction.numbers.population.shape[1] else 1
+    # Without drawn quantities all draws are equivalent.
+    compared = _COMPARED_DRAWS if direction.numbers.population.shape[1] else 1
     out: list[tuple[float, int]] = []
     for number in range(flown, flown + count):
         taken = [draw for _, draw in out]
-        draws = _next_draws(direction, 1 if number % _PLAIN == 0 else compared, taken)
+        draws = _next_draws(direction, 1 if number % _NEXT_DRAW_INTERVAL == 0 else compared, taken)
         drawn = direction.numbers.first(max(draws) + 1)[draws]
         terms = regressors(np.repeat(speeds, len(draws)), np.tile(drawn, (speeds.size, 1)))
         best = int(np.argmax(sum(belief.gains(terms) for belief in beliefs) + _gains_between(fits, terms)))
@@ -347,29 +355,30 @@ def _most_telling(direction: Direction, count: int) -> list[tuple[float, int]]:
 
 
 def _gains_between(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
-    """(n,) by how much each of these flights is expected to lessen the variance of the boundary between fits, m2/s2.
+    """Return the expected reduction (n,) of the boundary's variance between fits by each flight, m2/s2.
 
-    Which fit is right shows in what comes out: the boundary's expected square less that of its two conditional means.
+    The outcome of a flight discriminates between the fits: the reduction is the variance of the boundary's mean given
+    the outcome.
     """
     weights, speeds = (np.array(column) for column in zip(*((fit.weight, fit.speed) for fit in fits), strict=True))
     off = speeds - weights @ speeds
     fails = np.array([fail_shares(fit.modes, terms) for fit in fits])
     failing = np.clip(weights @ fails, 1e-300, 1.0 - 1e-16)
-    # The mean of what is left over where one fails; where one flies, it is the opposite.
+    # Mean deviation of the boundary, weighted by failure; for success it has the opposite sign.
     failed = (weights * off) @ fails
     out: Floats = failed**2 / failing + failed**2 / (1.0 - failing)
     return out
 
 
 class _Belief:
-    """What a fit will know once flights that are chosen have been flown."""
+    """Expected posterior of a fit after the chosen flights."""
 
     def __init__(self, fit: FailureFit) -> None:
         self._fit = fit
         self._covariances = [mode.covariance for mode in fit.modes]
 
     def gains(self, terms: Floats) -> Floats:
-        """(n,) by how much each of these flights (n, 2 + d) is expected to lessen the boundary's variance, m2/s2."""
+        """Return the expected reduction (n,) of the boundary's variance by each flight (n, 2 + d), m2/s2."""
         out: Floats = np.zeros(len(terms))
         for k, info in enumerate(self._informations(terms)):
             known, slope = terms @ self._covariances[k], self._fit.slopes[k]
@@ -377,13 +386,13 @@ class _Belief:
         return self._fit.weight * out
 
     def expect(self, row: Floats) -> None:
-        """Count a flight (2 + d,) as flown, whatever comes of it."""
+        """Include a flight (2 + d,) as flown, with unknown outcome."""
         for k, info in enumerate(self._informations(row[None])):
             known = self._covariances[k] @ row
             self._covariances[k] = self._covariances[k] - info * np.outer(known, known) / (1.0 + info * (row @ known))
 
     def _informations(self, terms: Floats) -> Iterator[Floats]:
-        """(n,) of each mode: a flight tells of one if it does not fail by those before."""
+        """Yield the information (n,) on each mode: a flight is informative unless it fails in an earlier mode."""
         reaches: Floats = np.ones(len(terms))
         for mode in self._fit.modes:
             x = terms @ mode.mean
