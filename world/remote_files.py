@@ -2,6 +2,9 @@
 
 The copy has the file's full size and holes where nothing was fetched yet; which bytes it holds stands in a file beside
 it.  A part counts when as many bytes have come as were asked for, of the version of the file that was met first.
+
+GDAL can read such files itself (``/vsicurl``), and does not take the place of this: it keeps nothing for the next
+command, does not tell that a file has changed, and does not end with Ctrl-C while a server is silent.
 """
 
 import http.client
