@@ -13,15 +13,13 @@ from logs.recording.recorder import Recorder
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict
+from planfly.flight_options import MAX_HOURS, MAX_MEGABYTES
 from world.files import hold
 from world.geometry import leg_runs
 from world.interruption import uninterrupted
 
 # ----------------------------------------------------------------------
 # How long a simulated flight may take, how large its log may grow, and what both come to by prediction.
-
-# Longer than the aircraft that planfly has can stay up; a log of 60 rows a second grows by some 20 MB an hour.
-MAX_HOURS, MAX_MEGABYTES = 6.0, 256.0
 
 
 @dataclass(frozen=True, slots=True)

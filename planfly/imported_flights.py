@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +18,9 @@ from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission.route import lay_route
-from flight.mission_files.formats import mission_text, read_mission
-from flight.simulation.setup import FlightSetup, ImportedLog, VerticalDatum, make_limits
-from flight.simulation.simulate import simulate
+from flight.mission_files.formats import read_mission
+from flight.simulation.setup import FlightSetup, ImportedLog, make_limits
+from flight.simulation.simulate import Flight, simulate, track_of
 from flight.simulation.track import Track
 from logs.importers.clean_places import LONGEST_STEP
 from logs.importers.imported_flight import LoggedFlight, make_flight, mean_wind, track_of_flight, with_flown_heights
@@ -31,9 +31,13 @@ from logs.verdict.imported.judge_imported_flight import missing_text
 from logs.verdict.imported.model_comparison import Reflight, compare_with_model
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
-from planfly.airframe import find_airframe
+from planfly.airframe import find_airframe, load_airframe
+from planfly.file_autopilots import with_file_autopilot
+from planfly.flight_options import LogOptions, apply_options, flight_entries
 from planfly.make_plan import Advance
-from planfly.open_mission import NamedFences, ScenarioChange, open_plan
+from planfly.named_fences import read_named_fences
+from planfly.open_flight import existing_mission, mission_of_plan
+from planner.plan import read_plan
 from world.errors import LogError, MissionError
 from world.scenario import Scenario, load_scenario, with_flight, with_wind
 from world.scenario_tables import FlightTable
@@ -43,29 +47,6 @@ Floats = NDArray[np.float64]
 _BLOCK = 2**20
 # Items that a mission has at least.
 _FEWEST = 2
-
-
-@dataclass(frozen=True, slots=True)
-class ImportOptions:
-    """What the options say of a flight beside its log; None where they say nothing.
-
-    plan: a mission file or plan.json that was to be flown.
-    scenario: to judge it in.  terrain: an elevation file.
-    aircraft: its name or folder; without one none of an aircraft's limits count.
-    datum: of the log's heights where it states none.
-    number: which flight of the log, from 1.
-    wind_given: the wind is another's, not the log's.
-    fences: to be kept to beside the mission's and the scenario's own.
-    """
-
-    plan: Path | None = None
-    scenario: str | None = None
-    terrain: str | None = None
-    aircraft: str | None = None
-    datum: VerticalDatum | None = None
-    number: int | None = None
-    wind_given: bool = False
-    fences: NamedFences = field(default_factory=NamedFences)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -95,29 +76,31 @@ class ImportedFlight:
         return self.verdict._repr_html_() + self.track._repr_html_()
 
 
-def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) -> ImportedFlight:
+def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     """Read a log, set it into its world and judge it.
 
-    change: makes another scenario of the one that the flight is judged in.  Raises LogError for a file that is no log
-    of an aeroplane's flight, MissionError where no mission is known, and for a plan that is not the one flown.
+    Raises LogError for a file that is no log of an aeroplane's flight, MissionError if no mission is known, and for a
+    plan that is not the one flown.
     """
-    flight = make_flight(open_log(path), options.number)
+    plan, fences = options.get("plan"), read_named_fences(options.get("fence") or ())
+    flight = make_flight(open_log(path), options.get("flight"))
     mission, origin_of_mission, planned_in = _mission(path, flight, options)
-    mission = options.fences.on_mission(mission)
-    plan_heights = options.plan is not None or flight.mission is None or flight.mission.with_heights
+    mission = fences.on_mission(mission)
+    plan_heights = plan is not None or flight.mission is None or flight.mission.with_heights
     if not plan_heights:
         mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
     _refuse_other_autopilot(path, mission, flight.raw.program)
     scenario, placed = _world(mission, options, planned_in)
-    scenario, wind_source = _in_its_wind(options.fences.on_scenario(change(scenario)), flight, options)
-    known = options.aircraft is not None or options.scenario is not None or planned_in is not None
+    scenario, wind_source = _in_its_wind(fences.on_scenario(apply_options(scenario, options)), flight, options)
+    named = (options.get("aircraft"), options.get("scenario"), planned_in)
+    known = any(one is not None for one in named)
     logged = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
     # A flight by an autopilot that planfly does not know says what the aircraft can.
     autopilot, refused = logged or (PlanflyGuidance(scenario.flight.steering.guidance), ())
     setup = _setup(scenario, placed, mission, autopilot, flight)
     heights = flight.heights
-    if options.datum is not None and heights.datum == "unstated":
-        heights = replace(heights, datum=options.datum)
+    if (datum := options.get("datum")) is not None and heights.datum == "unstated":
+        heights = replace(heights, datum=datum)
     notes = (
         *_edges(flight),
         *_other_flights(flight),
@@ -126,7 +109,7 @@ def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) ->
         *_differing(flight, mission, options),
     )
     source = ImportedLog(
-        missing=None if options.plan is not None or flight.mission is None else flight.mission.missing,
+        missing=None if plan is not None or flight.mission is None else flight.mission.missing,
         file=path.name,
         sha256=_sha256(path),
         format=flight.raw.format,
@@ -147,10 +130,8 @@ def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) ->
     )
     setup = replace(setup, source=source)
     track = track_of_flight(flight, scenario.origin)
-    if options.plan is not None:
-        mismatch = plan_mismatch(setup, track)
-        if mismatch is not None:
-            raise MissionError(f"{path}: not flown by {options.plan}: {mismatch.text}", file=path)
+    if plan is not None and (mismatch := plan_mismatch(setup, track)) is not None:
+        raise MissionError(f"{path}: not flown by {plan}: {mismatch.text}", file=path)
     verdict = judge_flight(setup, track, "")
     ended = "completed" if verdict.complete else _end_of(verdict)
     return ImportedFlight(setup, track, _events(flight), verdict, ended)
@@ -165,17 +146,16 @@ def _refuse_other_autopilot(path: Path, mission: Mission, program: str) -> None:
         raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
 
 
-def _mission(path: Path, flight: LoggedFlight, options: ImportOptions) -> tuple[Mission, str, Scenario | None]:
-    """The mission that was to be flown, whose it is, and the scenario that its plan was made in."""
-    if options.plan is not None:
-        if options.plan.suffix.lower() == ".json":
-            opened = open_plan(options.plan, options.terrain)
-            return opened.mission, f"of {options.plan.name}", opened.scenario
-        if not options.plan.is_file():
-            raise MissionError(
-                f"{options.plan}: no such file; a plan.json, .waypoints or .plan file is expected", file=options.plan
-            )
-        return read_mission(options.plan), f"of {options.plan.name}", None
+def _mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
+    """Return the mission that was to be flown, where it is from, and the scenario that its plan was made in."""
+    if (named := options.get("plan")) is not None:
+        plan_path, terrain = existing_mission(Path(named)), options.get("terrain")
+        if plan_path.suffix.lower() != ".json":
+            return read_mission(plan_path), f"of {plan_path.name}", None
+        plan = read_plan(plan_path, terrain=None if terrain is None else str(terrain))
+        scenario = with_file_autopilot(plan.scenario)
+        mission = mission_of_plan(plan, load_airframe(scenario), str(plan_path))
+        return mission, f"of {plan_path.name}", scenario
     if flight.mission is None:
         raise LogError(f"{path}: holds no mission: `plan` names the one that was to be flown", file=path)
     found = flight.mission
@@ -187,26 +167,28 @@ def _mission(path: Path, flight: LoggedFlight, options: ImportOptions) -> tuple[
     return found.mission, f"{found.origin} of the log{when}, {len(found.mission.items)} items", None
 
 
-def _world(mission: Mission, options: ImportOptions, planned_in: Scenario | None) -> tuple[Scenario, PlacedMission]:
-    """The scenario that a flight is judged in, and its mission's places there."""
-    scenario = planned_in
-    if options.scenario is not None:
-        scenario = load_scenario(options.scenario, options.terrain)
+def _world(mission: Mission, options: LogOptions, planned_in: Scenario | None) -> tuple[Scenario, PlacedMission]:
+    """Return the scenario that a flight is judged in, and the mission's places in it."""
+    scenario, named = planned_in, options.get("scenario")
+    terrain = None if options.get("terrain") is None else str(options["terrain"])
+    if named is not None:
+        scenario = load_scenario(str(named), terrain)
     if scenario is None:
         # As ArduPlane flies: so that a flight in the simulation can be held against it.
-        table = FlightTable() if options.aircraft is None else FlightTable(aircraft=options.aircraft)
-        implied = implied_scenario(mission, options.terrain, table, vertical_legs=True)
+        aircraft = flight_entries(options)["aircraft"]
+        table = FlightTable() if aircraft is None else FlightTable(aircraft=str(aircraft))
+        implied = implied_scenario(mission, terrain, table, vertical_legs=True)
         return implied.scenario, implied.placed
     return scenario, place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
 
 
-def _in_its_wind(scenario: Scenario, flight: LoggedFlight, options: ImportOptions) -> tuple[Scenario, str]:
-    """The scenario in the mean wind of the stretches, and where that is from."""
-    if options.wind_given:
+def _in_its_wind(scenario: Scenario, flight: LoggedFlight, options: LogOptions) -> tuple[Scenario, str]:
+    """Return the scenario in the mean wind of the stretches, and where that wind is from."""
+    if options.get("wind") is not None:
         return scenario, "as given"
     found = mean_wind(flight)
     if found is None:
-        own = "as the scenario has it: the log holds no wind" if options.scenario else ""
+        own = "as the scenario has it: the log holds no wind" if options.get("scenario") else ""
         return scenario, own
     blown = with_wind(scenario, found.speed, found.from_course, None)
     return blown, f"from {round(math.degrees(found.from_course)) % 360:03d}°, by {found.source} of the log"
@@ -224,7 +206,6 @@ def _setup(
     return FlightSetup(
         scenario=scenario,
         mission=mission,
-        mission_text=mission_text(mission, "waypoints"),
         route=lay_route(placed, limits.airspeed, scenario.flight.fly_over, limits, autopilot.route_rules),
         limits=limits,
         aircraft=aircraft.name,
@@ -279,9 +260,9 @@ def _other_flights(flight: LoggedFlight) -> tuple[str, ...]:
     return (f"flight {flight.number} of {flight.count} is judged; the others began {others} (--flight N)",)
 
 
-def _differing(flight: LoggedFlight, mission: Mission, options: ImportOptions) -> tuple[str, ...]:
-    """That the plan is not what the log's own mission is, in words."""
-    if options.plan is None or flight.mission is None:
+def _differing(flight: LoggedFlight, mission: Mission, options: LogOptions) -> tuple[str, ...]:
+    """Say in words how the plan differs from the log's own mission."""
+    if options.get("plan") is None or flight.mission is None:
         return ()
     own = flight.mission.mission.items
     pairs = zip(own, mission.items, strict=False)
@@ -350,14 +331,16 @@ def _one_again(
         nav="perfect",
     )
 
-    def report(done: float, whole: float) -> None:
-        advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
-
-    flown = simulate(own, model, progress=report)
-    if len(flown.track) < 2:
-        raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {flown.ended}", file=scenario.name)
+    flight, blocks = Flight(own, model), []
+    length = flight.path.length
+    for block in simulate(flight):
+        blocks.append(block)
+        advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
+    flown, ended = track_of(blocks), blocks[-1].ended
+    if len(flown) < 2:
+        raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {ended}", file=scenario.name)
     stands_in = setup.source is not None and not setup.source.aircraft_known and aircraft is None
-    return compare_with_model(own, legs, flown.track, flown.ended, stands_in=stands_in)
+    return compare_with_model(own, legs, flown, ended, stands_in=stands_in)
 
 
 def _stretches(setup: FlightSetup, track: Track) -> list[FlownLegs]:

@@ -51,7 +51,7 @@ _SEED = 77
 
 def demo(seed: int) -> CampaignBase:
     """The demo's plan of seed 1, with a spread but for the wind's mean; seed: of the draws."""
-    base = open_campaign("jacksboro-air", default_dispersions().without(ASKED), seed=1)
+    base = open_campaign("jacksboro-air", default_dispersions().without(ASKED), {"seed": 1})
     return replace(base, seed=seed)
 
 

@@ -3,6 +3,7 @@
 import copy
 import math
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -194,7 +195,6 @@ class FlightSetup:
 
     scenario: the world, and what it asks of the flight.
     mission: its items, as read or exported.
-    mission_text: the same as a .waypoints file, as flown.
     route: the waypoints that the mission comes to.
     limits: of scenario and aircraft together, made where the aircraft is loaded.
     aircraft: its name in the catalog, or its folder.
@@ -211,7 +211,6 @@ class FlightSetup:
 
     scenario: Scenario
     mission: Mission
-    mission_text: str
     route: Route
     limits: Limits
     aircraft: str
@@ -228,6 +227,11 @@ class FlightSetup:
     def __post_init__(self) -> None:
         """Draw the path here, where it cannot differ from route and limits."""
         object.__setattr__(self, "path", fly_by_path(self.route, self.limits, self.scenario.terrain))
+
+    @property
+    def name(self) -> str:
+        """Stem for names of files: the scenario of a plan, the file of a mission."""
+        return self.scenario.name if self.plan is not None else Path(self.mission.source).stem
 
     @property
     def envelope(self) -> Envelope:
