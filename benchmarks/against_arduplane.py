@@ -26,11 +26,13 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.arduplane_sitl.flight import fly_autopilot
 from flight.mission.from_plan import plan_mission
+from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from planfly.airframe import Airframe, load_airframe
-from planfly.make_plan import make_plan, make_setup
+from planfly.make_plan import make_plan
+from planfly.open_flight import make_setup
 from planner.evaluation.problem import TURBULENCE_SHARE
 from world.errors import ScenarioError
 from world.scenario import Scenario, from_spec, load_scenario
@@ -199,7 +201,7 @@ def flown_figures(setup: FlightSetup, track: Track, ended: str) -> Flown:
 def compare(seed: int, *, steep: bool = False) -> tuple[Compared, FlightSetup]:
     """Fly one random plan with both."""
     setup, airframe = random_setup(seed, steep=steep)
-    law = simulate(setup, airframe.aircraft)
+    law = fly_to_end(Flight(setup, airframe.aircraft))
     assert isinstance(setup.autopilot, ArduPlane)
     autopilot = ArduPlaneSitl.flying(setup.autopilot, BINARY)
     real, _ = fly_autopilot(setup, airframe.aircraft, autopilot)
@@ -251,7 +253,7 @@ def kept_flight(compared: Compared, setup: FlightSetup) -> dict[str, Any]:
         "arduplane_sha256": hashlib.sha256(BINARY.read_bytes()).hexdigest(),
         "seed": setup.seed,
         "scenario": setup.scenario.to_json(),
-        "mission": setup.mission_text,
+        "mission": mission_text(setup.mission, "waypoints"),
         "real": asdict(compared.real),
     }
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from tests.missions import feasible
@@ -34,7 +34,7 @@ def angles(numbers: Iterable[int], margin: float) -> Angles:
     slopes: list[float] = []
     for number in numbers:
         made = feasible(number, margin)
-        flown = simulate(made.setup, made.airframe.aircraft)
+        flown = fly_to_end(Flight(made.setup, made.airframe.aircraft))
         if flown.ended != "completed":
             raise RuntimeError(f"mission {number} {flown.ended}")
         shape = route_requirements(made.setup)

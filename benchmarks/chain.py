@@ -20,12 +20,13 @@ from benchmarks.timing import median_cpu
 from flight.dynamics.fdm import Fdm
 from flight.mission.from_plan import plan_mission
 from flight.simulation.setup import FDM_HZ, FlightSetup
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end, simulate
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.judge_flight import judge_flight
 from planfly.airframe import Airframe, load_airframe
-from planfly.make_plan import make_plan, make_setup
+from planfly.make_plan import make_plan
+from planfly.open_flight import make_setup
 from planfly.pipeline import BATCH
 from world.scenario import load_scenario
 
@@ -40,7 +41,7 @@ def run() -> dict[str, Any]:
     plan = make_plan(scenario, airframe, 1)
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
     setup = make_setup(scenario, airframe, mission, 1, plan=plan)
-    flown = simulate(setup, airframe.aircraft)
+    flown = fly_to_end(Flight(setup, airframe.aircraft))
     seconds = float(flown.track.time[-1])
     steps = round(seconds * FDM_HZ)
 
@@ -97,11 +98,14 @@ def recording(setup: FlightSetup, airframe: Airframe, folder: Path, rounds: int 
 
     def fly(every: int) -> None:
         with Recorder(log, setup, every=every, batch=BATCH) as recorder:
-            flown = simulate(setup, airframe.aircraft, sink=recorder.write_rows)
-            recorder.finish(flown.ended, None)
+            ended = ""
+            for block in simulate(Flight(setup, airframe.aircraft)):
+                recorder.write_rows(block.rows)
+                ended = block.ended
+            recorder.finish(ended, None)
 
     work: dict[str, Callable[[], object]] = {
-        "flight": lambda: simulate(setup, airframe.aircraft),
+        "flight": lambda: fly_to_end(Flight(setup, airframe.aircraft)),
         "flight, recorded at 20 Hz": lambda: fly(3),
         "flight, recorded at 60 Hz": lambda: fly(1),
     }

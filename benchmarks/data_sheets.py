@@ -24,7 +24,7 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import fastest, full_throttle, idle, straight
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from planfly.data_sheets import make_data_sheet_folder
 from tests.setups import setup_maker
 from world.errors import FlightError
@@ -105,7 +105,7 @@ def fly_both(aircraft: Aircraft, seed: int) -> dict[str, tuple[str, float, float
     setup = replace(setup, battery=aircraft.battery_energy / 3600.0)
     found = {}
     for name, flown_by in (("planfly", setup.autopilot), ("arduplane", ArduPlane(ArduPilotParameters.load(aircraft)))):
-        flown = simulate(replace(setup, autopilot=flown_by), aircraft)
+        flown = fly_to_end(Flight(replace(setup, autopilot=flown_by), aircraft))
         errors = errors_of(flown)
         found[name] = (flown.ended, errors.cross_max, errors.height_max)
     return found

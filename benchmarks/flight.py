@@ -24,7 +24,7 @@ from flight.dynamics.fdm import Fdm, Variation
 from flight.guidance.gains import Gains, load_gains
 from flight.simulation import simulate as simulation
 from flight.simulation.setup import FDM_HZ, FlightSetup
-from flight.simulation.simulate import Flight, SimulatedFlight, simulate
+from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from tests.setups import MakeSetup, setup_maker, standard
 
 Floats = NDArray[np.float64]
@@ -110,16 +110,16 @@ def windy(seed: int, speed: float = 10.0, turbulence: str = "moderate", share: f
 
 
 def calm() -> Errors:
-    return errors_of(simulate(maker()(standard()), aerosonde()))
+    return errors_of(fly_to_end(Flight(maker()(standard()), aerosonde())))
 
 
 def steady(seeds: Sequence[int]) -> list[Errors]:
-    return [errors_of(simulate(windy(seed, turbulence="none"), aerosonde())) for seed in seeds]
+    return [errors_of(fly_to_end(Flight(windy(seed, turbulence="none"), aerosonde()))) for seed in seeds]
 
 
 def moderate(seeds: Sequence[int], guidance_hz: int = 60) -> list[Errors]:
     setups = [replace(windy(seed), guidance_hz=cast("Any", guidance_hz)) for seed in seeds]
-    return [errors_of(simulate(setup, aerosonde())) for setup in setups]
+    return [errors_of(fly_to_end(Flight(setup, aerosonde()))) for setup in setups]
 
 
 def anywhere(seeds: Sequence[int]) -> list[Errors]:
@@ -128,14 +128,16 @@ def anywhere(seeds: Sequence[int]) -> list[Errors]:
     for seed in seeds:
         random = np.random.default_rng([seed, 1])
         turbulence = ("none", "light", "moderate")[int(random.integers(3))]
-        found.append(errors_of(simulate(windy(seed, float(random.uniform(0.0, 10.0)), turbulence), aerosonde())))
+        found.append(
+            errors_of(fly_to_end(Flight(windy(seed, float(random.uniform(0.0, 10.0)), turbulence), aerosonde())))
+        )
     return found
 
 
 def mismatched(seeds: Sequence[int]) -> dict[str, list[Errors]]:
     # The same slopes for all, although at a lower voltage the motor gives up to a quarter less climb.
     return {
-        name: [errors_of(simulate(windy(seed), aerosonde(), variation=variation)) for seed in seeds]
+        name: [errors_of(fly_to_end(Flight(windy(seed), aerosonde(), variation=variation))) for seed in seeds]
         for name, variation in MISMATCHES.items()
     }
 
@@ -178,11 +180,11 @@ def reference_laws(seeds: Sequence[int]) -> dict[str, list[float]]:
     found: dict[str, list[float]] = {name: [] for name in laws}
     for seed in seeds:
         setup = windy(seed)
-        ours = straight_rms(setup, simulate(setup, aerosonde()))
+        ours = straight_rms(setup, fly_to_end(Flight(setup, aerosonde())))
         for name, (law, chosen) in laws.items():
             other = replace(setup, autopilot=PlanflyGuidance(cast("Any", law)))
             with flown_with(chosen):
-                found[name].append(straight_rms(other, simulate(other, aerosonde())) / ours)
+                found[name].append(straight_rms(other, fly_to_end(Flight(other, aerosonde()))) / ours)
     return found
 
 

@@ -15,7 +15,7 @@ from flight.guidance.gains import load_gains
 from flight.mission.items import Mission
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup, make_limits
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import route_requirements
 from world.scenario import from_spec
@@ -101,7 +101,6 @@ def made_setup(points: ArrayLike, aircraft: Aircraft, wind: float, wind_from: fl
     return FlightSetup(
         scenario=scenario,
         mission=Mission(None, (), source="limits"),
-        mission_text="",
         route=route,
         limits=make_limits(scenario, load_envelope(aircraft), aircraft.airspeed, BANK),
         aircraft=aircraft.name,
@@ -138,7 +137,7 @@ def slope_limit(aircraft: Aircraft, direction: float, wind: float = 0.0, wind_fr
         return np.array([first, second, second + run * (along + np.array([0.0, 0.0, direction * math.tan(slope)]))])
 
     def holds(slope: float) -> bool:
-        flown = simulate(made_setup(leg(slope), aircraft, wind, wind_from), aircraft)
+        flown = fly_to_end(Flight(made_setup(leg(slope), aircraft, wind, wind_from), aircraft))
         return flown.ended == "completed" and _held(flown.track, aircraft.airspeed, direction)
 
     setup = made_setup(leg(0.05), aircraft, wind, wind_from)
@@ -174,7 +173,7 @@ def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0
 
     def fly(leg: float) -> Track | None:
         with flown_with(replace(load_gains(aircraft), arc_slowing_max=0.0)):
-            flown = simulate(made_setup(points(leg), aircraft, wind, wind_from), aircraft)
+            flown = fly_to_end(Flight(made_setup(points(leg), aircraft, wind, wind_from), aircraft))
         return (
             flown.track.rows(int(np.searchsorted(flown.track.time, 5.0)), len(flown.track))
             if flown.ended == "completed"

@@ -13,9 +13,10 @@ from pathlib import Path
 
 from flight.mission.from_plan import plan_mission
 from planfly.airframe import load_airframe
-from planfly.api.planning import flight_entries
 from planfly.arguments import CHOICES
-from planfly.make_plan import make_plan, make_setup
+from planfly.flight_options import flight_entries
+from planfly.make_plan import make_plan
+from planfly.open_flight import make_setup
 from planfly.pipeline import fly_and_judge
 from tests.autopilot_plans import CLEARANCE, Harm, harm_of, plan_scenario
 from world.scenario import with_flight
@@ -33,7 +34,7 @@ class Flown:
 
 def fly(number: int, law: str, autopilot: Path | None) -> Flown:
     """Plan and fly the scenario of this number, and print a line about it."""
-    scenario = with_flight(plan_scenario(number), **flight_entries(autopilot_law=law))
+    scenario = with_flight(plan_scenario(number), **flight_entries({"autopilot_law": law}))
     airframe = load_airframe(scenario)
     plan = make_plan(scenario, airframe, number + 1)
     if not plan.safe:

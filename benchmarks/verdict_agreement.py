@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
 from planfly.airframe import Airframe, load_airframe
-from planfly.api.planning import flight_entries
 from planfly.arguments import CHOICES
-from planfly.make_plan import make_setup
+from planfly.flight_options import flight_entries
+from planfly.open_flight import make_setup
 from planfly.pipeline import fly_and_judge
 from tests.field_missions import GROUND, FieldMission, close_mission, ordinary_mission
 
@@ -56,7 +56,7 @@ def setup_of(made: FieldMission) -> tuple[FlightSetup, Airframe]:
 def by_law(made: FieldMission) -> tuple[Verdict, float]:
     """Return the verdict on the law's flight, and its energy, Wh."""
     setup, airframe = setup_of(made)
-    flown = simulate(setup, airframe.aircraft)
+    flown = fly_to_end(Flight(setup, airframe.aircraft))
     return judge_flight(setup, flown.track, flown.ended), float(flown.track.energy[-1])
 
 
@@ -72,8 +72,8 @@ def by_program(made: FieldMission, program: Path) -> tuple[Verdict, bool]:
 
 
 def compare(seed: int, law_name: str, program: Path) -> Answer:
-    """Fly the mission of a seed with both."""
-    flight = {name: value for name, value in flight_entries(autopilot_law=law_name).items() if value is not None}
+    """Fly the mission of a seed by both."""
+    flight = {name: value for name, value in flight_entries({"autopilot_law": law_name}).items() if value is not None}
     made = close_mission(seed, energy=lambda ordinary: by_law(ordinary)[1], **flight)
     (law, _), (real, lost) = by_law(made), by_program(made, program)
     agree = law.flyable == real.flyable

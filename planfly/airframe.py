@@ -4,12 +4,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from aircraft.catalog import Aircraft, find_aircraft, model_hash
+from aircraft.catalog import Aircraft, find_again, find_aircraft, model_hash
 from aircraft.path_limits import Limits
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.catalog import load_autopilot
 from flight.dynamics.envelope_tables import load_envelope
-from flight.simulation.setup import make_limits
+from flight.simulation.setup import FlightSetup, make_limits
 from planner.plan import Plan
 from planner.search.lay_ground_ways import FinalLaw, with_ground_ways
 from world.errors import FlightError, ScenarioError
@@ -97,8 +97,19 @@ def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = N
     return Airframe(aircraft, with_tracking(limits, autopilot, scenario), battery, autopilot)
 
 
+def airframe_of(setup: FlightSetup) -> Airframe:
+    """Return the airframe that a setup was made with.  Raises FlightError for an aircraft that is not there.
+
+    >>> from logs.recording.example_log import example_log
+    >>> airframe_of(example_log().setup).aircraft.name
+    'aerosonde'
+    """
+    aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
+    return Airframe(aircraft, setup.limits, setup.battery, setup.autopilot)
+
+
 def bank_limit(scenario: Scenario, autopilot: Autopilot) -> float:
-    """Steepest bank that turns may take, rad: the scenario's, or that of whoever flies where it is less."""
+    """Return the bank limit in turns, rad: the lower of the scenario's limit and the autopilot's limit."""
     return min(math.radians(scenario.flight.max_bank_deg), autopilot.bank_limit)
 
 
@@ -128,7 +139,7 @@ def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
 
 
 def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot) -> float:
-    """Airspeed until a mission sets one, m/s: the scenario's, that of a file of parameters, the aircraft's.
+    """Return the initial cruise airspeed, m/s, stated by (in this order) scenario, parameter file, or aircraft.
 
     Raises ScenarioError for one that the aircraft cannot fly.
     """

@@ -13,17 +13,13 @@ from logs.recording.recorder import Recorder
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict
+from planfly.flight_options import MAX_HOURS, MAX_MEGABYTES
 from world.files import hold
 from world.geometry import leg_runs
 from world.interruption import uninterrupted
 
 # ----------------------------------------------------------------------
 # Limits on the duration of a simulated flight and on the size of its log, with a prediction of the duration.
-
-# Longest simulated flight, h: longer than any aircraft of planfly can stay in the air.
-MAX_HOURS = 6.0
-# Largest log, MB of 10^6 bytes; a log of 60 rows a second grows by about 20 MB an hour.
-MAX_MEGABYTES = 256.0
 
 
 @dataclass(frozen=True, slots=True)

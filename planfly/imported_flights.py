@@ -1,8 +1,8 @@
-"""Import flights logged by other programs: place them in a scenario, judge them, and fly them again."""
+"""Imported flights: another program's log in a scenario, along its mission, in its wind: judged, and flown again."""
 
 import hashlib
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +18,9 @@ from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission.route import lay_route
-from flight.mission_files.formats import mission_text, read_mission
-from flight.simulation.setup import FlightSetup, ImportedLog, VerticalDatum, make_limits
-from flight.simulation.simulate import simulate
+from flight.mission_files.formats import read_mission
+from flight.simulation.setup import FlightSetup, ImportedLog, make_limits
+from flight.simulation.simulate import Flight, simulate, track_of
 from flight.simulation.track import Track
 from logs.importers.clean_places import LONGEST_STEP
 from logs.importers.imported_flight import LoggedFlight, make_flight, mean_wind, track_of_flight, with_flown_heights
@@ -31,50 +31,30 @@ from logs.verdict.imported.judge_imported_flight import missing_text
 from logs.verdict.imported.model_comparison import Reflight, compare_with_model
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
-from planfly.airframe import find_airframe
+from planfly.airframe import find_airframe, load_airframe
+from planfly.file_autopilots import with_file_autopilot
+from planfly.flight_options import LogOptions, apply_options, flight_entries
 from planfly.make_plan import Advance
-from planfly.open_mission import NamedFences, ScenarioChange, open_plan
+from planfly.named_fences import read_named_fences
+from planfly.open_flight import existing_mission, mission_of_plan
+from planner.plan import read_plan
 from world.errors import LogError, MissionError
 from world.scenario import Scenario, load_scenario, with_flight, with_wind
 from world.scenario_tables import FlightTable
 
 Floats = NDArray[np.float64]
 
-# Bytes that are hashed at a time.
-_HASH_BLOCK_BYTES = 2**20
-# Least number of items of a mission.
-_MIN_MISSION_ITEMS = 2
-
-
-@dataclass(frozen=True, slots=True)
-class ImportOptions:
-    """Options for an imported flight, in addition to its log; None if an option is not given.
-
-    plan: mission file or plan.json that was to be flown.
-    scenario: scenario to judge the flight in.  terrain: elevation file.
-    aircraft: name or folder; without an aircraft none of its limits apply.
-    datum: vertical datum of the altitudes of the log, if the log states none.
-    number: number of the flight in the log, from 1.
-    wind_given: true if the wind is given instead of taken from the log.
-    fences: fences that apply in addition to the fences of the mission and the scenario.
-    """
-
-    plan: Path | None = None
-    scenario: str | None = None
-    terrain: str | None = None
-    aircraft: str | None = None
-    datum: VerticalDatum | None = None
-    number: int | None = None
-    wind_given: bool = False
-    fences: NamedFences = field(default_factory=NamedFences)
+_BLOCK = 2**20
+# Items that a mission has at least.
+_FEWEST = 2
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class ImportedFlight:
-    """Imported flight with its verdict.
+    """An imported flight, judged.
 
-    setup: setup with its source.  track: rows of the track.  events: messages of the vehicle.
-    ended: how the flight ended, according to the log.
+    setup: with its source.  track: its rows.  events: what the vehicle said.
+    ended: how the log shows that it ended.
     """
 
     setup: FlightSetup
@@ -85,49 +65,51 @@ class ImportedFlight:
 
     @property
     def lossy(self) -> bool:
-        """True if some of the log could not be read."""
+        """Whether some of the log could not be read."""
         return self.setup.source is not None and self.setup.source.damage.lossy
 
     def __repr__(self) -> str:
         return f"<ImportedFlight {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
 
     def _repr_html_(self) -> str:
-        """Return the HTML for a notebook."""
+        """How a notebook shows it."""
         return self.verdict._repr_html_() + self.track._repr_html_()
 
 
-def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) -> ImportedFlight:
-    """Read a log, place it in its scenario and judge the flight.
+def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
+    """Read a log, set it into its world and judge it.
 
-    change: makes another scenario of the one that the flight is judged in.  Raises LogError for a file that is no log
-    of an aeroplane's flight, MissionError if no mission is known or the plan is not the one flown.
+    Raises LogError for a file that is no log of an aeroplane's flight, MissionError if no mission is known, and for a
+    plan that is not the one flown.
     """
-    flight = make_flight(open_log(path), options.number)
-    mission, origin_of_mission, planned_in = _find_mission(path, flight, options)
-    mission = options.fences.on_mission(mission)
-    plan_heights = options.plan is not None or flight.mission is None or flight.mission.with_heights
+    plan, fences = options.get("plan"), read_named_fences(options.get("fence") or ())
+    flight = make_flight(open_log(path), options.get("flight"))
+    mission, origin_of_mission, planned_in = _mission(path, flight, options)
+    mission = fences.on_mission(mission)
+    plan_heights = plan is not None or flight.mission is None or flight.mission.with_heights
     if not plan_heights:
         mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
-    _require_same_autopilot(path, mission, flight.raw.program)
-    scenario, placed = _place_mission(mission, options, planned_in)
-    scenario, wind_source = _with_logged_wind(options.fences.on_scenario(change(scenario)), flight, options)
-    known = options.aircraft is not None or options.scenario is not None or planned_in is not None
+    _refuse_other_autopilot(path, mission, flight.raw.program)
+    scenario, placed = _world(mission, options, planned_in)
+    scenario, wind_source = _in_its_wind(fences.on_scenario(apply_options(scenario, options)), flight, options)
+    named = (options.get("aircraft"), options.get("scenario"), planned_in)
+    known = any(one is not None for one in named)
     logged = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
-    # Judge a flight by an autopilot unknown to planfly by the limits of the aircraft.
+    # A flight by an autopilot that planfly does not know says what the aircraft can.
     autopilot, refused = logged or (PlanflyGuidance(scenario.flight.steering.guidance), ())
-    setup = _make_logged_setup(scenario, placed, mission, autopilot, flight)
+    setup = _setup(scenario, placed, mission, autopilot, flight)
     heights = flight.heights
-    if options.datum is not None and heights.datum == "unstated":
-        heights = replace(heights, datum=options.datum)
+    if (datum := options.get("datum")) is not None and heights.datum == "unstated":
+        heights = replace(heights, datum=datum)
     notes = (
-        *_coverage_notes(flight),
-        *_other_flight_notes(flight),
+        *_edges(flight),
+        *_other_flights(flight),
         *refused,
         *mission.warnings,
-        *_plan_difference_notes(flight, mission, options),
+        *_differing(flight, mission, options),
     )
     source = ImportedLog(
-        missing=None if options.plan is not None or flight.mission is None else flight.mission.missing,
+        missing=None if plan is not None or flight.mission is None else flight.mission.missing,
         file=path.name,
         sha256=_sha256(path),
         format=flight.raw.format,
@@ -148,17 +130,15 @@ def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) ->
     )
     setup = replace(setup, source=source)
     track = track_of_flight(flight, scenario.origin)
-    if options.plan is not None:
-        mismatch = plan_mismatch(setup, track)
-        if mismatch is not None:
-            raise MissionError(f"{path}: not flown by {options.plan}: {mismatch.text}", file=path)
+    if plan is not None and (mismatch := plan_mismatch(setup, track)) is not None:
+        raise MissionError(f"{path}: not flown by {plan}: {mismatch.text}", file=path)
     verdict = judge_flight(setup, track, "")
-    ended = "completed" if verdict.complete else _completion_text(verdict)
-    return ImportedFlight(setup, track, _flight_events(flight), verdict, ended)
+    ended = "completed" if verdict.complete else _end_of(verdict)
+    return ImportedFlight(setup, track, _events(flight), verdict, ended)
 
 
-def _require_same_autopilot(path: Path, mission: Mission, program: str) -> None:
-    """Raise MissionError for a plan that was written for another autopilot than the one in the log."""
+def _refuse_other_autopilot(path: Path, mission: Mission, program: str) -> None:
+    """Raise MissionError for a plan that was written for another autopilot than the one that wrote the log."""
     flown = next((name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), "")
     if mission.autopilot and flown and mission.autopilot != flown:
         allowed = f"the flight of {path} is {program}'s: `plan` names the mission that was flown"
@@ -166,21 +146,20 @@ def _require_same_autopilot(path: Path, mission: Mission, program: str) -> None:
         raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
 
 
-def _find_mission(path: Path, flight: LoggedFlight, options: ImportOptions) -> tuple[Mission, str, Scenario | None]:
-    """Return the mission that was to be flown, its origin, and the scenario of its plan."""
-    if options.plan is not None:
-        if options.plan.suffix.lower() == ".json":
-            opened = open_plan(options.plan, options.terrain)
-            return opened.mission, f"of {options.plan.name}", opened.scenario
-        if not options.plan.is_file():
-            raise MissionError(
-                f"{options.plan}: no such file; a plan.json, .waypoints or .plan file is expected", file=options.plan
-            )
-        return read_mission(options.plan), f"of {options.plan.name}", None
+def _mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
+    """Return the mission that was to be flown, where it is from, and the scenario that its plan was made in."""
+    if (named := options.get("plan")) is not None:
+        plan_path, terrain = existing_mission(Path(named)), options.get("terrain")
+        if plan_path.suffix.lower() != ".json":
+            return read_mission(plan_path), f"of {plan_path.name}", None
+        plan = read_plan(plan_path, terrain=None if terrain is None else str(terrain))
+        scenario = with_file_autopilot(plan.scenario)
+        mission = mission_of_plan(plan, load_airframe(scenario), str(plan_path))
+        return mission, f"of {plan_path.name}", scenario
     if flight.mission is None:
         raise LogError(f"{path}: holds no mission: `plan` names the one that was to be flown", file=path)
     found = flight.mission
-    if found.missing is not None and len(found.mission.items) < _MIN_MISSION_ITEMS:
+    if found.missing is not None and len(found.mission.items) < _FEWEST:
         lacking = [missing_text(found.missing), *found.mission.warnings[:1]]
         lacking.append("`plan` names the mission that was to be flown")
         raise LogError(f"{path}: {'; '.join(lacking)}", file=path)
@@ -188,34 +167,34 @@ def _find_mission(path: Path, flight: LoggedFlight, options: ImportOptions) -> t
     return found.mission, f"{found.origin} of the log{when}, {len(found.mission.items)} items", None
 
 
-def _place_mission(
-    mission: Mission, options: ImportOptions, planned_in: Scenario | None
-) -> tuple[Scenario, PlacedMission]:
-    """Return the scenario that a flight is judged in, and the mission placed in it."""
-    scenario = planned_in
-    if options.scenario is not None:
-        scenario = load_scenario(options.scenario, options.terrain)
+def _world(mission: Mission, options: LogOptions, planned_in: Scenario | None) -> tuple[Scenario, PlacedMission]:
+    """Return the scenario that a flight is judged in, and the mission's places in it."""
+    scenario, named = planned_in, options.get("scenario")
+    terrain = None if options.get("terrain") is None else str(options["terrain"])
+    if named is not None:
+        scenario = load_scenario(str(named), terrain)
     if scenario is None:
-        # Place the mission as ArduPlane flies it, so that a simulated flight can be compared with the log.
-        table = FlightTable() if options.aircraft is None else FlightTable(aircraft=options.aircraft)
-        implied = implied_scenario(mission, options.terrain, table, vertical_legs=True)
+        # As ArduPlane flies: so that a flight in the simulation can be held against it.
+        aircraft = flight_entries(options)["aircraft"]
+        table = FlightTable() if aircraft is None else FlightTable(aircraft=str(aircraft))
+        implied = implied_scenario(mission, terrain, table, vertical_legs=True)
         return implied.scenario, implied.placed
     return scenario, place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
 
 
-def _with_logged_wind(scenario: Scenario, flight: LoggedFlight, options: ImportOptions) -> tuple[Scenario, str]:
-    """Return the scenario with the mean wind of the mission parts, and the source of the wind."""
-    if options.wind_given:
+def _in_its_wind(scenario: Scenario, flight: LoggedFlight, options: LogOptions) -> tuple[Scenario, str]:
+    """Return the scenario in the mean wind of the stretches, and where that wind is from."""
+    if options.get("wind") is not None:
         return scenario, "as given"
     found = mean_wind(flight)
     if found is None:
-        own = "as the scenario has it: the log holds no wind" if options.scenario else ""
+        own = "as the scenario has it: the log holds no wind" if options.get("scenario") else ""
         return scenario, own
     blown = with_wind(scenario, found.speed, found.from_course, None)
     return blown, f"from {round(math.degrees(found.from_course)) % 360:03d}°, by {found.source} of the log"
 
 
-def _make_logged_setup(
+def _setup(
     scenario: Scenario,
     placed: PlacedMission,
     mission: Mission,
@@ -223,11 +202,10 @@ def _make_logged_setup(
     flight: LoggedFlight,
 ) -> FlightSetup:
     aircraft, battery = find_airframe(scenario)
-    limits = _logged_limits(scenario, autopilot, flight, aircraft.airspeed)
+    limits = _limits(scenario, autopilot, flight, aircraft.airspeed)
     return FlightSetup(
         scenario=scenario,
         mission=mission,
-        mission_text=mission_text(mission, "waypoints"),
         route=lay_route(placed, limits.airspeed, scenario.flight.fly_over, limits, autopilot.route_rules),
         limits=limits,
         aircraft=aircraft.name,
@@ -239,8 +217,8 @@ def _make_logged_setup(
     )
 
 
-def _logged_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, usual: float) -> Limits:
-    """Return limits at the airspeed of the autopilot or the scenario, or the median of the flight."""
+def _limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, usual: float) -> Limits:
+    """Limits at the speed that was to be flown: the autopilot's, the scenario's, or the one that was flown."""
     aircraft, _ = find_airframe(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
     airspeed, bank = scenario.flight.airspeed_mps or usual, math.radians(scenario.flight.max_bank_deg)
@@ -256,13 +234,13 @@ def _logged_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFligh
 def _sha256(path: Path) -> str:
     digest = hashlib.sha256()
     with path.open("rb") as file:
-        while block := file.read(_HASH_BLOCK_BYTES):
+        while block := file.read(_BLOCK):
             digest.update(block)
     return digest.hexdigest()
 
 
-def _coverage_notes(flight: LoggedFlight) -> tuple[str, ...]:
-    """Describe the parts of the flight that the log lacks: before it, after it, between its rows."""
+def _edges(flight: LoggedFlight) -> tuple[str, ...]:
+    """What the log does not hold of the flight by its nature, in words: before it, after it, between its rows."""
     notes = []
     if flight.begins:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
@@ -274,17 +252,17 @@ def _coverage_notes(flight: LoggedFlight) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _other_flight_notes(flight: LoggedFlight) -> tuple[str, ...]:
-    """Note the other flights of a log."""
+def _other_flights(flight: LoggedFlight) -> tuple[str, ...]:
+    """That a log holds other flights, in words."""
     if flight.count == 1:
         return ()
     others = ", ".join(f"at {start:.0f} s ({along:.0f} s along its mission)" for start, along in flight.others)
     return (f"flight {flight.number} of {flight.count} is judged; the others began {others} (--flight N)",)
 
 
-def _plan_difference_notes(flight: LoggedFlight, mission: Mission, options: ImportOptions) -> tuple[str, ...]:
-    """Describe the differences between the plan and the mission of the log."""
-    if options.plan is None or flight.mission is None:
+def _differing(flight: LoggedFlight, mission: Mission, options: LogOptions) -> tuple[str, ...]:
+    """Say in words how the plan differs from the log's own mission."""
+    if options.get("plan") is None or flight.mission is None:
         return ()
     own = flight.mission.mission.items
     pairs = zip(own, mission.items, strict=False)
@@ -296,8 +274,8 @@ def _plan_difference_notes(flight: LoggedFlight, mission: Mission, options: Impo
     return (f"{len(changed)} items of the log's own mission lie elsewhere than the plan's, item {changed[0]} first",)
 
 
-def _flight_events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
-    """Return the messages of the vehicle during the flight, and its modes."""
+def _events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
+    """What the vehicle said during the flight, and the modes it was in."""
     if not len(flight.time):
         return ()
     low, high = float(flight.time[0]), float(flight.time[-1])
@@ -312,30 +290,29 @@ def _flight_events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
     return tuple(sorted(inside, key=lambda event: event.time))
 
 
-def _completion_text(verdict: Verdict) -> str:
+def _end_of(verdict: Verdict) -> str:
     found = next((item for item in verdict.findings if item.rule == "completion"), None)
     return "not judged" if found is None else found.brief
 
 
 # ----------------------------------------------------------------------
+# The mission of an imported flight, flown again by the model of its aircraft.
 
 
 def fly_again(
     setup: FlightSetup, track: Track, aircraft: str | None, turbulence: str | None, advance: Advance, most: int = 9
 ) -> tuple[Reflight, ...]:
-    """Fly the logged parts of the mission again in simulation and compare the flights, the longest first.
+    """Fly the legs of every stretch again, in the wind of the log, and hold the flights side by side: longest first.
 
-    setup: setup with its source.  aircraft: flown in place of the aircraft of the setup.  turbulence: in place of the
-    scenario's turbulence.  most: greatest number of parts, the longest are chosen.
+    setup: with its source.  aircraft: that flies it, in place of the setup's.  turbulence: in place of the scenario's.
+    most: of the stretches, the longest.
 
-    Raises LogError for a flight that followed none of its mission, and StartError if the model cannot begin.
+    Raises LogError for a flight that followed none of its mission, and StartError where the model cannot begin.
     """
-    return tuple(
-        _fly_part_again(setup, legs, aircraft, turbulence, advance) for legs in _flown_parts(setup, track)[:most]
-    )
+    return tuple(_one_again(setup, legs, aircraft, turbulence, advance) for legs in _stretches(setup, track)[:most])
 
 
-def _fly_part_again(
+def _one_again(
     setup: FlightSetup, legs: FlownLegs, aircraft: str | None, turbulence: str | None, advance: Advance
 ) -> Reflight:
     scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
@@ -354,17 +331,19 @@ def _fly_part_again(
         nav="perfect",
     )
 
-    def report(done: float, whole: float) -> None:
-        advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
-
-    flown = simulate(own, model, progress=report)
-    if len(flown.track) < 2:
-        raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {flown.ended}", file=scenario.name)
+    flight, blocks = Flight(own, model), []
+    length = flight.path.length
+    for block in simulate(flight):
+        blocks.append(block)
+        advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
+    flown, ended = track_of(blocks), blocks[-1].ended
+    if len(flown) < 2:
+        raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {ended}", file=scenario.name)
     stands_in = setup.source is not None and not setup.source.aircraft_known and aircraft is None
-    return compare_with_model(own, legs, flown.track, flown.ended, stands_in=stands_in)
+    return compare_with_model(own, legs, flown, ended, stands_in=stands_in)
 
 
-def _flown_parts(setup: FlightSetup, track: Track) -> list[FlownLegs]:
+def _stretches(setup: FlightSetup, track: Track) -> list[FlownLegs]:
     source = setup.source
     stretches = () if source is None else source.stretches
     found = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]

@@ -1,24 +1,16 @@
-"""A plan of a scenario for whoever flies it, as every command makes it, and what decides the flight of its mission."""
+"""Make the plan of a scenario for its aircraft and autopilot, as every command makes it."""
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Literal
 
 from aircraft.path_limits import Limits
-from flight.mission.fences import fence_zones
-from flight.mission.field_notes import field_notes
-from flight.mission.from_plan import plan_mission
-from flight.mission.items import Mission
-from flight.mission.placing import PlacedMission, place_stops
-from flight.mission.route import lay_route, with_end_courses
-from flight.mission_files.formats import mission_text
-from flight.simulation.setup import FDM_HZ, FlightSetup
 from logs.verdict.conditions import Conditions, conditions_of
 from logs.verdict.measures.circle_reach import beside_end
 from logs.verdict.measures.route_requirements import route_requirements
 from planfly.airframe import Airframe, laid_from_the_ground
 from planfly.gust_circles import settle_in_gusts
 from planfly.gust_heights import keep_height
+from planfly.open_flight import make_setup, mission_of_plan
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from planner.search.replan import replan
@@ -99,55 +91,10 @@ def _completed(plan: Plan, airframe: Airframe, old: Plan | None = None, *, onwar
     plan = laid_from_the_ground(plan, airframe, old)
     if onward or not airframe.autopilot.loiter_rules.ends_in_circle:
         return plan
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
-    setup = make_setup(plan.scenario, airframe, mission, plan.seed, plan=plan)
+    setup = make_setup(plan.scenario, airframe, mission_of_plan(plan, airframe), plan.seed, plan=plan)
     beside = beside_end(route_requirements(setup))
     if beside is None or not beside[1]:
         return plan
     circles = f"{airframe.autopilot.title} circles about the destination, up to {beside[0]:.0f} m from it"
     problems = (*plan.certificate.problems, f"{circles}: {', '.join(beside[1])}")
     return replace(plan, certificate=replace(plan.certificate, problems=problems))
-
-
-def make_setup(
-    scenario: Scenario,
-    airframe: Airframe,
-    mission: Mission,
-    seed: int,
-    *,
-    plan: Plan | None = None,
-    placed: PlacedMission | None = None,
-    fdm_hz: Literal[60, 120] = FDM_HZ,
-) -> FlightSetup:
-    """Everything that decides the flight of a mission in a scenario.
-
-    placed: the mission's places on the scenario's map where they are known already.  fdm_hz: JSBSim's steps a second.
-    Raises MissionError for a mission that cannot be laid out, and for a fence whose shapes are none.
-    """
-    # A fence that makes no zones is bad input, and the verdict could not judge it.
-    fence_zones(mission.fences, scenario.origin, mission.source)
-    limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
-    autopilot = airframe.autopilot
-    mission = replace(mission, autopilot=autopilot.name)
-    if placed is None:
-        placed = place_stops(mission, scenario.origin, scenario.terrain)
-    route = lay_route(placed, airspeed, fly_over, limits, autopilot.route_rules)
-    route = with_end_courses(route, scenario, limits)
-    stated = {} if autopilot.parameters is None else autopilot.parameters.by_origin("file")
-    notes = field_notes(mission, route, scenario, autopilot.return_rules, stated)
-    route = replace(route, notes=(*route.notes, *notes)) if notes else route
-    return FlightSetup(
-        scenario=scenario,
-        mission=mission,
-        mission_text=mission_text(mission, "waypoints"),
-        route=route,
-        limits=limits,
-        aircraft=airframe.aircraft.name,
-        battery=airframe.battery,
-        seed=seed,
-        plan=plan,
-        autopilot=autopilot,
-        nav=scenario.flight.steering.nav,
-        guidance_hz=scenario.flight.guidance_hz,
-        fdm_hz=fdm_hz,
-    )

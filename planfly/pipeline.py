@@ -8,22 +8,22 @@ import numpy as np
 from flight.autopilots.catalog import program_autopilot
 from flight.autopilots.program import ProgramAutopilot
 from flight.dynamics.fdm import Variation
-from flight.mission.from_plan import plan_mission
 from flight.mission.items import Mission
 from flight.simulation.airborne import Airborne
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import Flight, fly_to_end
+from flight.simulation.simulate import Flight, FlightBlock, simulate, track_of
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import thin_track
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
+from logs.verdict.measures.energy import predicted_energy
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import ReferenceFlights
-from logs.verdict.rules.energy_rule import needed_energy
 from logs.verdict.verdict import Verdict
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.crash_safe_log import CrashSafeLog, FlightLimits
-from planfly.make_plan import Advance, make_plan, make_setup, planned_for
+from planfly.make_plan import Advance, make_plan, planned_for
+from planfly.open_flight import make_setup, mission_of_plan
 from planfly.reference_flights import FlyReference, judge_with_reference_flights
 from planfly.returns_beside import ReturnsBeside, returns_beside
 from planner.plan import Plan
@@ -109,8 +109,7 @@ def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | No
     number = choose_seed(scenario, seed)
     airframe = load_airframe(scenario)
     plan = make_plan(scenario, airframe, number)
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
-    mission = replace(mission, autopilot=airframe.autopilot.name)
+    mission = replace(mission_of_plan(plan, airframe, "plan"), autopilot=airframe.autopilot.name)
     if not plan.feasible:
         return PlanThenFly(plan, mission, None, judge_plan_only(plan, planned_for(scenario, airframe)))
     setup = make_setup(scenario, airframe, mission, number, plan=plan)
@@ -144,60 +143,60 @@ def fly_and_judge(
     log: its verdict is its route's, and that it did not begin.  Raises FlightError for a program that does not fly it
     to its end; no log is left then.
     """
-    stores = _stores_needed(setup)
+    task = _Task(airframe, log, advance, every, limits, reference, returns=returns)
+    requirements = route_requirements(setup)
+    stores = _stores_needed(requirements)
     if stores > MAX_ENERGY_RATIO:
-        return _unflown(setup, log, f"not started: it takes {stores:.0f} times the energy carried")
+        return _unflown(requirements, log, f"not started: it takes {stores:.0f} times the energy carried")
     try:
         if autopilot is not None:
-            program = program_autopilot(autopilot).flying(setup.autopilot, autopilot)
-            return _fly_program(
-                setup, program, airframe, log, advance, every, limits, reference=reference, returns=returns
-            )
+            return _fly_program(task, setup, program_autopilot(autopilot).flying(setup.autopilot, autopilot))
         how = off_nominal or OffNominal(Variation())
         flight = Flight(setup, airframe.aircraft, how.variation, start_offset=how.start_offset)
-        return _record_and_judge(
-            setup, airframe, flight, log, advance, every, limits, reference=reference, returns=returns
-        )
+        return _record_and_judge(task, requirements, flight)
     except StartError as error:
-        return _unflown(setup, log, f"not started: {error.reason}")
+        return _unflown(requirements, log, f"not started: {error.reason}")
 
 
-def _stores_needed(setup: FlightSetup) -> float:
-    """How many times the energy carried a route takes by prediction; 0 where not even full power all the way would."""
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """What `fly_and_judge` is asked to do with a flight; the fields are its arguments."""
+
+    airframe: Airframe
+    log: Path | None
+    advance: Advance | None
+    every: int
+    limits: FlightLimits
+    reference: FlyReference
+    returns: bool
+
+
+def _stores_needed(requirements: RouteRequirements) -> float:
+    """Predict how many times the energy carried a route takes; 0 if even full power throughout takes less than two."""
+    setup = requirements.setup
     seconds, full = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full
     full_energy = float(np.nanmax(full, initial=0.0)) * seconds / 3600.0
-    return needed_energy(setup) / setup.battery if full_energy > MAX_ENERGY_RATIO * setup.battery else 0.0
+    if full_energy <= MAX_ENERGY_RATIO * setup.battery:
+        return 0.0
+    return predicted_energy(requirements)[0] / setup.battery
 
 
-def _fly_program(
-    setup: FlightSetup,
-    program: ProgramAutopilot,
-    airframe: Airframe,
-    log: Path | None,
-    advance: Advance | None,
-    every: int,
-    limits: FlightLimits,
-    *,
-    reference: FlyReference,
-    returns: bool,
-) -> JudgedFlight:
-    with program.start(setup, airframe.aircraft) as flight:
+def _fly_program(task: _Task, setup: FlightSetup, program: ProgramAutopilot) -> JudgedFlight:
+    with program.start(setup, task.airframe.aircraft) as flight:
         flight.prepare()
         try:
-            judged = _record_and_judge(
-                flight.setup, airframe, flight, log, advance, every, limits, reference=reference, returns=returns
-            )
+            judged = _record_and_judge(task, route_requirements(flight.setup), flight)
         except FlightError:
-            if log is not None:
-                log.unlink(missing_ok=True)
+            if task.log is not None:
+                task.log.unlink(missing_ok=True)
             raise
-        if log is not None:
-            flight.keep_log(log.with_suffix(program.log_suffix))
+        if task.log is not None:
+            flight.keep_log(task.log.with_suffix(program.log_suffix))
     return judged
 
 
 def autopilot_log(log: Path, program: Path) -> Path:
-    """Where the log that an autopilot's program writes is kept, beside ours.
+    """Return where the log that an autopilot's program writes is kept, next to planfly's log.
 
     >>> autopilot_log(Path("runs/flight.mcap"), Path("arduplane")).name
     'flight.BIN'
@@ -205,53 +204,51 @@ def autopilot_log(log: Path, program: Path) -> Path:
     return log.with_suffix(program_autopilot(program).log_suffix)
 
 
-def _record_and_judge(
-    setup: FlightSetup,
-    airframe: Airframe,
-    flight: Airborne,
-    log: Path | None,
-    advance: Advance | None,
-    every: int,
-    limits: FlightLimits,
-    *,
-    reference: FlyReference = "failed",
-    returns: bool = False,
-) -> JudgedFlight:
-    flight.max_ticks = min(flight.max_ticks, limits.max_ticks(flight.dt))
-
-    def report(done: float, total: float) -> None:
-        if advance is not None:
-            advance(done, total, f"{done / 1000:.1f} of {total / 1000:.1f} km")
-
-    if log is None:
-        flown = fly_to_end(flight, progress=report)
-        return _judged(setup, airframe, flown.track, flown.ended, reference=reference)
-    with CrashSafeLog(log, setup, every=every, batch=BATCH) as recorder:
-        flown = fly_to_end(flight, recorder.write, report, lambda: limits.log_full(recorder.size))
-        recorder.ended = flown.ended
-        judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended, reference=reference)
+def _record_and_judge(task: _Task, requirements: RouteRequirements, flight: Airborne) -> JudgedFlight:
+    """Fly to the end, and judge the rows that are recorded."""
+    flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
+    if task.log is None:
+        track, ended = _fly(task, flight, None)
+        return _judged(task, requirements, track, ended)
+    with CrashSafeLog(task.log, flight.setup, every=task.every, batch=BATCH) as recorder:
+        track, recorder.ended = _fly(task, flight, recorder)
+        judged = _judged(task, requirements, thin_track(track, task.every), recorder.ended)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
-        beside = returns_beside(setup, judged.track) if returns else None
+        beside = returns_beside(flight.setup, judged.track) if task.returns else None
         drawn = None if beside is None else beside.plainly_drawn()
         recorder.finish(judged.ended, judged.verdict, judged.reference, drawn)
     return replace(judged, returns=beside)
 
 
-def _unflown(setup: FlightSetup, log: Path | None, ended: str) -> JudgedFlight:
-    """A flight without a row, and without a log: none of a flight before it stays there."""
+def _fly(task: _Task, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
+    """Fly to the end or until the log is full; record and report each block.  Return the track and how it ended."""
+    blocks, ended, length = list[FlightBlock](), "", flight.path.length
+    for block in simulate(flight):
+        blocks.append(block)
+        ended = block.ended
+        if recorder is not None and len(block.rows):
+            recorder.write(block.rows)
+            ended = ended or task.limits.log_full(recorder.size)
+        if task.advance is not None:
+            task.advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
+        if ended:
+            break
+    return track_of(blocks), ended
+
+
+def _unflown(requirements: RouteRequirements, log: Path | None, ended: str) -> JudgedFlight:
+    """Judge a flight without a row; the log of an earlier flight is removed."""
     if log is not None:
         log.unlink(missing_ok=True)
-    requirements, track = route_requirements(setup), join_tracks([])
+    setup, track = requirements.setup, join_tracks([])
     verdict = judge_flight(setup, track, ended, requirements=requirements)
     return JudgedFlight(setup, requirements, track, ended, verdict, ())
 
 
-def _judged(
-    setup: FlightSetup, airframe: Airframe, track: Track, ended: str, *, reference: FlyReference
-) -> JudgedFlight:
+def _judged(task: _Task, requirements: RouteRequirements, track: Track, ended: str) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-    requirements = route_requirements(setup)
-    verdict, others = judge_with_reference_flights(requirements, airframe.aircraft, track, ended, fly=reference)
-    return JudgedFlight(setup, requirements, track, ended, verdict, (event,), others)
+    aircraft = task.airframe.aircraft
+    verdict, others = judge_with_reference_flights(requirements, aircraft, track, ended, fly=task.reference)
+    return JudgedFlight(requirements.setup, requirements, track, ended, verdict, (event,), others)

@@ -10,7 +10,7 @@ from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import Progress, simulate
+from flight.simulation.simulate import Flight, simulate, track_of
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight
@@ -101,19 +101,25 @@ class _GivenUp(Exception):
     """There is no time for reference flights."""
 
 
-def airframe_answer(setup: FlightSetup, aircraft: Aircraft, progress: Progress | None = None) -> AirframeAnswer:
-    """Fly a setup by planfly's guidance, which knows exactly where it is, and judge that flight.
+Hurry = Callable[[], bool]
+
+
+def _never() -> bool:
+    return False
+
+
+def airframe_answer(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry = _never) -> AirframeAnswer:
+    """Fly a setup by planfly's guidance, which knows its exact position, and judge that flight.
 
     It flies the same true airspeeds: those that ArduPlane takes for equivalent ones are higher the higher it flies.
-    progress: as of `flight.simulation.simulate.simulate`.
+    hurry: see `judge_with_reference_flights`.
     """
     same = true_route(setup)
     ideal = replace(setup, autopilot=PlanflyGuidance(), nav="perfect", route=same)
     try:
-        flown = simulate(ideal, aircraft, progress=progress)
+        verdict = _flown_verdict(ideal, aircraft, hurry)
     except StartError as error:
         return AirframeAnswer(False, f"not flyable: not started: {error.reason}", (("completion", FLIGHT),))
-    verdict = judge_flight(ideal, flown.track, flown.ended)
     failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
     # What is left open of ways from the ground is no matter of this flight.
     said = "flyable in the air" if verdict.flies and not verdict.flyable else verdict.headline
@@ -121,19 +127,19 @@ def airframe_answer(setup: FlightSetup, aircraft: Aircraft, progress: Progress |
 
 
 def find_deciding_parameter(
-    setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, progress: Progress | None = None
+    setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, hurry: Hurry = _never
 ) -> DecidingParameter | None:
-    """The parameter with another value of which a flight that failed passes; None where there is none.
+    """Find a parameter with which, at another value, a flight that failed passes; None if there is none.
 
-    verdict: on the flight with the setup's own parameters.  progress: of each flight.  Takes about ten flights, by
-    its law: of a program's flight they say something where the law's own flight fails as well, and
-    nothing where it passes.
+    verdict: on the flight with the setup's own parameters.  hurry: see `judge_with_reference_flights`.
+    Takes about ten flights, by the autopilot's law: they explain the flight of a program only if the law's own flight
+    fails, too.
     """
     if setup.autopilot.parameters is None or verdict.flies:
         return None
     findings = verdict.findings
     if setup.autopilot.program is not None:
-        own = _flown_by_law(setup, setup.autopilot.law, aircraft, progress)
+        own = _flown_verdict(replace(setup, autopilot=setup.autopilot.law), aircraft, hurry)
         if own.flies:
             return None
         findings = own.findings
@@ -144,7 +150,7 @@ def find_deciding_parameter(
     same = setup.in_scenario(replace(scenario, spec=spec, limits=limits))
 
     def passes(law: Autopilot) -> bool:
-        flown = _flown_by_law(same, law, aircraft, progress)
+        flown = _flown_verdict(replace(same, autopilot=law), aircraft, hurry)
         return flown.flies and has_room(flown.findings, findings)
 
     return deciding_parameter(setup.autopilot, findings, passes)
@@ -182,7 +188,7 @@ def judge_with_reference_flights(
     ended: str,
     *,
     fly: FlyReference = "failed",
-    hurry: Callable[[], bool] | None = None,
+    hurry: Hurry = _never,
 ) -> tuple[Verdict, ReferenceFlights | None]:
     """Judge a flight, and fly reference flights that explain its verdict; they do not decide whether it is flyable.
 
@@ -196,24 +202,22 @@ def judge_with_reference_flights(
     verdict = judge_flight(setup, track, ended, requirements=requirements)
     if setup.autopilot.level == "airframe" or fly == "never" or (fly == "failed" and not verdict.failed):
         return verdict, None
-
-    def watch(_done: float, _whole: float) -> None:
-        if hurry is not None and hurry():
-            raise _GivenUp
-
     try:
-        airframe = airframe_answer(setup, aircraft, watch)
+        airframe = airframe_answer(setup, aircraft, hurry)
     except _GivenUp:
         return verdict, None
     reference = ReferenceFlights(airframe)
     if airframe.flyable:
         with contextlib.suppress(_GivenUp):
-            reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, watch))
+            reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, hurry))
     return judge_flight(setup, track, ended, reference=reference, requirements=requirements), reference
 
 
-def _flown_by_law(setup: FlightSetup, law: Autopilot, aircraft: Aircraft, progress: Progress | None = None) -> Verdict:
-    """Fly a setup by a law, whoever flew it before, and judge that flight."""
-    by_law = replace(setup, autopilot=law)
-    flown = simulate(by_law, aircraft, progress=progress)
-    return judge_flight(by_law, flown.track, flown.ended)
+def _flown_verdict(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry) -> Verdict:
+    """Fly a setup and judge the flight.  Raises _GivenUp in a hurry."""
+    blocks = []
+    for block in simulate(Flight(setup, aircraft)):
+        blocks.append(block)
+        if hurry():
+            raise _GivenUp
+    return judge_flight(setup, track_of(blocks), blocks[-1].ended)

@@ -11,11 +11,11 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.mission.items import LANDINGS, Command, Frame, Mission, MissionItem
 from flight.mission.return_path import LandingStart
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from logs.verdict.returns.judge_returns import ReturnWorld
 from planfly.airframe import Airframe, load_airframe
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.kernels import Record
@@ -53,7 +53,7 @@ def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
     """
     try:
         setup, airframe = return_setup(world, start)
-        flown = simulate(setup, airframe.aircraft)
+        flown = fly_to_end(Flight(setup, airframe.aircraft))
     except PlanflyError:
         return None
     position = from_start(flown.track, start)

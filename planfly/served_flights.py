@@ -49,15 +49,15 @@ from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rule_words import rule_word
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import deciding_text, place_text
-from planfly.airframe import Airframe, choose_seed, load_airframe
-from planfly.file_autopilots import with_file_autopilot
-from planfly.make_plan import make_setup
-from planfly.open_mission import NamedFences, open_mission
+from planfly.airframe import Airframe, airframe_of, choose_seed, load_airframe
+from planfly.flight_options import MissionOptions, named_scenario
+from planfly.named_fences import read_named_fences
+from planfly.open_flight import make_setup, open_flight
 from planfly.reference_flights import judge_with_reference_flights
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.interruption import end_with_parent
-from world.scenario import Scenario, at_time, in_the_air, load_scenario, with_flight
+from world.scenario import Scenario, in_the_air
 
 Floats = NDArray[np.float64]
 
@@ -72,49 +72,38 @@ _MAX_TEXTS = 4
 class ServeOptions:
     """Options of the command line for serving; both processes load them for themselves.
 
-    mission: path of a file, "" for none.
-    scenario, terrain: None if not given.
-    flight: entries that replace entries of the scenario's [flight] table; None keeps an entry.
-    speed: ratio to real time.
-    logs: folder of the flight logs.
-    at: time of the flight, None if not stated.
-    fences: named in addition to the mission; a station that uploads another fence replaces the items, not the zones.
+    mission: a file's path, "" for none.
+    speed: times real time.
+    logs: the folder of the flight logs.
+    flown: how it is flown.  A station that uploads another fence replaces the items of named fences, not their zones.
     """
 
     mission: str
-    scenario: str | None
-    terrain: str | None
     speed: float
     logs: Path
-    flight: dict[str, str | float | None] = field(default_factory=dict)
-    fences: NamedFences = field(default_factory=NamedFences)
-    at: str | None = None
+    flown: MissionOptions = field(default_factory=MissionOptions)
 
 
 @dataclass(frozen=True, slots=True)
 class ServedScenario:
-    """Scenario, aircraft, seed, and the initial mission."""
+    """The scenario, the aircraft in it, the seed, the mission to begin with, and the fence items that are named."""
 
     scenario: Scenario
     airframe: Airframe
     seed: int
     mission: Mission | None
+    fence: tuple[MissionItem, ...] = ()
 
 
 def open_served(options: ServeOptions) -> ServedScenario:
-    """Load the scenario and mission to serve.  Raises PlanflyError."""
-
-    def change(scenario: Scenario) -> Scenario:
-        return with_file_autopilot(with_flight(at_time(scenario, options.at), **options.flight))
-
+    """Load what is served.  Raises PlanflyError."""
     if options.mission:
-        opened = open_mission(
-            Path(options.mission), options.scenario, options.terrain, change=change, fences=options.fences
-        )
-        return ServedScenario(opened.setup.scenario, opened.airframe, opened.setup.seed, opened.setup.mission)
-    scenario = change(load_scenario(options.scenario or DEFAULT_SCENARIO, options.terrain))
-    scenario = options.fences.on_scenario(scenario)
-    return ServedScenario(scenario, load_airframe(scenario), choose_seed(scenario, None), None)
+        setup = open_flight(options.mission, options.flown)
+        return ServedScenario(setup.scenario, airframe_of(setup), setup.seed, setup.mission)
+    fences = read_named_fences(options.flown.get("fence") or ())
+    scenario = named_scenario(options.flown.get("scenario") or DEFAULT_SCENARIO, options.flown)
+    scenario, seed = fences.on_scenario(scenario), options.flown.get("seed")
+    return ServedScenario(scenario, load_airframe(scenario), choose_seed(scenario, seed), None, fences.items)
 
 
 def flown_parameters(scenario: Scenario, stated: Mapping[str, float]) -> dict[str, float]:

@@ -43,8 +43,8 @@ def serve_vehicle(
         on_message(f"flight logs go to {options.logs}/; Ctrl-C ends")
         if served.mission is not None:
             vehicle.load(served.mission)
-        elif options.fences.items:
-            vehicle.load_fence(options.fences.items)
+        elif served.fence:
+            vehicle.load_fence(served.fence)
         opened.callback(vehicle.close)
         vehicle.run(stop)
     dropped = ", ".join(f"{count:,} {reason}" for reason, count in asdict(link.dropped).items() if count)

@@ -16,7 +16,7 @@ from logs.verdict.measures.route_requirements import surveys_of
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
 from planfly.airframe import Airframe, load_airframe
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from planfly.pipeline import fly_and_judge
 from planfly.reference_flights import deciding_parameter
 from world.errors import PlanflyError

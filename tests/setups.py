@@ -74,7 +74,7 @@ def setup_along(
 ) -> FlightSetup:
     """A setup of a route without a mission file; battery: Wh."""
     limits = make_limits(scenario, envelope, airspeed, math.radians(bank_deg))
-    return FlightSetup(scenario, Mission(None, (), source=source), "", route, limits, aircraft, battery, seed)
+    return FlightSetup(scenario, Mission(None, (), source=source), route, limits, aircraft, battery, seed)
 
 
 def waypoint_mission(points: Floats, speeds: Floats, origin: GeoOrigin) -> Mission:

@@ -4,6 +4,7 @@
 demo's terrain, in its wind.
 """
 
+import math
 import statistics
 import subprocess
 import sys
@@ -21,7 +22,8 @@ from planfly.campaigns.dispersions import default_dispersions, draw_flight
 from planfly.campaigns.flight_requests import FlightRequest
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.worker_pool import Workers, worker_pool
-from world.scenario import Scenario, load_scenario, with_wind
+from planfly.flight_options import MissionOptions
+from world.scenario import load_scenario
 
 # Number of flights whose rate is measured.
 FLIGHTS = 90
@@ -39,10 +41,11 @@ def mission_13_km(folder: Path) -> CampaignBase:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     wind = load_scenario("jacksboro-air").wind
 
-    def in_its_wind(scenario: Scenario) -> Scenario:
-        return with_wind(scenario, wind.speed, wind.from_course, wind.turbulence)
-
-    return open_campaign(str(path), default_dispersions(), terrain="jacksboro", seed=1, change=in_its_wind)
+    options: MissionOptions = {
+        "terrain": "jacksboro", "seed": 1, "wind": (wind.speed, math.degrees(wind.from_course)),
+        "turbulence": wind.turbulence,
+    }  # fmt: skip
+    return open_campaign(str(path), default_dispersions(), options)
 
 
 def flights_a_minute(base: CampaignBase, workers: int, flights: int) -> float:

@@ -14,11 +14,11 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import SimulatedFlight, simulate
+from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
 from planfly.airframe import Airframe, load_airframe
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from tests.field_missions import FieldMission, close_mission, ordinary_mission
 from world.scenario import Scenario
 from world.wind import Wind
@@ -64,11 +64,13 @@ def mission_of(seed: int, aircraft: str) -> FieldMission:
 
 def _energy(made: FieldMission) -> float:
     airframe = load_airframe(made.scenario)
-    return float(simulate(make_setup(made.scenario, airframe, made.mission, 1), airframe.aircraft).track.energy[-1])
+    return float(
+        fly_to_end(Flight(make_setup(made.scenario, airframe, made.mission, 1), airframe.aircraft)).track.energy[-1]
+    )
 
 
 def _judged(setup: FlightSetup, airframe: Airframe, hz: Literal[60, 120]) -> Verdict:
-    flown = simulate(replace(setup, fdm_hz=hz), airframe.aircraft)
+    flown = fly_to_end(Flight(replace(setup, fdm_hz=hz), airframe.aircraft))
     return judge_flight(setup, flown.track, flown.ended)
 
 
@@ -91,7 +93,7 @@ def _max_distance(setup: FlightSetup, airframe: Airframe) -> float:
 
 
 def _flown(setup: FlightSetup, airframe: Airframe, hz: int) -> SimulatedFlight:
-    return simulate(replace(setup, fdm_hz=cast("Any", hz)), airframe.aircraft)
+    return fly_to_end(Flight(replace(setup, fdm_hz=cast("Any", hz)), airframe.aircraft))
 
 
 def compare_all(seeds: range, aircraft: str = "aerosonde", *, loud: bool = False) -> dict[str, float]:

@@ -53,8 +53,8 @@ _SEED = 77
 
 
 def demo(seed: int) -> CampaignBase:
-    """Open the demo's plan of seed 1, dispersed except for the mean wind; seed: seed of the draws."""
-    base = open_campaign("jacksboro-air", default_dispersions().without(ASKED), seed=1)
+    """The demo's plan of seed 1, with a spread but for the wind's mean; seed: of the draws."""
+    base = open_campaign("jacksboro-air", default_dispersions().without(ASKED), {"seed": 1})
     return replace(base, seed=seed)
 
 

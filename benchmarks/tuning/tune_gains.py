@@ -25,7 +25,7 @@ from flight.dynamics.fdm import JSBSIM_VERSION
 from flight.guidance.gains import Gains, load_gains
 from flight.guidance.model_gains import ROUND_FIGURES, airframe_gains, at_airspeed
 from flight.simulation import simulate as simulation
-from flight.simulation.simulate import SimulatedFlight, simulate
+from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from tests.setups import MakeSetup, setup_maker, standard
 
 # Start of every search: round figures, of the size that earlier searches of the Aerosonde found.
@@ -70,7 +70,7 @@ def fly(aircraft: Aircraft, gains: Gains, case: Case) -> SimulatedFlight:
     module.BANK_RESERVE = RESERVE
     try:
         with flown_with(gains):
-            return simulate(case.setup, aircraft, variation=case.variation)
+            return fly_to_end(Flight(case.setup, aircraft, variation=case.variation))
     finally:
         module.BANK_RESERVE = usual
 

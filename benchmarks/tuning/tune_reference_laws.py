@@ -17,7 +17,7 @@ from benchmarks.flight import aerosonde, errors_of, flown_with, straight_rms, wi
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.gains import load_gains
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 
 # Seeds of the training winds, 10 m/s with moderate turbulence from any direction; the benchmark uses seeds from 0.
 SEEDS = range(500, 506)
@@ -71,7 +71,7 @@ def measure(law: str, chosen: dict[str, float], setups: list[FlightSetup]) -> Se
     found = []
     with flown_with(replace(load_gains(aerosonde()), **cast("Any", chosen))):
         for setup in setups:
-            flown = simulate(replace(setup, autopilot=PlanflyGuidance(cast("Any", law))), aerosonde())
+            flown = fly_to_end(Flight(replace(setup, autopilot=PlanflyGuidance(cast("Any", law))), aerosonde()))
             if not errors_of(flown).completed:
                 return Setting(chosen, ())
             found.append(straight_rms(setup, flown))

@@ -3,6 +3,7 @@
 import copy
 import math
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -200,12 +201,11 @@ FDM_HZ: Literal[120] = 120
 class FlightSetup:
     """Inputs of a flight: mission, aircraft, autopilot and world; the log carries all of them.
 
-    scenario: the world, and the requirements on the flight.
-    mission: mission items, as read or exported.
-    mission_text: the same mission as a .waypoints file, as flown.
-    route: waypoints of the mission as flown.
-    limits: limits of scenario and aircraft together, made where the aircraft is loaded.
-    aircraft: name in the catalog, or folder.
+    scenario: the world, and what it asks of the flight.
+    mission: its items, as read or exported.
+    route: the waypoints that the mission comes to.
+    limits: of scenario and aircraft together, made where the aircraft is loaded.
+    aircraft: its name in the catalog, or its folder.
     battery: energy carried, Wh.
     seed: seed of the flight; the turbulence's stream comes from it unless the scenario's wind has its own.
     plan: None for a mission from outside.
@@ -219,7 +219,6 @@ class FlightSetup:
 
     scenario: Scenario
     mission: Mission
-    mission_text: str
     route: Route
     limits: Limits
     aircraft: str
@@ -236,6 +235,11 @@ class FlightSetup:
     def __post_init__(self) -> None:
         """Build the path here, so that it always matches route and limits."""
         object.__setattr__(self, "path", fly_by_path(self.route, self.limits, self.scenario.terrain))
+
+    @property
+    def name(self) -> str:
+        """Stem for names of files: the scenario of a plan, the file of a mission."""
+        return self.scenario.name if self.plan is not None else Path(self.mission.source).stem
 
     @property
     def envelope(self) -> Envelope:

@@ -2,9 +2,10 @@
 
 import math
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 from aircraft.catalog import Aircraft
 from aircraft.contacts import contacts_of
@@ -81,9 +82,6 @@ def make_loop(
     return fly
 
 
-Progress = Callable[[float, float], None]
-Sink = Callable[[Rows], None]
-
 # Of the usual guidance, s; `Flight.dt` is a flight's own.
 TICK = 1.0 / 60.0
 # Rows that are handed on at a time, s of flight.
@@ -108,21 +106,41 @@ class SimulatedFlight:
     path: FlyByPath
 
 
-def simulate(
-    setup: FlightSetup,
-    aircraft: Aircraft,
-    *,
-    sink: Sink | None = None,
-    progress: Progress | None = None,
-    variation: Variation | None = None,
-) -> SimulatedFlight:
-    """Fly a setup from a trimmed start.  The same setup gives the same track, bit for bit.
+class FlightBlock(NamedTuple):
+    """Some rows of a flight, as `simulate` yields them.
 
-    sink: is handed each second's rows, (t,) of `flight.simulation.track.TRACK_ROW`.
-    progress: is called with the distance flown and the whole, m.
-    variation: an aircraft that differs from its model, which guidance knows nothing of: for robustness.
+    rows: (t,) of `flight.simulation.track.TRACK_ROW`.
+    ended: how the flight ended with these rows, "completed" or the reason why not; "" while it goes on.
+    distance: flown along the path by now, m.
+    """
 
-    Raises FlightError for an aircraft that cannot be loaded, and StartError for a flight that cannot start.
+    rows: Rows
+    ended: str
+    distance: float
+
+
+def simulate(flight: Airborne) -> Iterator[FlightBlock]:
+    """Fly until the flight ends, and yield the rows of each second.
+
+    >>> import numpy as np
+    >>> from types import SimpleNamespace
+    >>> from flight.simulation.track import TRACK_ROW
+    >>> blocks = iter([(np.zeros(60, TRACK_ROW), ""), (np.zeros(12, TRACK_ROW), "ground contact")])
+    >>> at, path = SimpleNamespace(distance=0.0), SimpleNamespace(length=9.0)
+    >>> flight = SimpleNamespace(dt=1 / 60, memory=at, path=path, block=lambda count: next(blocks))
+    >>> [(len(block.rows), block.ended) for block in simulate(flight)]
+    [(60, ''), (12, 'ground contact')]
+    """
+    ended = ""
+    while not ended:
+        rows, ended = flight.block(round(BLOCK / flight.dt))
+        yield FlightBlock(rows, ended, min(float(flight.memory.distance), flight.path.length))
+
+
+def fly_to_end(flight: Airborne) -> SimulatedFlight:
+    """Fly until the flight ends.  The same setup gives the same track, bit for bit.
+
+    Raises FlightError for a program that does not fly to the end.
 
     >>> import numpy as np
     >>> from aircraft.catalog import load_aircraft
@@ -135,45 +153,18 @@ def simulate(
     >>> way = scenario.start + np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0]])
     >>> route = Route(way, np.array([25.0]), np.zeros(2), np.zeros(2, dtype=bool), np.arange(2), "")
     >>> limits = make_limits(scenario, load_envelope(aerosonde), 25.0, 0.5)
-    >>> flown = simulate(FlightSetup(scenario, Mission(None, ()), "", route, limits, "aerosonde", 888.0, 1), aerosonde)
+    >>> setup = FlightSetup(scenario, Mission(None, ()), route, limits, "aerosonde", 888.0, 1)
+    >>> flown = fly_to_end(Flight(setup, aerosonde))
     >>> flown.ended, round(float(flown.track.time[-1])), bool(abs(flown.track.cross_track).max() < 0.1)
     ('completed', 12, True)
     """
-    return fly_to_end(Flight(setup, aircraft, variation), sink, progress)
+    blocks = list(simulate(flight))
+    return SimulatedFlight(track_of(blocks), blocks[-1].ended, flight.path)
 
 
-def fly_to_end(
-    flight: Airborne,
-    sink: Sink | None = None,
-    progress: Progress | None = None,
-    stop: Callable[[], str] | None = None,
-) -> SimulatedFlight:
-    """Fly until the flight ends.
-
-    sink, progress: as of `simulate`.  stop: asked after each second of flight; what it gives, if anything, is how the
-    flight ends there.
-
-    >>> import numpy as np
-    >>> from types import SimpleNamespace
-    >>> from flight.simulation.track import TRACK_ROW
-    >>> blocks = iter([(np.zeros(60, TRACK_ROW), ""), (np.zeros(12, TRACK_ROW), "ground contact")])
-    >>> at, path = SimpleNamespace(distance=0.0), SimpleNamespace(length=9.0)
-    >>> flown = fly_to_end(SimpleNamespace(dt=1 / 60, memory=at, path=path, block=lambda count: next(blocks)))
-    >>> len(flown.track), flown.ended
-    (72, 'ground contact')
-    """
-    blocks: list[Rows] = []
-    ended = ""
-    while not ended:
-        rows, ended = flight.block(round(BLOCK / flight.dt))
-        blocks.append(rows)
-        if sink is not None and len(rows):
-            sink(rows)
-        if stop is not None and not ended:
-            ended = stop()
-        if progress is not None:
-            progress(min(flight.memory.distance, flight.path.length), flight.path.length)
-    return SimulatedFlight(as_track(join_rows(blocks)), ended, flight.path)
+def track_of(blocks: Sequence[FlightBlock]) -> Track:
+    """Join the rows of blocks to a track."""
+    return as_track(join_rows([block.rows for block in blocks]))
 
 
 # What of `flight.guidance.inner_loops.GUIDANCE_MEMORY` belongs to the path that is flown, and not to the aircraft.
@@ -187,7 +178,7 @@ _CARRIED = ("state", "true", "estimated", "commands", "air", "place", "wind", "g
 
 
 class Flight(Airborne):
-    """A flight by the law of an autopilot: `simulate` flies it in one go, the live vehicle in step with a clock."""
+    """A flight by the law of an autopilot: `simulate` flies it as fast as possible, the live vehicle in real time."""
 
     def __init__(
         self,
@@ -197,9 +188,12 @@ class Flight(Airborne):
         local_map: LocalMap | None = None,
         start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
-        """Start it: local_map is the setup's where another flight of it has fitted one already.
+        """Start it from a trimmed state.
 
+        variation: an aircraft that differs from its model, which guidance does not know.
+        local_map: the map of the setup if another flight of it has fitted one already.
         start_offset: east, north and up from the route's first waypoint to where the flight begins, m.
+        Raises FlightError for an aircraft that cannot be loaded, and StartError for a flight that cannot start.
         """
         gains = load_gains(aircraft)
         self._ways, gear = setup.ground_ways, None

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from aircraft.envelope import Envelope
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.route import Route
-from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
 from flight.simulation.track import COLUMNS, Track
 from logs.recording.reader import FlightLog, LogEvent
@@ -48,7 +47,6 @@ def example_log() -> FlightLog:
     setup = FlightSetup(
         scenario=scenario,
         mission=mission,
-        mission_text=mission_text(mission, "waypoints"),
         route=Route(
             waypoints=_WAYPOINTS,
             airspeed=np.full(2, _AIRSPEED),

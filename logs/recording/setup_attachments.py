@@ -21,6 +21,7 @@ from pydantic import ConfigDict, Field, ValidationError
 
 from flight.autopilots.autopilot import Autopilot, StoredAutopilot
 from flight.autopilots.catalog import restore_autopilot, stored_name
+from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, ImportedLog, make_limits
 from logs.recording.setup_schema import (
     EnvelopeTable,
@@ -280,7 +281,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
     """
     attachments = {
         SCENARIO_FILE: _json(setup.scenario.to_json()),
-        MISSION_FILE: setup.mission_text.encode(),
+        MISSION_FILE: mission_text(setup.mission, "waypoints").encode(),
     }
     if setup.plan is not None:
         attachments[PLAN_FILE] = plan_json(setup.plan).encode()
@@ -343,7 +344,6 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
     setup = FlightSetup(
         scenario=scenario,
         mission=file.mission.mission(),
-        mission_text=_text(listed, MISSION_FILE, source),
         route=file.route.route(where),
         limits=make_limits(scenario, envelope, file.airspeed_mps, file.max_bank_rad),
         aircraft=file.aircraft,

@@ -54,14 +54,14 @@ def judge_flight(
     >>> from flight.mission.items import Mission, MissionItem
     >>> from flight.mission.route import make_route
     >>> from flight.simulation.setup import make_limits
-    >>> from flight.simulation.simulate import simulate
+    >>> from flight.simulation.simulate import Flight, fly_to_end
     >>> from world.scenario import load_scenario
     >>> scenario, aerosonde = load_scenario("tight"), find_aircraft("aerosonde")
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0 + 0.01 * k, 75.0) for k in range(2)]
     >>> mission, limits = Mission(None, tuple(way)), make_limits(scenario, load_envelope(aerosonde), 25.0, 0.5)
     >>> route = make_route(mission, scenario.origin, scenario.terrain, 25.0, False, limits)
-    >>> setup = FlightSetup(scenario, mission, "", route, limits, "aerosonde", 888.0, seed=1)
-    >>> flown = simulate(setup, aerosonde)
+    >>> setup = FlightSetup(scenario, mission, route, limits, "aerosonde", 888.0, seed=1)
+    >>> flown = fly_to_end(Flight(setup, aerosonde))
     >>> judge_flight(setup, flown.track, flown.ended).headline
     'flyable'
     """

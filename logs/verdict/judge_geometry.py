@@ -203,7 +203,7 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0 + 0.001 * k, 60.0 + 20.0 * k) for k in range(2)]
     >>> mission, limits = Mission(None, tuple(way)), make_limits(scenario, envelope, 25.0, 0.5)
     >>> route = make_route(mission, scenario.origin, scenario.terrain, 25.0, False, limits)
-    >>> verdict = judge_geometry(FlightSetup(scenario, mission, "", route, limits, "aerosonde", 888.0, seed=1))
+    >>> verdict = judge_geometry(FlightSetup(scenario, mission, route, limits, "aerosonde", 888.0, seed=1))
     >>> verdict.headline
     'not flyable: slope on leg 0, to item 1 (14.5° > 14.2°)'
     >>> [[change.what for change in one] for finding in verdict.findings for one in finding.suggestions]

@@ -1,12 +1,10 @@
 """How likely a mission is to fly, and the largest wind from each direction: many flights, each somewhat different."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
-from planfly.api.planning import Wind, changed_scenario
 from planfly.arguments import check_arguments
 from planfly.campaigns.campaign_base import CampaignBase, is_mission_file, open_campaign
 from planfly.campaigns.campaign_result import CampaignResult, campaign_line, make_goal, winds_line
@@ -27,13 +25,19 @@ from planfly.campaigns.summary import summarise
 from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, read_table
 from planfly.campaigns.worker_pool import Workers, checked_address
 from planfly.first_start import with_warm_up
+from planfly.flight_options import (
+    CampaignOptions,
+    MissionOptions,
+    WindsOptions,
+    mission_options,
+    named_fences,
+    takes_options,
+)
 from planfly.kernel_units.unit_kernels import BOTH
-from planfly.open_mission import FencePaths, read_named_fences
 from planfly.stages import stage
 from planner.plan import Plan
 from world.errors import PlanflyError
 from world.extras import need_extra, needs_extra
-from world.scenario_tables import Guidance, Navigation
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,55 +51,34 @@ class CampaignFlight:
     log: Path
 
 
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """What a campaign flies, as the keywords of a call state it; None for what they leave as it is."""
+def _open(
+    target: Plan | str | Path, options: MissionOptions, dispersions: Dispersions, folder: OutputDirectory
+) -> CampaignBase:
+    """Open the mission of a campaign, and its folder for the campaign.
 
-    target: Plan | str
-    scenario: str | None
-    terrain: str | None
-    fence: FencePaths
-    seed: int | None
-    flown: Mapping[str, Any]
+    A scenario is planned, if the folder holds no plan of it.  Raises PlanflyError; the folder is left as it was then.
+    """
+    named, flown = target if isinstance(target, Plan) else str(target), mission_options(options)
+    is_planned = isinstance(named, Plan) or is_mission_file(named)
 
-    def open(self, dispersions: Dispersions, folder: OutputDirectory) -> CampaignBase:
-        """The mission, and its folder ready for it.  Raises PlanflyError; the folder is as it was then."""
-        return folder.open(lambda planned: self._opened(dispersions, planned))
-
-    def _opened(self, dispersions: Dispersions, planned: Path | None) -> CampaignBase:
-        """The mission, planned if it is a scenario and there is no plan of it."""
-        opened = partial(
-            open_campaign, self.target, dispersions, planned=planned, scenario_name=self.scenario,
-            terrain=self.terrain, seed=self.seed, change=partial(changed_scenario, **self.flown),
-            fences=read_named_fences(self.fence),
-        )  # fmt: skip
-        is_planned = isinstance(self.target, Plan) or is_mission_file(self.target)
+    def opened(planned: Path | None) -> CampaignBase:
+        made = partial(open_campaign, named, dispersions, flown, planned=planned)
         if is_planned or (planned is not None and planned.is_file()):
-            return opened()
+            return made()
         with stage("planning") as advance:
-            return opened(advance=advance)
+            return made(advance=advance)
 
-    def name(self, folder: Path) -> str:
-        """What the line that repeats it names: a plan lies in the campaign's folder."""
-        return str(folder / "plan.json") if isinstance(self.target, Plan) else self.target
-
-    def options(self, base: CampaignBase, spread: str | Path | None) -> dict[str, object]:
-        """What decides what is flown, by name, for the line that repeats it."""
-        fences = [self.fence] if isinstance(self.fence, str | Path) else list(self.fence)
-        named = {"scenario": self.scenario, "terrain": self.terrain, "fence": [str(one) for one in fences]}
-        return {"seed": base.seed, "spread": spread, **named, **self.flown}
+    return folder.open(opened)
 
 
-def _asked(
-    target: Plan | str | Path,
-    scenario: str | Path | None,
-    terrain: str | Path | None,
-    fence: FencePaths,
-    seed: int | None,
-    **flown: Any,
-) -> _Asked:
-    world, ground = (None if name is None else str(name) for name in (scenario, terrain))
-    return _Asked(target if isinstance(target, Plan) else str(target), world, ground, fence, seed, flown)
+def _line_of(target: Plan | str | Path, folder: Path) -> str:
+    """Return what the command line that repeats a campaign names: a plan lies in the campaign's folder."""
+    return str(folder / "plan.json") if isinstance(target, Plan) else str(target)
+
+
+def _repeated(base: CampaignBase, options: MissionOptions, spread: str | Path | None) -> dict[str, object]:
+    """Return the options of the command line that repeats a campaign."""
+    return {"seed": base.seed, "spread": spread} | {**mission_options(options), "fence": named_fences(options)}
 
 
 def _workers(count: int | None, scheduler: str | None, seed: int | None) -> Workers:
@@ -128,32 +111,16 @@ def continued_goal(
 
 @needs_extra("campaigns")
 @with_warm_up(*BOTH)
+@takes_options
 def campaign(
     target: Plan | str | Path,
     *,
-    spread: Path | str | None = None,
-    flights: int | None = None,
-    prove: float | None = None,
-    at_least: float | None = None,
-    confidence: float | None = None,
-    scenario: str | Path | None = None,
-    terrain: str | Path | None = None,
-    fence: FencePaths = (),
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    nav: Navigation | None = None,
-    seed: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     out: Path | str | None = None,
     resume: bool = False,
     overwrite: bool = False,
+    **options: Unpack[CampaignOptions],
 ) -> CampaignResult:
     """Fly a mission many times, each time as `planfly.fly` would in its own wind, aircraft, terrain and start.
 
@@ -164,7 +131,7 @@ def campaign(
     prove: a probability: fly until it is reached or missed, whichever comes first.  at_least: one to answer after all
     flights.  Not both.
     confidence: of each bound; None takes 0.95, or what it was of a campaign that is resumed.
-    scenario to nav: as of `planfly.fly`.  seed: of plan and draws; None takes the scenario's, or 1.
+    The other options are as of `planfly.fly`; seed: of plan and draws.
     workers: processes on this machine; None for one a core.  scheduler: a running dask scheduler's address instead.
     out: folder of the campaign's files; None keeps none.  resume: go on with the campaign that is there.
     overwrite: replace it.
@@ -176,17 +143,14 @@ def campaign(
     ...
     world.errors.ArgumentError: prove 1.5: at least 0.5 and below 1 is expected
     """
-    place_of_work = _workers(workers, scheduler, seed)
-    goal = make_goal(flights, prove, at_least, confidence)
-    asked = _asked(
-        target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
-        turbulence=turbulence, at=at, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
-    )  # fmt: skip
+    place_of_work = _workers(workers, scheduler, options["seed"])
+    asked = (options["flights"], options["prove"], options["at_least"], options["confidence"])
+    goal, spread = make_goal(*asked), options["spread"]
     with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as place:
         if resume:
-            goal = continued_goal(place.folder, flights, prove, at_least, confidence)
-        base = asked.open(_dispersions(spread), place)
-        line = campaign_line(asked.name(place.folder), goal, asked.options(base, spread))
+            goal = continued_goal(place.folder, *asked)
+        base = _open(target, options, _dispersions(spread), place)
+        line = campaign_line(_line_of(target, place.folder), goal, _repeated(base, options, spread))
         return _flown(base, goal, place_of_work, place, line, keep=out is not None)
 
 
@@ -209,43 +173,23 @@ def _flown(
 
 @needs_extra("campaigns")
 @with_warm_up(*BOTH)
+@takes_options
 def campaign_flight(
     target: Plan | str | Path,
     index: int,
     out: str | Path,
-    *,
-    spread: Path | str | None = None,
-    flights: int | None = None,
-    prove: float | None = None,
-    at_least: float | None = None,
-    confidence: float | None = None,
-    scenario: str | Path | None = None,
-    terrain: str | Path | None = None,
-    fence: FencePaths = (),
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    nav: Navigation | None = None,
-    seed: int | None = None,
+    **options: Unpack[CampaignOptions],
 ) -> CampaignFlight:
     """Fly one flight of a campaign again, into a log in the campaign's folder.
 
     target: as of the campaign, and so are all other keywords.  index: of the flight, from 0.  out: the folder.
     Raises a `planfly.PlanflyError` for bad input, and where the flight does not come out as the table has it.
     """
-    check_arguments(index=index, seed=seed)
+    check_arguments(index=index, seed=options["seed"])
     folder = Path(out)
-    goal = continued_goal(folder, flights, prove, at_least, confidence)
-    asked = _asked(
-        target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
-        turbulence=turbulence, at=at, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
-    )  # fmt: skip
-    base = asked.open(_dispersions(spread), OutputDirectory(folder, DATABASE, resume=True, overwrite=False))
+    goal = continued_goal(folder, options["flights"], options["prove"], options["at_least"], options["confidence"])
+    place = OutputDirectory(folder, DATABASE, resume=True, overwrite=False)
+    base = _open(target, options, _dispersions(options["spread"]), place)
     row = _row_of(base, goal, folder, index)
     log = folder / "flights" / f"flight-{index:06d}.mcap"
     log.parent.mkdir(exist_ok=True)
@@ -267,33 +211,17 @@ def _row_of(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightR
 
 @needs_extra("campaigns")
 @with_warm_up(*BOTH)
+@takes_options
 def winds(
     target: Plan | str | Path,
     *,
     prove: float = 0.99,
     directions: int = 16,
     most: float = 20.0,
-    flights: int | None = None,
-    confidence: float = 0.95,
-    spread: str | Path | None = None,
-    scenario: str | Path | None = None,
-    terrain: str | Path | None = None,
-    fence: FencePaths = (),
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    nav: Navigation | None = None,
-    seed: int | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
     out: str | Path | None = None,
     resume: bool = False,
     overwrite: bool = False,
+    **options: Unpack[WindsOptions],
 ) -> WindsFound:
     """Find the largest wind from each direction in which a mission flies with a probability.
 
@@ -301,7 +229,7 @@ def winds(
     prove: the probability.  directions: 4 to 72.  most: wind to look up to, m/s.  flights: at most, of all
     directions; None takes 5,000, or those that a search which is resumed was to have.
     confidence: of each interval.  spread, seed, workers, scheduler: as of `planfly.campaign`.
-    scenario to nav: as of `planfly.fly`.
+    The other options are as of `planfly.fly`.
     out: a folder for ``winds.html``, ``winds.png``, ``winds.json`` and the flights; None keeps none.
     resume: go on with the search that is there.  overwrite: replace it.
     A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
@@ -312,18 +240,16 @@ def winds(
     ...
     world.errors.ArgumentError: directions 3: 4 to 72 is expected
     """
+    confidence, flights, spread = options["confidence"], options["flights"], options["spread"]
     check_arguments(prove=prove, confidence=confidence, directions=directions, most=most, flights=flights)
-    place_of_work = _workers(workers, scheduler, seed)
-    asked = _asked(
-        target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
-        turbulence=turbulence, at=at, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
-    )  # fmt: skip
+    place_of_work = _workers(options["workers"], options["scheduler"], options["seed"])
     with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as place:
         folder = place.folder
         goal = WindsGoal(prove, confidence, directions, most, asked_flights(flights, folder, resume=resume))
-        base = asked.open(_dispersions(spread).without(ASKED), place)
+        base = _open(target, options, _dispersions(spread).without(ASKED), place)
         with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
             found = find_winds(base, goal, place_of_work, store, advance)
         if out is not None:
-            write_winds(folder, base, found, winds_line(asked.name(place.folder), goal, asked.options(base, spread)))
+            line = winds_line(_line_of(target, folder), goal, _repeated(base, options, spread))
+            write_winds(folder, base, found, line)
     return found

@@ -2,7 +2,6 @@
 
 import contextlib
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 from flight.autopilots.autopilot import Autopilot
@@ -27,15 +26,11 @@ from logs.views.exports.map_files import (
 )
 from planfly.api.flying import FlownMission
 from planfly.first_start import with_warm_up
-from planfly.open_mission import (
-    FencePaths,
-    NamedFences,
-    fence_of_plan,
-    is_log,
-    loss_text,
-    open_mission,
-    read_named_fences,
-)
+from planfly.flight_logs import is_log, loss_text
+from planfly.flight_options import FencePaths, MissionOptions
+from planfly.named_fences import read_named_fences
+from planfly.open_flight import open_flight
+from planfly.plan_fence import fence_of_plan
 from planfly.returns_beside import returns_beside
 from planfly.stages import stage
 from planfly.targets import refuse_existing
@@ -43,7 +38,7 @@ from planner.plan import Plan, plan_json
 from world.errors import MissionError, PlanflyError
 from world.extras import need_extra
 from world.files import temporary_folder, write_whole
-from world.scenario import Scenario, at_time
+from world.scenario import Scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT
 
 MAPS = {".kml": kml_text, ".gpx": gpx_text}
@@ -127,7 +122,7 @@ def export(
             if target.suffix.lower() not in (*MAPS, *PARAMETERS, *LOGS):
                 _refuse_unknown(target)
             refuse_existing(target, overwrite, path)
-        found = _read(path, targets, read_named_fences(fence), at, fenced=bool(fence))
+        found = _read(path, targets, {"fence": fence, "at": at})
         texts = [_text(found, target) for target in targets]
     for target, (text, _) in zip(targets, texts, strict=True):
         write_whole(target, text)
@@ -160,15 +155,15 @@ def _refuse_unknown(target: Path) -> None:
         raise MissionError(message, file=target, field="suffix", value=target.suffix, allowed=allowed) from None
 
 
-def _read(path: Path, targets: tuple[Path, ...], fences: NamedFences, at: str | None, *, fenced: bool) -> _Source:
-    """A source, as far as the targets ask for it."""
+def _read(path: Path, targets: tuple[Path, ...], options: MissionOptions) -> _Source:
+    """Read a source as far as the targets need it."""
     if path.is_file() and is_log(path):
-        if at is not None:
+        if (at := options["at"]) is not None:
             allowed = "a log is exported with the zones of its own time"
             raise MissionError.of_argument("at", at, allowed, file=path)
-        if fenced:
+        if options["fence"]:
             allowed = "a log is exported with the fence that it was flown with"
-            raise MissionError.of_argument("fence", fences, allowed, shown="", file=path)
+            raise MissionError.of_argument("fence", options["fence"], allowed, shown="", file=path)
         return _read_log(path, coloured=_asks_kml(targets))
     for target in targets:
         suffix = target.suffix
@@ -176,7 +171,7 @@ def _read(path: Path, targets: tuple[Path, ...], fences: NamedFences, at: str | 
             message = f"{target}: {suffix} is written of a flight log (.mcap), and {path} is none"
             raise MissionError(message, file=target, field="suffix", value=suffix)
     placed = any(target.suffix.lower() in (*MAPS, *PARAMETERS) for target in targets)
-    return _read_mission(path, fences, at, placed=placed, coloured=_asks_kml(targets))
+    return _read_mission(path, options, placed=placed, coloured=_asks_kml(targets))
 
 
 def _asks_kml(targets: tuple[Path, ...]) -> bool:
@@ -202,16 +197,16 @@ def _read_log(path: Path, *, coloured: bool) -> _Source:
     return _with_returns(source, log.setup, log.track) if coloured else source
 
 
-def _read_mission(path: Path, fences: NamedFences, at: str | None, *, placed: bool, coloured: bool) -> _Source:
-    """A plan or a mission file; a map, parameters, zones and a plan's fence need its place, which not every one has."""
+def _read_mission(path: Path, options: MissionOptions, *, placed: bool, coloured: bool) -> _Source:
+    """Read a plan or a mission file; a map, parameters, zones and a plan's fence need its place."""
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
-    is_plan = path.suffix.lower() == ".json"
-    if not (placed or is_plan or fences.zones or at is not None):
+    is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
+    if not (placed or is_plan or fences.zones or options["at"] is not None):
         mission = fences.on_mission(read_mission(path))
         return _Source(replace(mission, autopilot=mission.autopilot or DEFAULT_AUTOPILOT), path.stem)
     # What a station uploads has no times: which zones count is decided here.
-    setup = open_mission(path, None, None, change=partial(at_time, at=at), fences=fences).setup
+    setup = open_flight(path, options)
     line, zones = {"plan": plan_line(setup)}, map_zones(setup)
     source = _Source(setup.mission, setup.scenario.name, line, zones, autopilot=setup.autopilot)
     source = _with_returns(source, setup, None) if coloured else source

@@ -2,37 +2,38 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Unpack
 
 from flight.autopilots.catalog import program_autopilot
 from flight.autopilots.sitl.process import check_binary
 from flight.mission.items import Mission
-from flight.simulation.setup import FlightSetup, VerticalDatum
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.verdict import Verdict
 from planfly import pipeline
-from planfly.api.planning import Wind, changed_scenario, opened_scenario
+from planfly.airframe import airframe_of
 from planfly.arguments import check_arguments
-from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_kind, flight_text
+from planfly.crash_safe_log import FlightLimits, flight_kind, flight_text
 from planfly.first_start import with_warm_up
-from planfly.kernel_units.unit_kernels import BOTH, FLYING
-from planfly.open_mission import (
-    FencePaths,
-    NamedFences,
-    OpenedMission,
-    ScenarioChange,
-    is_log,
-    judge_log,
-    loss_text,
-    open_mission,
-    open_planned,
-    read_named_fences,
+from planfly.flight_logs import is_log, judge_log, loss_text
+from planfly.flight_options import (
+    LOG_OPTIONS,
+    FlightOptions,
+    FlyOptions,
+    LogOptions,
+    MissionOptions,
+    mission_options,
+    named_scenario,
+    options_of_log,
+    takes_options,
 )
+from planfly.kernel_units.unit_kernels import BOTH, FLYING
+from planfly.named_fences import NamedFences, read_named_fences
+from planfly.open_flight import open_flight
 from planfly.pipeline import PlanThenFly, autopilot_log, fly_and_judge
 from planfly.returns_beside import ReturnsBeside, returns_line
 from planfly.stages import say_replaced, stage
@@ -41,7 +42,6 @@ from planner.plan import Plan
 from world.errors import ArgumentError, ScenarioError
 from world.extras import need_extra
 from world.scenario import Scenario, over_terrain
-from world.scenario_tables import Guidance, Navigation
 
 # ----------------------------------------------------------------------
 # What the functions return: frozen data, short to print, a table in a notebook.
@@ -128,28 +128,20 @@ class Judged:
 
 
 @with_warm_up(*BOTH)
+@takes_options
 def plan_then_fly(
     scenario: Scenario | str | Path,
     *,
     seed: int | None = None,
-    terrain: str | Path | None = None,
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    nav: Navigation | None = None,
     log: Path | str | None = None,
+    **options: Unpack[FlightOptions],
 ) -> PlanThenFly:
     """Plan a path, fly it in JSBSim and judge the flight.
 
-    scenario: an embedded name, a TOML file's path, or a `Scenario`.  terrain: an elevation file in place of its own.
+    scenario: an embedded name, a TOML file's path, or a `Scenario`.
     seed: of planner and turbulence; None takes the scenario's, or 1.
-    wind to nav: as of `planfly.plan`.
     log: where to write the flight as MCAP, replaced if it exists; None writes none.
+    options: as of `planfly.fly`.
     Raises a `planfly.PlanflyError` for bad input.  A plan that cannot be flown is a verdict, not an error.
 
     >>> import planfly
@@ -160,50 +152,40 @@ def plan_then_fly(
     check_arguments(seed=seed)
     if log is not None:
         refuse_existing(Path(log), overwrite=True)
-    world = changed_scenario(
-        opened_scenario(scenario, terrain), wind=wind, turbulence=turbulence, at=at, aircraft=aircraft,
-        airspeed=airspeed, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
-    )  # fmt: skip
+    world = named_scenario(scenario, options)
     return pipeline.plan_then_fly(world, seed=seed, log=None if log is None else Path(log))
 
 
 @with_warm_up(*FLYING)
+@takes_options
 def fly(
     mission: Plan | str | Path,
     *,
     log: str | Path | None = None,
-    scenario: str | Path | None = None,
-    terrain: str | Path | None = None,
-    fence: FencePaths = (),
-    seed: int | None = None,
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    nav: Navigation | None = None,
-    autopilot: str | Path | None = None,
-    log_hz: Literal[10, 20, 30, 60] = 60,
-    max_hours: float = MAX_HOURS,
-    max_log: float = MAX_MEGABYTES,
-    levels: bool = False,
     overwrite: bool = True,
+    **options: Unpack[FlyOptions],
 ) -> FlownMission:
     """Fly a plan or a mission file in JSBSim, and judge the flight.
 
     mission: a `Plan`, or the path of a plan.json, .waypoints or .plan file.
     log: where to write the flight as MCAP; {name} and {seed} in it stand for the mission's name and the seed; None
     writes none.  overwrite: whether an existing file is replaced.
-    scenario: to fly it in, a name or a TOML file; None for the plan's own, or one made around the mission.
-    terrain: an elevation file in place of the scenario's.  fence: files of fences and zones beside its own.
+
+    Where it is flown (None keeps what the plan or the scenario states):
+    scenario: a name or a TOML file; None for the plan's own, or one made around the mission.
+    terrain: an elevation file in place of the scenario's.  fence: files of fences and zones in addition to its own.
     seed: of the turbulence; None takes the plan's, the scenario's, or 1.
-    wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law, nav: as of `planfly.plan`.
+    wind: speed, m/s, and where it comes from, degrees.  turbulence: "none", "light" or "moderate".
+    at: when, "START" or "START/END" by ISO 8601 with offsets from UTC: zones that are inactive then are left out.
+
+    By what it is flown:
+    aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
+    autopilot_law: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16", "px4-1.17" or "ideal".
+    guidance: planfly's own law ("path", "l1", "vector-field") in place of ArduPlane's.  nav: "perfect", "rtk", "gnss".
     autopilot: the program of ArduPlane or PX4, which then flies.
-    log_hz: rows a second in the log.  max_hours, max_log: where a flight ends that would go on, h and MB.
-    levels: True flies a mission that passes by planfly's guidance, too, as one that fails: both are compared.
+
+    log_hz: rows a second in the log.  max_hours, max_log: limits at which a flight is stopped, h and MB.
+    levels: True flies a mission that passes by planfly's guidance, too, as one that fails: both flights are compared.
 
     A plan that cannot be flown is a verdict, not an error; bad input raises a `planfly.PlanflyError`.
 
@@ -211,19 +193,15 @@ def fly(
     >>> flown.ended, flown.verdict.flyable, flown.setup.scenario.wind.speed
     ('completed', True, 4.0)
     """
-    check_arguments(seed=seed, log_hz=log_hz, max_hours=max_hours, max_log=max_log)
-    program = named_program(autopilot)
-    change = partial(
-        changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft, airspeed=airspeed, params=params,
-        guidance=guidance, autopilot_law=autopilot_law, nav=nav, autopilot=autopilot,
-    )  # fmt: skip
-    opened = opened_mission(mission, scenario, terrain, seed, fence, change)
-    target = None if log is None else _log_target(log, opened, mission, program, overwrite)
-    limits = FlightLimits(max_hours, max_log)
-    with stage(f"flying {flight_text(opened.setup)}", flight_kind(opened.setup)) as advance:
+    limits = FlightLimits(options["max_hours"], options["max_log"])
+    check_arguments(seed=options["seed"], log_hz=options["log_hz"], max_hours=limits.hours, max_log=limits.megabytes)
+    program = named_program(options["autopilot"])
+    setup = open_flight(mission, options, program)
+    target = None if log is None else _log_target(log, setup, mission, program, overwrite)
+    with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
         flown = fly_and_judge(
-            opened.setup, opened.airframe, target, advance, every=60 // log_hz, autopilot=program, limits=limits,
-            reference="always" if levels else "failed", returns=target is not None,
+            setup, airframe_of(setup), target, advance, every=60 // options["log_hz"], autopilot=program,
+            limits=limits, reference="always" if options["levels"] else "failed", returns=target is not None,
         )  # fmt: skip
     target = target if len(flown.track) else None
     own = None if target is None or program is None else autopilot_log(target, program)
@@ -231,22 +209,14 @@ def fly(
 
 
 @with_warm_up(*FLYING)
+@takes_options
 def fly_by_each(
-    mission: Plan | str | Path,
-    autopilots: Sequence[str],
-    *,
-    scenario: str | Path | None = None,
-    terrain: str | Path | None = None,
-    fence: FencePaths = (),
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
+    mission: Plan | str | Path, autopilots: Sequence[str], **options: Unpack[MissionOptions]
 ) -> dict[str, FlownMission]:
     """Fly a mission by the laws of several autopilots, each with its default parameters, and judge each flight.
 
-    autopilots: names, as `autopilot_law` of `planfly.plan` takes them.  The others are as of `planfly.fly`.
+    autopilots: names, as `autopilot_law` of `planfly.fly` takes them, which is not an option here, nor are `params`
+    and `guidance`.  options: as of `planfly.fly`.
     Returns the flights by these names.  Raises a `planfly.PlanflyError` for bad input.
 
     >>> import planfly
@@ -258,29 +228,21 @@ def fly_by_each(
     if not named:
         raise ArgumentError.of_argument("autopilots", "", "at least one autopilot is expected")
     check_arguments(autopilot_law=named)
-    return {
-        name: fly(
-            mission,
-            scenario=scenario,
-            terrain=terrain,
-            fence=fence,
-            wind=wind,
-            turbulence=turbulence,
-            at=at,
-            aircraft=aircraft,
-            airspeed=airspeed,
-            autopilot_law=name,
-        )
-        for name in named
-    }
+    own = {name: value for name, value in options.items() if name in ("params", "guidance", "autopilot_law")}
+    refuse(_source_of(mission), own, "belongs to one autopilot, and several are named")
+    flown = {}
+    for name in named:
+        options["autopilot_law"] = name
+        flown[name] = fly(mission, **options)
+    return flown
 
 
 def _log_target(
-    log: str | Path, opened: OpenedMission, mission: Plan | str | Path, program: Path | None, overwrite: bool
+    log: str | Path, setup: FlightSetup, mission: Plan | str | Path, program: Path | None, overwrite: bool
 ) -> Path:
-    """The log to write; it and the log that a program writes beside it may be replaced.  Raises PlanflyError."""
+    """Prepare the file of the log; an existing one and the log of a program are replaced.  Raises PlanflyError."""
     source = None if isinstance(mission, Plan) else Path(mission)
-    target = file_target(log, opened.name, opened.setup.seed, overwrite=overwrite, source=source)
+    target = file_target(log, setup.name, setup.seed, overwrite=overwrite, source=source)
     if program is not None:
         refuse_existing(autopilot_log(target, program), overwrite, source)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -291,39 +253,19 @@ def _log_target(
 # ----------------------------------------------------------------------
 # Judge a flight by its log, or a mission.
 
-# Why a log takes no other world.
-_AS_FLOWN = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
-_WHERE_FLOWN = "a log is judged in the scenario it carries; only `terrain` replaces its ground"
-
 
 @with_warm_up()
+@takes_options
 def judge(
-    what: FlightLog | FlownMission | Plan | str | Path,
-    *,
-    scenario: str | Path | None = None,
-    terrain: str | Path | None = None,
-    fence: FencePaths = (),
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    plan: str | Path | None = None,
-    flight: int | None = None,
-    datum: VerticalDatum | None = None,
-    geometry: bool = False,
+    what: FlightLog | FlownMission | Plan | str | Path, *, geometry: bool = False, **options: Unpack[LogOptions]
 ) -> Judged:
     """Judge a flight by its log, or a plan or a mission by flying it, and keep what the verdict is about.
 
     what: a flight log or its path, an autopilot's log, what `planfly.fly` gave, a `Plan`, or the path of a plan.json,
     .waypoints or .plan.
     geometry: True judges a plan or a mission by its geometry alone, which says nothing of how an autopilot flies it.
-    scenario, wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law: of a plan or mission, as of
-    `planfly.fly`; a flight is judged as it was flown.
-    terrain, fence: in place of the ground, and beside the fences, that it carries.
+    options: of a plan or mission, as of `planfly.fly`; a flight is judged as it was flown, and only `terrain` replaces
+    its ground and `fence` adds to its fences.
     plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
     Raises a `planfly.PlanflyError` for bad input.
 
@@ -331,52 +273,30 @@ def judge(
     >>> [planfly.judge(plan, geometry=geometry).verdict.level for geometry in (False, True)]
     ['autopilot', 'geometric']
     """
-    flown_with: dict[str, Any] = {
-        "wind": wind, "turbulence": turbulence, "at": at, "aircraft": aircraft, "airspeed": airspeed, "params": params,
-        "guidance": guidance, "autopilot_law": autopilot_law,
-    }  # fmt: skip
-    of_log: dict[str, Any] = {"plan": plan, "flight": flight, "datum": datum}
     if isinstance(what, str | Path) and is_imported_log(Path(what)):
         # Imported here: no other check needs the libraries that read other programs' logs.
         from planfly.api.imported import read_imported
 
-        found = read_imported(what, scenario=scenario, terrain=terrain, fence=fence, **of_log, **flown_with)
+        found = read_imported(what, **options)
         return Judged(found.setup, found.verdict, lossy=found.lossy, track=found.track, is_log=True)
     source = _source_of(what)
-    refuse(source, of_log, "goes with an imported log, not with this file")
-    fences = read_named_fences(fence)
+    refuse(source, options_of_log(options), "goes with an imported log, not with this file")
     if isinstance(what, FlightLog | FlownMission) or (isinstance(what, str | Path) and is_log(Path(what))):
-        refuse(source, flown_with, _AS_FLOWN)
-        refuse(source, {"scenario": scenario}, _WHERE_FLOWN)
-        what = read_log(Path(what)) if isinstance(what, str | Path) else what
+        refuse_other_flight(source, options)
         refuse(source, {"geometry": geometry or None}, "a flight is judged as it was flown")
-        return _judge_flight(what, terrain, fences)
+        what = read_log(Path(what)) if isinstance(what, str | Path) else what
+        return _judge_flight(what, options["terrain"], read_named_fences(options["fence"]))
+    mission = mission_options(options)
     if not geometry:
-        flown = fly(what, scenario=scenario, terrain=terrain, fence=fence, **flown_with)
+        flown = fly(what, **mission)
         return Judged(flown.setup, flown.verdict, track=flown.track if len(flown.track) else None)
-    change = partial(changed_scenario, **flown_with)
-    setup = opened_mission(what, scenario, terrain, None, fences, change).setup
+    setup = open_flight(what, mission)
     return Judged(setup, judge_geometry(setup))
 
 
+@takes_options
 def check(
-    what: FlightLog | FlownMission | Plan | str | Path,
-    *,
-    scenario: str | Path | None = None,
-    terrain: str | Path | None = None,
-    fence: FencePaths = (),
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    plan: str | Path | None = None,
-    flight: int | None = None,
-    datum: VerticalDatum | None = None,
-    geometry: bool = False,
+    what: FlightLog | FlownMission | Plan | str | Path, *, geometry: bool = False, **options: Unpack[LogOptions]
 ) -> Verdict:
     """Judge a flight by its log, or a plan or a mission by flying it.
 
@@ -389,12 +309,7 @@ def check(
     >>> planfly.check(plan).flyable, planfly.check(plan, geometry=True).level
     (False, 'geometric')
     """
-    return judge(
-        what, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence,
-        at=at, aircraft=aircraft,
-        airspeed=airspeed, params=params, guidance=guidance, autopilot_law=autopilot_law, plan=plan, flight=flight,
-        datum=datum, geometry=geometry,
-    ).verdict  # fmt: skip
+    return judge(what, geometry=geometry, **options).verdict
 
 
 def _source_of(what: FlightLog | FlownMission | Plan | str | Path) -> str:
@@ -413,6 +328,18 @@ def refuse(source: str, given: Mapping[str, Any], allowed: str) -> None:
             raise ScenarioError.of_argument(name, value, allowed, shown="", file=source)
 
 
+# Why a log takes no other world.
+_AS_FLOWN = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
+_WHERE_FLOWN = "a log is judged in the scenario it carries; only `terrain` replaces its ground"
+
+
+def refuse_other_flight(source: str, options: MissionOptions) -> None:
+    """Refuse options of another flight than the one that a log holds.  Raises ScenarioError."""
+    kept = (*LOG_OPTIONS, "terrain", "fence", "scenario")
+    refuse(source, {name: value for name, value in options.items() if name not in kept}, _AS_FLOWN)
+    refuse(source, {"scenario": options["scenario"]}, _WHERE_FLOWN)
+
+
 def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Judged:
     setup = flight.setup
     if terrain is not None:
@@ -426,24 +353,11 @@ def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, 
     return Judged(setup, verdict, track=flight.track, is_log=True)
 
 
-def opened_mission(
-    mission: Plan | str | Path,
-    scenario: str | Path | None,
-    terrain: str | Path | None,
-    seed: int | None,
-    fence: FencePaths | NamedFences,
-    change: ScenarioChange,
-) -> OpenedMission:
-    """A plan or a mission file, opened with what is asked for; arguments as of `fly`.  Raises PlanflyError."""
-    world, ground = (None if name is None else str(name) for name in (scenario, terrain))
-    fences = fence if isinstance(fence, NamedFences) else read_named_fences(fence)
-    if isinstance(mission, Plan):
-        return open_planned(mission, world, ground, seed=seed, change=change, fences=fences)
-    return open_mission(Path(mission), world, ground, seed=seed, change=change, fences=fences)
-
-
 def named_program(autopilot: str | Path | None) -> Path | None:
-    """The program that is to fly; None for none.  Raises FlightError for what cannot be run, and MissingExtraError."""
+    """Return the autopilot's program that is to fly, or None if none is named.
+
+    Raises FlightError for what cannot be run, and MissingExtraError.
+    """
     if autopilot is None:
         return None
     need_extra("live", "--autopilot needs")

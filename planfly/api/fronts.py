@@ -5,15 +5,15 @@ import io
 import json
 import math
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from planfly.airframe import choose_seed, load_airframe
-from planfly.api.planning import Wind, changed_scenario, opened_scenario, stop_condition
+from planfly.api.planning import stop_condition
 from planfly.arguments import RANGES, check_arguments
 from planfly.choice_of_ways import make_front
 from planfly.first_start import with_warm_up
+from planfly.flight_options import FlightOptions, named_scenario, takes_options
 from planfly.kernel_units.unit_kernels import CHOOSING
 from planfly.stages import stage
 from planfly.targets import RUN_FOLDER, clean_folder, filled_pattern
@@ -21,7 +21,6 @@ from planner.plan import plan_json
 from planner.search.plan_front import Front, FrontPlan
 from world.files import write_whole
 from world.scenario import Scenario
-from world.scenario_tables import Guidance, Navigation
 
 # Where a front goes that nobody named a place for.
 FRONT_FOLDER = f"{RUN_FOLDER}-front"
@@ -36,24 +35,17 @@ FRONT_FILES = (
 
 
 @with_warm_up(*CHOOSING)
+@takes_options
 def plan_front(
     scenario: Scenario | str | Path,
     count: int = 20,
     *,
     seed: int | None = None,
     seconds: float | None = None,
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    nav: Navigation | None = None,
     out: str | Path | None = None,
     overwrite: bool = True,
     stop: Callable[[], bool] | None = None,
+    **options: Unpack[FlightOptions],
 ) -> Front:
     """Plan a choice of ways: plans of which none is better than another in all of what they are compared by.
 
@@ -73,12 +65,8 @@ def plan_front(
     >>> 1 <= len(front.plans) <= 3, all(one.plan.safe for one in front.plans)
     (True, True)
     """
-    change = partial(
-        changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft, airspeed=airspeed, params=params,
-        guidance=guidance, autopilot_law=autopilot_law, nav=nav,
-    )  # fmt: skip
     check_arguments(front=count, seed=seed, seconds=seconds)
-    world = change(opened_scenario(scenario))
+    world = named_scenario(scenario, options)
     number = choose_seed(world, seed)
     airframe = load_airframe(world)
     folder = None

@@ -2,27 +2,24 @@
 
 import tempfile
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
+from typing import Unpack
 
-from flight.simulation.setup import VerticalDatum
 from logs.recording.reader import FlightLog, read_log
 from logs.recording.recorder import Recorder
 from logs.recording.recover import recover_log
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
 from logs.views.report.text import left_lines, refly_lines
-from planfly.api.planning import Wind, changed_scenario
 from planfly.arguments import check_arguments
 from planfly.first_start import with_warm_up
-from planfly.imported_flights import ImportedFlight, ImportOptions, fly_again, import_flight
+from planfly.flight_options import LogOptions, takes_options
+from planfly.imported_flights import ImportedFlight, fly_again, import_flight
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.open_mission import FencePaths, read_named_fences
 from planfly.stages import stage
 from planfly.targets import REFLOWN, REFLY_FILES, clean_folder, refuse_existing, refuse_folder
 from world.errors import LogError, ScenarioError
 from world.files import write_whole
-from world.scenario_tables import Guidance
 
 # Rows that are recorded at once: a recorder takes many times the bytes of a row for it.
 _ROWS_AT_ONCE = 4096
@@ -42,69 +39,24 @@ class Reflown:
     files: tuple[Path, ...]
 
 
-def read_imported(
-    log: str | Path,
-    *,
-    plan: str | Path | None = None,
-    scenario: str | Path | None = None,
-    terrain: str | Path | None = None,
-    fence: FencePaths = (),
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    flight: int | None = None,
-    datum: VerticalDatum | None = None,
-) -> ImportedFlight:
-    """Read and judge a flight of another program's log; arguments as of `import_log`.
+@takes_options
+def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFlight:
+    """Read and judge a flight of another program's log; options as of `import_log`.
 
-    Raises ScenarioError for an argument that a flown log cannot take.
+    Raises ScenarioError for an option that a flown log cannot take.
     """
-    for name, value in {
-        "params": params,
-        "guidance": guidance,
-        "autopilot_law": autopilot_law,
-        "airspeed": airspeed,
-    }.items():
-        if value is not None:
+    for name in ("params", "guidance", "autopilot_law", "airspeed", "nav", "seed"):
+        if (value := dict(options)[name]) is not None:
             allowed = "an imported flight is judged by the autopilot and the speeds of its log"
             raise ScenarioError.of_argument(name, value, allowed, shown="", file=log)
-    check_arguments(flight=flight, datum=datum)
-    options = ImportOptions(
-        plan=None if plan is None else Path(plan),
-        scenario=None if scenario is None else str(scenario),
-        terrain=None if terrain is None else str(terrain),
-        aircraft=str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft,
-        datum=datum,
-        number=flight,
-        wind_given=wind is not None,
-        fences=read_named_fences(fence),
-    )
-    change = partial(changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft)
-    return import_flight(Path(log), options, change)
+    check_arguments(flight=options["flight"], datum=options["datum"])
+    return import_flight(Path(log), options)
 
 
 @with_warm_up()
+@takes_options
 def import_log(
-    log: str | Path,
-    target: str | Path | None = None,
-    *,
-    plan: str | Path | None = None,
-    scenario: str | Path | None = None,
-    terrain: str | Path | None = None,
-    fence: FencePaths = (),
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    flight: int | None = None,
-    datum: VerticalDatum | None = None,
-    overwrite: bool = False,
+    log: str | Path, target: str | Path | None = None, *, overwrite: bool = False, **options: Unpack[LogOptions]
 ) -> ImportedFlight:
     """Read a flight of another program's log, judge it against its plan, and write it as a flight log.
 
@@ -114,16 +66,12 @@ def import_log(
     flight: which of the log's flights, from 1; None for the longest in AUTO.
     datum: what the log's heights are above where it does not say, "amsl" or "ellipsoid".
     scenario, terrain, fence, wind, turbulence, at, aircraft: as of `planfly.fly`; without an aircraft no limits of an
-    aircraft are judged.
-    airspeed: refused: the flight is judged by the speeds of its log.
+    aircraft are judged.  The other options are refused: the flight is judged by the speeds of its log.
     Raises a `planfly.PlanflyError` for bad input; nothing is written then.
     """
     if target is not None:
         refuse_existing(Path(target), overwrite, Path(log))
-    found = read_imported(
-        log, plan=plan, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence, at=at,
-        aircraft=aircraft, airspeed=airspeed, flight=flight, datum=datum,
-    )  # fmt: skip
+    found = read_imported(log, **options)
     if target is not None:
         _write(Path(target), found)
     return found

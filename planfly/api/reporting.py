@@ -13,7 +13,8 @@ from logs.verdict.verdict import Verdict
 from logs.views.report.compare import Comparison, compare_logs, write_comparison
 from planfly.api.flying import FlownMission
 from planfly.first_start import with_warm_up
-from planfly.open_mission import judge_log, open_planned
+from planfly.flight_logs import judge_log
+from planfly.open_flight import open_flight
 from planfly.returns_beside import returns_beside
 from planfly.stages import stage
 from planfly.targets import COMPARE_FILES, LOG_FIGURES, clean_folder, refuse_existing
@@ -159,7 +160,7 @@ def compare(
 
 def _shown(source: Source) -> _Shown:
     if isinstance(source, Plan):
-        setup = open_planned(source).setup
+        setup = open_flight(source, {})
         return _Shown(setup, judge_geometry(setup))
     if isinstance(source, FlownMission):
         return _Shown(source.setup, source.verdict, source.track, source.ended, source.events)

@@ -2,14 +2,13 @@
 
 import shutil
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 
-from flight.simulation.setup import FlightSetup, VerticalDatum
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, read_log
@@ -29,13 +28,15 @@ from logs.verdict.returns.returns_text import (
 )
 from logs.verdict.returns.suggest_returns import Remedy, helps, suggest_parameters, suggest_rally
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
-from planfly.api.flying import FlownMission, named_program, opened_mission, refuse
-from planfly.api.planning import Wind, changed_scenario
+from planfly.airframe import airframe_of
+from planfly.api.flying import FlownMission, named_program, refuse
 from planfly.arguments import check_arguments
 from planfly.crash_safe_log import INTERRUPTED
 from planfly.first_start import with_warm_up
+from planfly.flight_logs import is_log
+from planfly.flight_options import LogOptions, mission_options, options_of_log, takes_options
 from planfly.kernel_units.unit_kernels import FLYING, GLIDING
-from planfly.open_mission import FencePaths, OpenedMission, is_log
+from planfly.open_flight import open_flight
 from planfly.pipeline import fly_and_judge
 from planfly.program_returns import ProgramReturns, fly_by_program, refuse_program
 from planfly.return_flights import fly_return
@@ -45,7 +46,6 @@ from planfly.targets import RETURN_FILES, clean_folder, refuse_folder
 from planner.plan import Plan
 from world.files import write_whole
 from world.scenario import over_terrain
-from world.scenario_tables import Guidance, Navigation
 
 if TYPE_CHECKING:
     from planfly.imported_flights import ImportedFlight
@@ -165,6 +165,7 @@ _AS_FLOWN = "a flight's returns are flown as it was flown; only `terrain` replac
 
 
 @with_warm_up(*FLYING, *GLIDING)
+@takes_options
 def returns(
     what: FlightLog | FlownMission | Plan | str | Path,
     *,
@@ -174,22 +175,7 @@ def returns(
     points: int = 3,
     out: str | Path | None = None,
     overwrite: bool = True,
-    scenario: str | Path | None = None,
-    terrain: str | Path | None = None,
-    fence: FencePaths = (),
-    seed: int | None = None,
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    nav: Navigation | None = None,
-    plan: str | Path | None = None,
-    flight: int | None = None,
-    datum: VerticalDatum | None = None,
+    **options: Unpack[LogOptions],
 ) -> ReturnsFound:
     """Fly the return to launch from everywhere on the way, judge each, and tell what is reached without an engine.
 
@@ -198,8 +184,7 @@ def returns(
     every: s between two returns.  suggest: whether to look for what would make all of them safe.
     autopilot: ArduPlane's program, which then flies the worst ``points`` of them, too, far apart.
     out: folder for pictures; None writes none.  overwrite: whether results in it are replaced.
-    scenario, terrain, fence, seed, wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law, nav: of a
-    plan or mission, as of `planfly.fly`; of a flight only terrain.
+    options: of a plan or mission, as of `planfly.fly`; of a flight only terrain.
     plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a home.
 
@@ -208,30 +193,27 @@ def returns(
     >>> found.safe, found.returns.ranges[0].worst.target.name, found.glides.each[0].reach
     (False, 'home', 'home')
     """
-    check_arguments(every=every, points=points, seed=seed, flight=flight, datum=datum)
-    given: dict[str, Any] = {
-        "scenario": scenario, "wind": wind, "turbulence": turbulence, "at": at, "params": params, "aircraft": aircraft,
-        "fence": fence or None, "airspeed": airspeed, "guidance": guidance, "autopilot_law": autopilot_law}  # fmt: skip
-    other, of_log = {"seed": seed, "nav": nav}, {"plan": plan, "flight": flight, "datum": datum}
+    check_arguments(every=every, points=points, seed=options["seed"], flight=options["flight"], datum=options["datum"])
     path = Path(what) if isinstance(what, str | Path) else None
     asked = _asked(every, suggest, out, autopilot, points, overwrite=overwrite)
     if path is not None and is_imported_log(path):
-        refuse(str(path), other, _AS_FLOWN)
-        return _of_import(_imported(path, terrain=terrain, **{**given, **of_log, "fence": fence}), asked)
-    refuse(str(path or "mission"), of_log, "goes with an imported log")
+        refuse(str(path), {"seed": options["seed"], "nav": options["nav"]}, _AS_FLOWN)
+        return _of_import(_imported(path, options), asked)
+    refuse(str(path or "mission"), options_of_log(options), "goes with an imported log")
     what = read_log(path) if path is not None and is_log(path) else what
+    mission = mission_options(options)
     if isinstance(what, FlightLog | FlownMission):
-        refuse(str(path or "flight"), given | other, _AS_FLOWN)
-        return _judged(_over(what.setup, terrain), what.track, asked, what.ended or INTERRUPTED)
-    change = partial(changed_scenario, nav=nav, **{k: given[k] for k in given if k not in ("scenario", "fence")})
-    return _of_mission(opened_mission(what, scenario, terrain, seed, fence, change), asked)
+        given: dict[str, Any] = {**mission, "terrain": None, "fence": options["fence"] or None}
+        refuse(str(path or "flight"), given, _AS_FLOWN)
+        return _judged(_over(what.setup, options["terrain"]), what.track, asked, what.ended or INTERRUPTED)
+    return _of_mission(open_flight(what, mission), asked)
 
 
-def _imported(path: Path, **keywords: Any) -> "ImportedFlight":
+def _imported(path: Path, options: LogOptions) -> "ImportedFlight":
     # Imported here: no other call needs the libraries that read other programs' logs.
     from planfly.api.imported import read_imported
 
-    return read_imported(path, **keywords)
+    return read_imported(path, **options)
 
 
 def _over(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
@@ -266,11 +248,11 @@ def _of_import(found: "ImportedFlight", asked: _Asked) -> ReturnsFound:
     return _judged(found.setup, found.track, asked, found.ended)
 
 
-def _of_mission(opened: OpenedMission, asked: _Asked) -> ReturnsFound:
-    """Of a mission, which is flown first."""
-    return_world(opened.setup)  # Raises before it is flown.
+def _of_mission(setup: FlightSetup, asked: _Asked) -> ReturnsFound:
+    """Fly a mission, and judge the returns of its flight."""
+    return_world(setup)  # Raises before it is flown.
     with stage("flying the mission"):
-        flown = fly_and_judge(opened.setup, opened.airframe, None, reference="never")
+        flown = fly_and_judge(setup, airframe_of(setup), None, reference="never")
     return _judged(flown.setup, flown.track, asked, flown.ended)
 
 

@@ -5,11 +5,9 @@ import json
 import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Unpack
 
-from flight.mission.from_plan import plan_mission
 from flight.mission_files.formats import mission_kind, mission_text
 from logs.recording.setup_attachments import package_versions
 from logs.verdict.judge_flight import judge_plan_only
@@ -17,12 +15,13 @@ from logs.verdict.verdict import Verdict, verdict_json
 from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
 from planfly.api.exporting import judged_parameters
 from planfly.api.flying import named_program
-from planfly.api.planning import Wind, changed_scenario, opened_scenario
 from planfly.arguments import check_arguments
-from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_kind, flight_text
+from planfly.crash_safe_log import FlightLimits, flight_kind, flight_text
 from planfly.first_start import with_warm_up
+from planfly.flight_options import RunOptions, named_scenario, option_defaults, takes_options
 from planfly.kernel_units.unit_kernels import BOTH, GLIDING
-from planfly.make_plan import make_plan, make_setup, planned_for
+from planfly.make_plan import make_plan, planned_for
+from planfly.open_flight import make_setup, mission_of_plan
 from planfly.pipeline import autopilot_log, fly_and_judge
 from planfly.reference_flights import FlyReference
 from planfly.refine import refine as refine_rounds
@@ -32,7 +31,6 @@ from planfly.targets import RUN_FILES, RUN_FOLDER, filled_pattern, prepare_folde
 from planner.plan import Plan, plan_json
 from world.files import hold, write_whole
 from world.scenario import Scenario
-from world.scenario_tables import Guidance, Navigation
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,33 +111,20 @@ class _Task:
 
 
 @with_warm_up(*BOTH, *GLIDING)
+@takes_options
 def run(
     scenario: Scenario | str | Path = "jacksboro",
     *,
     seed: int | None = None,
     refine: int = 0,
-    terrain: str | Path | None = None,
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    nav: Navigation | None = None,
-    autopilot: str | Path | None = None,
-    log_hz: Literal[10, 20, 30, 60] = 60,
-    max_hours: float = MAX_HOURS,
-    max_log: float = MAX_MEGABYTES,
-    levels: bool = False,
     out: str | Path = RUN_FOLDER,
     overwrite: bool = False,
     on_round: Callable[[Round], None] | None = None,
+    **options: Unpack[RunOptions],
 ) -> RunResult:
     """Plan, export, fly, record, judge and report into one folder.
 
-    scenario: an embedded name, a TOML file's path, or a `Scenario`.  terrain: an elevation file in place of its own.
+    scenario: an embedded name, a TOML file's path, or a `Scenario`.
     seed: of planner and turbulence; None takes the scenario's, or 1.
     refine: rounds more, up to 20, each planned within limits tightened by what the flight before could not do.
     out: the folder; {name} and {seed} in it stand for the scenario's name and the seed.
@@ -153,38 +138,39 @@ def run(
     ...     result.verdict.flyable, len(result.rounds), [file.name for file in result.files][:3]
     (False, 1, ['plan.json', 'mission.waypoints', 'mission.plan'])
     """
-    check_arguments(seed=seed, refine=refine, log_hz=log_hz, max_hours=max_hours, max_log=max_log)
-    program = named_program(autopilot)
-    change = partial(
-        changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft, airspeed=airspeed, params=params,
-        guidance=guidance, autopilot_law=autopilot_law, nav=nav, autopilot=autopilot,
-    )  # fmt: skip
-    world = change(opened_scenario(scenario, terrain))
+    limits = FlightLimits(options["max_hours"], options["max_log"])
+    check_arguments(
+        seed=seed, refine=refine, log_hz=options["log_hz"], max_hours=limits.hours, max_log=limits.megabytes
+    )
+    program = named_program(options["autopilot"])
+    world = named_scenario(scenario, options, program)
     number, airframe = choose_seed(world, seed), load_airframe(world)
     folder = filled_pattern(out, world.name, number)
     refuse_folder(folder, overwrite or out == RUN_FOLDER)
-    repeated = {
-        "refine": refine, "terrain": terrain, "aircraft": aircraft, "airspeed": airspeed, "wind": wind,
-        "turbulence": turbulence, "at": at, "params": params, "guidance": guidance, "nav": nav, "autopilot": autopilot,
-    } | {"autopilot-law": autopilot_law, "levels": levels}  # fmt: skip
     name = world.name if isinstance(scenario, Scenario) else str(scenario)
-    line, limits = command_line(name, number, repeated), FlightLimits(max_hours, max_log)
-    task = _Task(world, airframe, number, line, folder, program, limits, 60 // log_hz, "always" if levels else "failed")
+    defaults = {"refine": 0, **option_defaults(RunOptions)}
+    repeated = {one: value for one, value in {"refine": refine, **options}.items() if value != defaults[one]}
+    line = command_line(name, number, repeated)
+    reference: FlyReference = "always" if options["levels"] else "failed"
+    task = _Task(world, airframe, number, line, folder, program, limits, 60 // options["log_hz"], reference)
     with contextlib.ExitStack() as held:
         return _rounds(task, refine, held, on_round)
 
 
 def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
-    """Write the command line of ``planfly run`` with options by name; those that are None, False or 0 are left out.
+    """Write the command line of ``planfly run`` with options by their keywords.
 
-    >>> command_line("tight", 3, {"refine": 0, "wind": (8.0, 270.0), "params": "my file.parm"})
-    "planfly run tight --seed 3 --wind 8,270 --params 'my file.parm'"
+    >>> command_line("tight", 3, {"wind": (8.0, 270.0), "autopilot_law": "px4", "params": "my file.parm"})
+    "planfly run tight --seed 3 --wind 8,270 --autopilot-law px4 --params 'my file.parm'"
     """
-    given = {name: value for name, value in options.items() if value}
-    if "wind" in given:
-        given["wind"] = "{:g},{:g}".format(*given["wind"])
-    words = [f"--{name}" if value is True else f"--{name} {shlex.quote(str(value))}" for name, value in given.items()]
-    return " ".join([f"planfly run {shlex.quote(scenario)} --seed {seed}", *words])
+    words = [f"planfly run {shlex.quote(scenario)} --seed {seed}"]
+    for name, value in options.items():
+        words.append(f"--{name.replace('_', '-')}")
+        if name == "wind":
+            words.append("{:g},{:g}".format(*value))
+        elif value is not True:
+            words.append(shlex.quote(str(value)))
+    return " ".join(words)
 
 
 def _rounds(
@@ -224,8 +210,7 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
 
     folder, airframe = task.folder, task.airframe
     write_whole(folder / "plan.json", plan_json(plan))
-    tracking = airframe.limits.tracking
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="mission.waypoints", tracking=tracking)
+    mission = mission_of_plan(plan, airframe, "mission.waypoints")
     mission = replace(mission, autopilot=airframe.autopilot.name)
     rally = [folder / "mission.rally"] if mission.rally else []
     for target in (folder / "mission.waypoints", folder / "mission.plan", *rally):

@@ -3,16 +3,14 @@
 import ipaddress
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
-from planfly.api.planning import flight_entries
 from planfly.arguments import check_arguments
 from planfly.first_start import with_warm_up
+from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.open_mission import FencePaths, read_named_fences
 from world.errors import FlightError, PlanflyError
 from world.extras import needs_extra
-from world.scenario_tables import Guidance, Navigation
 
 if TYPE_CHECKING:
     from flight.live.link import Access
@@ -28,17 +26,10 @@ def _ignore(_text: str) -> None:
 
 @needs_extra("live", "serve needs")
 @with_warm_up(*FLYING)
+@takes_options
 def serve(
     mission: str | Path | None = None,
     *,
-    scenario: str | Path | None = None,
-    terrain: str | Path | None = None,
-    fence: FencePaths = (),
-    at: str | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    nav: Navigation | None = None,
     to: str | Sequence[str] = "127.0.0.1:14550",
     bind: str = "127.0.0.1:14580",
     allow: str | Sequence[str] = (),
@@ -47,12 +38,12 @@ def serve(
     log: str | Path = "runs/serve",
     stop: Callable[[], bool] = _never,
     on_message: Callable[[str], None] = _ignore,
+    **options: Unpack[MissionOptions],
 ) -> None:
     """Be a MAVLink vehicle in a simulated world, until ``stop`` is true; needs the extra ``planfly[live]``.
 
     mission: a file to begin with; None waits for an upload.
-    scenario, terrain, fence, at, params, guidance, autopilot_law, nav: as of `planfly.fly`; without a mission the
-    scenario is "jacksboro-air" unless another is named.
+    options: as of `planfly.fly`; without a mission the scenario is "jacksboro-air" unless another is named.
     to: where ground stations listen, IP:PORT, one or several.  bind: where the vehicle listens.
     allow: IP addresses beyond this machine that may talk to it.  sign_key: a file with a MAVLink signing key.
     speed: times real time, 0.1 to 100.  log: the folder of the flight logs.
@@ -67,14 +58,11 @@ def serve(
 
     access = link_access(to, bind, allow, sign_key)
     check_arguments(served_speed=speed)
-    named = ["" if one is None else str(one) for one in (mission, scenario, terrain)]
-    entries = flight_entries(params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav)
-    fences = read_named_fences(fence)
-    options = ServeOptions(named[0], named[1] or None, named[2] or None, speed, Path(log), entries, fences, at)
-    served = open_served(options)
-    if options.logs.exists() and not options.logs.is_dir():
+    flown = ServeOptions("" if mission is None else str(mission), speed, Path(log), options)
+    served = open_served(flown)
+    if flown.logs.exists() and not flown.logs.is_dir():
         raise PlanflyError.of_argument("log", log, "is a file; a folder is expected")
-    serve_vehicle(access, options, served, stop, on_message)
+    serve_vehicle(access, flown, served, stop, on_message)
 
 
 # ----------------------------------------------------------------------

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from flight.mission.items import Camera, SurveyPlan
 from flight.mission.surveys import Survey
@@ -17,13 +17,15 @@ from logs.verdict.measures.route_requirements import RouteRequirements, route_re
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
-from planfly.api.flying import FlownMission, opened_mission, refuse
-from planfly.api.planning import Wind, changed_scenario
+from planfly.airframe import airframe_of
+from planfly.api.flying import FlownMission, refuse
 from planfly.arguments import CAMERA, check_arguments, is_camera
 from planfly.crash_safe_log import flight_text
 from planfly.first_start import with_warm_up
+from planfly.flight_logs import is_log
+from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.open_mission import FencePaths, OpenedMission, is_log
+from planfly.open_flight import open_flight
 from planfly.pipeline import fly_and_judge
 from planfly.stages import stage
 from planfly.survey_remedies import NearMiss, SurveyRemedy, survey_remedies
@@ -42,7 +44,6 @@ from planfly.targets import SURVEY_FILES, clean_folder, refuse_folder
 from world.errors import ArgumentError, LogError, MissionError
 from world.files import write_whole
 from world.scenario import Scenario
-from world.scenario_tables import Guidance, Navigation
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -117,6 +118,7 @@ _AS_FLOWN = "a flight's photo lines are those that were flown"
 
 
 @with_warm_up(*FLYING)
+@takes_options
 def survey(
     what: FlightLog | FlownMission | str | Path,
     *,
@@ -124,19 +126,7 @@ def survey(
     suggest: bool = False,
     out: str | Path | None = None,
     overwrite: bool = True,
-    scenario: str | Path | None = None,
-    terrain: str | Path | None = None,
-    fence: FencePaths = (),
-    seed: int | None = None,
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    nav: Navigation | None = None,
+    **options: Unpack[MissionOptions],
 ) -> SurveyFound:
     """Fly a survey, and tell how much of each photo line can be used, and how much its photos overlap.
 
@@ -147,36 +137,28 @@ def survey(
     line, another course, a parameter of the autopilot, a slower flight; each is flown before it is named.
     out: folder for a picture of the lines, and what would help as a .waypoints and a .param; None writes none.
     overwrite: whether results in it are replaced.
-    scenario, terrain, fence, seed, wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law, nav: of a
-    mission, as of `planfly.fly`.
+    options: of a mission, as of `planfly.fly`.
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a survey.
     """
-    check_arguments(seed=seed)
+    check_arguments(seed=options["seed"])
     taken = _camera(camera)
-    given = {"scenario": scenario, "terrain": terrain, "fence": fence or None, "seed": seed, "nav": nav}
-    changes: dict[str, Any] = {
-        "wind": wind, "turbulence": turbulence, "at": at, "aircraft": aircraft, "airspeed": airspeed, "params": params,
-        "guidance": guidance, "autopilot_law": autopilot_law,
-    }  # fmt: skip
+    given: dict[str, Any] = {**options, "fence": options["fence"] or None, "suggest": suggest or None}
     if out is not None:
         refuse_folder(Path(out), overwrite)
     if isinstance(what, str | Path) and is_log(Path(what)):
-        refuse(str(what), given | changes | {"suggest": suggest or None}, _AS_FLOWN)
+        refuse(str(what), given, _AS_FLOWN)
         what = read_log(Path(what))
     if isinstance(what, FlightLog | FlownMission):
-        refuse("flight", given | changes | {"suggest": suggest or None}, _AS_FLOWN)
+        refuse("flight", given, _AS_FLOWN)
         source = what.setup.source
         if source is not None and "attitude" not in source.holds:
             raise LogError(f"{source.file}: no attitude: how far photos are banked is not known", file=source.file)
         setup = _with_camera(what.setup.in_scenario(_with_lines(what.setup.scenario)), taken)
         return _written(_of_flight(setup, what.track, what.ended or ""), out, overwrite)
 
-    def change(world: Scenario) -> Scenario:
-        return _with_lines(changed_scenario(world, **changes, nav=nav))
-
-    opened = opened_mission(what, scenario, terrain, seed, fence, change)
-    opened = replace(opened, setup=_with_camera(opened.setup, taken))
-    return _written(_flown(opened, suggest), out, overwrite)
+    opened = open_flight(what, options)
+    setup = _with_camera(opened.in_scenario(_with_lines(opened.scenario)), taken)
+    return _written(_flown(setup, suggest), out, overwrite)
 
 
 def _camera(numbers: tuple[float, ...] | None) -> Camera | None:
@@ -208,19 +190,18 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
     return replace(setup, mission=replace(setup.mission, survey_plans=(*plans, SurveyPlan(None, 0.0, camera))))
 
 
-def _flown(opened: OpenedMission, suggest: bool) -> SurveyFound:
+def _flown(setup: FlightSetup, suggest: bool) -> SurveyFound:
     """Fly a mission, measure its lines, and look for what would help."""
-    _require_survey(opened.setup)
-    with stage(f"flying {flight_text(opened.setup)}", "flying a survey") as advance:
-        flown = fly_and_judge(opened.setup, opened.airframe, None, advance, reference="never")
+    _require_survey(setup)
+    airframe = airframe_of(setup)
+    with stage(f"flying {flight_text(setup)}", "flying a survey") as advance:
+        flown = fly_and_judge(setup, airframe, None, advance, reference="never")
     found = _measured(flown.requirements, flown.track, flown.verdict)
     if not suggest or found.usable:
         return found
     with stage("looking for what would help") as advance:
         counted = count(1)
-        tried = survey_remedies(
-            flown.setup, opened.airframe, flown.verdict, lambda text: advance(next(counted), 0.0, text)
-        )
+        tried = survey_remedies(flown.setup, airframe, flown.verdict, lambda text: advance(next(counted), 0.0, text))
     return replace(found, remedies=tried.remedies, nearest=tried.nearest, kept=tried.kept)
 
 

@@ -14,26 +14,25 @@ from aircraft.path_limits import Limits
 from aircraft.uncertainty import DRAWS_FILE, read_draws
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import straight
-from flight.mission.from_plan import plan_mission
 from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
 from logs.verdict.conditions import Conditions, setup_conditions
-from planfly.airframe import Airframe, bank_limit, choose_seed, load_airframe, with_tracking
+from planfly.airframe import Airframe, airframe_of, bank_limit, choose_seed, load_airframe, with_tracking
 from planfly.campaigns.dispersions import DEFAULT, DRAWN, Dispersions, Draw, SpreadError
-from planfly.make_plan import Advance, make_plan, make_setup
-from planfly.open_mission import NamedFences, OpenedMission, ScenarioChange, open_mission, open_planned
+from planfly.flight_options import MissionOptions, named_scenario
+from planfly.make_plan import Advance, make_plan
+from planfly.named_fences import NamedFences, read_named_fences
+from planfly.open_flight import make_setup, mission_of_plan, open_flight
 from planfly.pipeline import OffNominal
 from planner.plan import Plan, plan_json, read_plan
 from world.errors import FlightError, MissionError
 from world.files import write_whole
-from world.scenario import Scenario, load_scenario
+from world.scenario import Scenario
 from world.scenario_tables import WindTable
 from world.terrain import Terrain
 from world.wind import Wind
-
-_NO_FENCES = NamedFences()
 
 
 @dataclass(frozen=True)
@@ -94,29 +93,26 @@ def is_mission_file(target: str) -> bool:
 def open_campaign(
     target: Plan | str,
     dispersions: Dispersions,
+    options: MissionOptions,
     *,
     planned: Path | None = None,
-    scenario_name: str | None = None,
-    terrain: str | None = None,
-    seed: int | None = None,
-    change: ScenarioChange = lambda scenario: scenario,
-    fences: NamedFences = _NO_FENCES,
     advance: Advance | None = None,
 ) -> CampaignBase:
-    """The base of a campaign of a scenario, which is planned here, or of a plan or mission file.
+    """Open the base of a campaign of a scenario, which is planned here, or of a plan or mission file.
 
     target: an embedded scenario's name, a scenario's TOML file, a plan, or a plan.json, .waypoints or .plan.
-    planned: where a scenario's plan is kept: it is read from there if it is there already, else written.
-    scenario_name, terrain, change, fences: as of `planfly.open_mission.open_mission`; zones are planned around.
-    seed: of plan and draws; None takes the scenario's, or 1.
+    options: how it is flown; zones are planned around, and the seed is of plan and draws.
+    planned: where a scenario's plan is kept: it is read from there if it exists, else written.
     Raises a PlanflyError for bad input, a plan that is not feasible, and dispersions whose middle is no aircraft
     that flies.
     """
-    if isinstance(target, Plan):
-        opened = open_planned(target, scenario_name, terrain, seed=seed, change=change, fences=fences)
-        base = _of_mission(opened, dispersions, opened.setup.mission.source)
-    elif not is_mission_file(target):
-        scenario = fences.on_scenario(change(load_scenario(target, terrain)))
+    if isinstance(target, Plan) or is_mission_file(target):
+        setup = open_flight(target, options)
+        # By its name alone: the folder that it lies in does not decide the flight.
+        base = _of_setup(setup, dispersions, Path(setup.mission.source).name)
+    else:
+        fences, seed = read_named_fences(options.get("fence") or ()), options.get("seed")
+        scenario = fences.on_scenario(named_scenario(target, options))
         kept = planned is not None and planned.is_file()
         plan = read_plan(planned) if kept and planned is not None else _make_plan(scenario, seed, advance)
         if kept and plan.scenario.to_json() != scenario.to_json():
@@ -124,9 +120,6 @@ def open_campaign(
         if planned is not None and not kept:
             write_whole(planned, plan_json(plan))
         base = _of_plan(plan, fences, dispersions, choose_seed(scenario, seed))
-    else:
-        opened = open_mission(Path(target), scenario_name, terrain, seed=seed, change=change, fences=fences)
-        base = _of_mission(opened, dispersions, Path(target).name)
     check_middle(base)
     # A mission that cannot be laid out is refused here, not by a worker.
     base.nominal_setup()
@@ -145,22 +138,18 @@ def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) ->
 def _of_plan(plan: Plan, fences: NamedFences, dispersions: Dispersions, seed: int) -> CampaignBase:
     scenario = plan.scenario
     airframe = load_airframe(scenario)
-    tracking = airframe.limits.tracking
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="plan.json", tracking=tracking)
-    mission = fences.on_mission(mission)
+    mission = fences.on_mission(mission_of_plan(plan, airframe))
     placed = place_stops(mission, scenario.origin, scenario.terrain)
     dispersions = _with_own_draws(dispersions, airframe.aircraft)
     return CampaignBase(scenario, airframe, mission, placed, plan, dispersions, seed, scenario.name)
 
 
-def _of_mission(opened: OpenedMission, dispersions: Dispersions, source: str) -> CampaignBase:
-    setup = opened.setup
-    # By its name alone: the folder that it lies in is nothing of the flight's.
+def _of_setup(setup: FlightSetup, dispersions: Dispersions, source: str) -> CampaignBase:
     mission = replace(setup.mission, source=source)
-    scenario = setup.scenario
+    scenario, airframe = setup.scenario, airframe_of(setup)
     placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
-    dispersions = _with_own_draws(dispersions, opened.airframe.aircraft)
-    return CampaignBase(scenario, opened.airframe, mission, placed, setup.plan, dispersions, setup.seed, opened.name)
+    dispersions = _with_own_draws(dispersions, airframe.aircraft)
+    return CampaignBase(scenario, airframe, mission, placed, setup.plan, dispersions, setup.seed, setup.name)
 
 
 def check_middle(base: CampaignBase) -> None:

@@ -19,7 +19,7 @@ from flight.simulation.setup import make_limits
 from logs.recording.recorder import Recorder
 from planfly.airframe import Airframe, find_airframe, load_airframe
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from planfly.pipeline import fly_and_judge
 from planfly.returns_beside import returns_beside, returns_line
 from planner.evaluation.problem import make_problem

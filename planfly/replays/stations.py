@@ -22,7 +22,7 @@ from flight.mission.items import Home
 from flight.simulation.local_map import LocalMap
 from flight.simulation.track import track_rows
 from logs.recording.reader import FlightLog
-from planfly.open_mission import CUT_SHORT
+from planfly.flight_logs import CUT_SHORT
 from world.errors import FlightError
 
 Stopped = Callable[[], bool]

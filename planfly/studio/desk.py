@@ -6,6 +6,7 @@ a changed mission is judged like a mission file.
 
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,9 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.verdict import Verdict
-from planfly.airframe import Airframe
-from planfly.make_plan import make_setup
-from planfly.open_mission import NamedFences, OpenedMission
+from planfly.airframe import Airframe, airframe_of
+from planfly.named_fences import NamedFences
+from planfly.open_flight import make_setup
 from planfly.studio.edits import places
 from planfly.studio.settings import SetParameters
 from planner.plan import Plan
@@ -67,15 +68,14 @@ class Desk:
     parameters: SetParameters = _DEFAULT_PARAMETERS
 
     @classmethod
-    def of(cls, opened: OpenedMission, terrain: str | None = None, fences: NamedFences = _NO_FENCES) -> "Desk":
-        """Return the context of an opened mission or plan."""
-        setup = opened.setup
+    def of(cls, setup: FlightSetup, terrain: str | Path | None = None, fences: NamedFences = _NO_FENCES) -> "Desk":
+        """Make the desk of an opened mission or plan."""
         return cls(
             setup.scenario,
-            opened.airframe,
+            airframe_of(setup),
             setup.seed,
             setup,
-            terrain,
+            None if terrain is None else str(terrain),
             planned=setup.plan is not None,
             fences=fences,
         )
@@ -219,7 +219,6 @@ class Desk:
         return FlightSetup(
             scenario=self.scenario,
             mission=mission,
-            mission_text="",
             route=route,
             limits=frame.limits,
             aircraft=frame.aircraft.name,

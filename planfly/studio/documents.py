@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.from_plan import plan_mission
 from flight.mission.items import AMSL, LANDINGS, TAKEOFFS, Command, Mission
 from flight.mission_files.formats import mission_text, parse_mission
+from flight.simulation.setup import FlightSetup
 from logs.importers.open_log import is_imported_log
 from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chunks
 from logs.recording.reader import read_log
 from logs.recording.setup_attachments import PLAN_FILE, SCENARIO_FILE
 from logs.views.exports.map_files import kml_text, map_zones, plan_line
 from planfly.airframe import Airframe, choose_seed, load_airframe
-from planfly.api.flying import opened_mission
 from planfly.api.imported import read_imported
+from planfly.flight_logs import MCAP_MAGIC, is_log
+from planfly.flight_options import LogOptions, MissionOptions, apply_options, named_scenario
 from planfly.imported_flights import ImportedFlight
-from planfly.make_plan import make_setup
-from planfly.open_mission import MCAP_MAGIC, OpenedMission, ScenarioChange, is_log
+from planfly.open_flight import make_setup, mission_of_plan, open_flight
 from planfly.studio.desk import Desk, Judged
 from planner.evaluation.certify import certify
 from planner.evaluation.paper_scores import paper_scores
@@ -32,7 +32,7 @@ from planner.plan import Certificate, Plan, plan_json
 from world.elevation_formats import EMBEDDED
 from world.errors import LogError, MissionError, PlanflyError
 from world.files import temporary_folder
-from world.scenario import Scenario, embedded_names, load_scenario
+from world.scenario import Scenario, embedded_names
 
 Floats = NDArray[np.float64]
 
@@ -54,16 +54,16 @@ _SAME_ALTITUDE_M = 0.02
 class Document:
     """Opened mission and its origin.
 
-    name: shown to people; stem: stem of the names of saved files.
-    opened: mission with its setup and airframe.
-    kind: one of `KINDS`, "" if not opened from a mission file; data: its bytes, saved again for an unchanged mission.
-    path: file that the command named, or None.  on_disk: its present bytes, as far as is known.
-    to_plan: true for a scenario that has no path yet.
+    name: for people; stem: of files that are saved.
+    setup: what was opened.
+    kind: of `KINDS`, "" for what was no mission file; data: its bytes, which an unchanged mission is saved as.
+    path: the file that the command named; None for any other.  on_disk: the bytes that it has, as far as is known.
+    to_plan: whether it is a scenario that has no path yet.
     """
 
     name: str
     stem: str
-    opened: OpenedMission
+    setup: FlightSetup
     kind: str = ""
     data: bytes = b""
     path: Path | None = None
@@ -71,32 +71,20 @@ class Document:
     to_plan: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class World:
-    """World in which a mission is opened, as given on the command line; None keeps the mission's value."""
-
-    scenario: str | None = None
-    terrain: str | None = None
-    fence: tuple[str, ...] = ()
-    seed: int | None = None
-    change: ScenarioChange = lambda scenario: scenario
-
-
-def open_document(target: str, world: World) -> Document:
+def open_document(target: str, options: MissionOptions) -> Document:
     """Open a scenario, a plan, a mission or a log, by name or path.  Raises PlanflyError."""
     if target in embedded_names() or target.lower().endswith(".toml"):
-        scenario = world.change(load_scenario(target, world.terrain))
-        return _scenario_document(scenario, world.seed)
+        return _of_scenario(named_scenario(target, options), options.get("seed"))
     path = Path(target)
-    opened = _open_file(path, world)
+    setup = _open_file(path, options)
     kind = next((kind for kind, suffix in KINDS.items() if suffix == path.suffix.lower()), "")
     kind = "waypoints" if path.suffix.lower() == ".txt" else "" if kind == "kml" else kind
     data = path.read_bytes() if kind else b""
-    return Document(path.name, path.stem, opened, kind, data, path, data)
+    return Document(path.name, path.stem, setup, kind, data, path, data)
 
 
-def open_dropped(name: str, data: bytes, world: World) -> Document:
-    """Open a file that was dropped on the page; only the suffix of its name is used.  Raises PlanflyError."""
+def open_dropped(name: str, data: bytes, options: MissionOptions) -> Document:
+    """Open a file that was dropped on the page: its bytes, and of its name the suffix.  Raises PlanflyError."""
     suffix = Path(name).suffix.lower()
     shown = "".join(ch if ch.isprintable() and ch not in "/\\" else "_" for ch in name)[-60:] or "dropped"
     if suffix not in DROPPED:
@@ -109,7 +97,7 @@ def open_dropped(name: str, data: bytes, world: World) -> Document:
         if data.startswith(MCAP_MAGIC):
             _refuse_log_naming_files(shown, file)
         try:
-            opened = open_document(str(file), world)
+            opened = open_document(str(file), options)
         except PlanflyError as error:
             raise PlanflyError(str(error).replace(str(file), shown), file=shown) from None
     return replace(opened, name=shown, stem=Path(shown).stem, path=None)
@@ -147,21 +135,24 @@ def _aircraft_folder(aircraft: Any) -> str | None:
     return aircraft if isinstance(aircraft, str) and ("/" in aircraft or "\\" in aircraft) else None
 
 
-def _open_file(path: Path, world: World) -> OpenedMission:
+def _open_file(path: Path, options: MissionOptions) -> FlightSetup:
     """Open a plan, a mission, or the mission of a log."""
     if path.is_file() and is_imported_log(path):
-        found = _open_imported_log(path, world)
-        return _open_log_mission(found.setup.scenario, found.setup.mission, found.setup.seed, path.stem)
+        setup = _imported(path, options).setup
+        return _unflown(setup.scenario, setup.mission, setup.seed)
     if path.is_file() and is_log(path):
         setup = read_log(path).setup
-        return _open_log_mission(world.change(setup.scenario), setup.mission, setup.seed, path.stem)
-    return opened_mission(path, world.scenario, world.terrain, world.seed, world.fence, world.change)
+        return _unflown(apply_options(setup.scenario, options), setup.mission, setup.seed)
+    return open_flight(path, options)
 
 
-def _open_imported_log(path: Path, world: World) -> ImportedFlight:
-    """Read a log of another program.  Raises PlanflyError, with the studio's text for a mere track."""
+def _imported(path: Path, options: MissionOptions) -> ImportedFlight:
+    """Read the flight of another program's log.  Raises PlanflyError, in the studio's words for a track alone."""
+    world: LogOptions = {
+        "scenario": options.get("scenario"), "terrain": options.get("terrain"), "fence": options.get("fence") or (),
+    }  # fmt: skip
     try:
-        return read_imported(path, scenario=world.scenario, terrain=world.terrain, fence=world.fence)
+        return read_imported(path, **world)
     except LogError as error:
         if "holds no mission" not in str(error):
             raise
@@ -169,18 +160,17 @@ def _open_imported_log(path: Path, world: World) -> ImportedFlight:
         raise MissionError(f"{path}: {alone}", file=path) from None
 
 
-def _open_log_mission(scenario: Scenario, mission: Mission, seed: int, stem: str) -> OpenedMission:
-    """Open the mission of a log, to be flown again."""
-    airframe = load_airframe(scenario)
-    return OpenedMission(make_setup(scenario, airframe, mission, seed), airframe, stem)
+def _unflown(scenario: Scenario, mission: Mission, seed: int) -> FlightSetup:
+    """Set up the mission of a log to be flown again."""
+    return make_setup(scenario, load_airframe(scenario), mission, seed)
 
 
-def _scenario_document(scenario: Scenario, seed: int | None) -> Document:
-    """Open a scenario with the straight line from start to destination, until a path is planned."""
+def _of_scenario(scenario: Scenario, seed: int | None) -> Document:
+    """Open a scenario with the straight line from its start to its destination, until a path is planned."""
     airframe, number = load_airframe(scenario), choose_seed(scenario, seed)
     mission = planned_mission(straight_plan(scenario, number), airframe)
-    opened = OpenedMission(make_setup(scenario, airframe, mission, number), airframe, scenario.name)
-    return Document(scenario.name, scenario.name, opened, to_plan=True)
+    setup = make_setup(scenario, airframe, mission, number)
+    return Document(scenario.name, scenario.name, setup, to_plan=True)
 
 
 def straight_plan(scenario: Scenario, seed: int) -> Plan:
@@ -191,9 +181,8 @@ def straight_plan(scenario: Scenario, seed: int) -> Plan:
 
 
 def planned_mission(plan: Plan, airframe: Airframe) -> Mission:
-    """Make the mission of a plan."""
-    tracking = airframe.limits.tracking
-    return plan_mission(plan, airframe.airspeed, airframe.max_bank, source=plan.scenario.name, tracking=tracking)
+    """Write the mission of a plan, named after its scenario."""
+    return mission_of_plan(plan, airframe, plan.scenario.name)
 
 
 # ----------------------------------------------------------------------
@@ -217,9 +206,9 @@ def save_document(document: Document, desk: Desk, judged: Judged, kind: str) -> 
     mission, name = judged.mission, f"{document.stem}{SAVED[kind]}"
     if kind == "parm":
         return _saved_parameters(name, desk)
-    before = document.opened.setup.scenario
+    before = document.setup.scenario
     same = kind != "plan.json" or desk.scenario is before
-    if kind == document.kind and mission is document.opened.setup.mission and same:
+    if kind == document.kind and mission is document.setup.mission and same:
         return Saved(name, document.data, _lost_settings(before, desk))
     if kind == "plan.json":
         return _saved_plan(name, desk, judged)

@@ -8,21 +8,17 @@ import secrets
 import socket
 import webbrowser
 from collections.abc import Callable, Iterator
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
-from planfly.api.planning import Wind, changed_scenario
 from planfly.arguments import check_arguments
 from planfly.first_start import with_warm_up
+from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import BOTH
-from planfly.open_mission import FencePaths
-from planfly.studio.documents import World
 from planfly.studio.session import open_session
 from world.errors import PlanflyError
 from world.extras import needs_extra
 from world.files import temporary_folder
-from world.scenario_tables import Guidance, Navigation
 
 if TYPE_CHECKING:
     from planfly.studio.server import Server
@@ -44,52 +40,34 @@ def _never() -> bool:
 
 @needs_extra("studio")
 @with_warm_up(*BOTH)
+@takes_options
 def open_studio(
     what: str | Path = "jacksboro",
     *,
-    scenario: str | Path | None = None,
-    terrain: str | Path | None = None,
-    fence: FencePaths = (),
-    seed: int | None = None,
-    wind: Wind | None = None,
-    turbulence: str | None = None,
-    at: str | None = None,
-    aircraft: str | Path | None = None,
-    airspeed: float | None = None,
-    params: str | Path | None = None,
-    guidance: Guidance | None = None,
-    autopilot_law: str | None = None,
-    nav: Navigation | None = None,
     port: int | None = None,
     browser: bool = True,
     keep: str | Path = "runs/studio",
     stop: Callable[[], bool] = _never,
     on_message: Callable[[str], None] = print,
+    **options: Unpack[MissionOptions],
 ) -> None:
     """Serve a page on which a mission is dragged, judged and flown; needs ``planfly[studio]``.
 
-    what: a scenario, by name or file, whose path is planned; or a plan, a mission or a log, as for `planfly.judge`.
-    scenario, terrain, fence: the world of a mission, as for `planfly.fly`.  seed: of planner and turbulence.
-    wind to nav: settings of the flight, as for `planfly.plan`; the page changes most of them.
-    port: port to listen on; None for 8790, or any free one if that is taken.
-    browser: true to open the page.  keep: folder in which edits are saved for the next start.
-    stop: called continually; true ends the studio.  on_message: called with the page's address, which holds its token.
+    what: a scenario, by name or file, whose path is planned; or a plan, a mission or a log, as of `planfly.judge`.
+    options: as of `planfly.fly`; the page changes most of them.  seed: of planner and turbulence.
+    port: where it listens; None for 8790, or any free one where that is taken.
+    browser: whether the page is opened.  keep: the folder in which what was done is kept for the next start.
+    stop: asked all the time.  on_message: called with the page's address, which holds the key to it.
 
     A script must call it under ``if __name__ == "__main__":``, because the processes that fly import the script.
     Raises a `planfly.PlanflyError` for bad input.
     """
-    check_arguments(seed=seed, port=port)
-    change = partial(
-        changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft, airspeed=airspeed, params=params,
-        guidance=guidance, autopilot_law=autopilot_law, nav=nav,
-    )  # fmt: skip
-    named, ground = (None if one is None else str(one) for one in (scenario, terrain))
-    fences = (str(fence),) if isinstance(fence, str | Path) else tuple(str(one) for one in fence)
+    check_arguments(seed=options["seed"], port=port)
     listener = _listen(port)
     with contextlib.closing(listener):
         target = str(what)
         kept = Path(keep) / f"{_stem(target)}.json"
-        session, restored = open_session(target, World(named, ground, fences, seed, change), kept)
+        session, restored = open_session(target, options, kept)
         if restored:
             back = "; undo takes it back" if session.undo_text else ""
             on_message(f"what was done before is there again (kept in {kept}){back}")

@@ -363,12 +363,12 @@ class Server:
 
     def _opened(self, message: messages.Open) -> Any:
         if message.data is None:
-            return open_document(str(file_inside(self._folder, message.name)), self.session.world)
+            return open_document(str(file_inside(self._folder, message.name)), self.session.options)
         try:
             data = base64.b64decode(message.data, validate=True)
         except binascii.Error as error:
             raise MissionError(f"{message.name[:60]}: its bytes did not come whole", field="data") from error
-        return open_dropped(message.name, data, self.session.world)
+        return open_dropped(message.name, data, self.session.options)
 
     def _parameters(self, name: str) -> messages.Settings:
         """Return the settings in a parameter file of the folder."""

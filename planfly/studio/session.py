@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from flight.mission.items import LANDINGS, Mission
-from planfly.open_mission import read_named_fences
+from planfly.flight_options import MissionOptions
+from planfly.named_fences import read_named_fences
 from planfly.studio import edits
 from planfly.studio.applied import apply_suggestion
 from planfly.studio.desk import Desk, Judged
-from planfly.studio.documents import Document, Saved, World, open_document, planned_mission, save_document
+from planfly.studio.documents import Document, Saved, open_document, planned_mission, save_document
 from planfly.studio.history import History
 from planfly.studio.kept import kept_beside, kept_text, read_kept
 from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, Raise, Settings
@@ -50,7 +51,7 @@ class Session:
     """
 
     document: Document
-    world: World
+    options: MissionOptions
     desk: Desk
     history: History
     judged: Judged
@@ -65,20 +66,20 @@ class Session:
     undone: list[_OpenedState] = field(default_factory=list)
 
     @classmethod
-    def of(cls, document: Document, world: World) -> "Session":
-        """Start a session with an opened document."""
-        desk = Desk.of(document.opened, world.terrain, read_named_fences(world.fence))
-        judged = desk.judge(document.opened.setup.mission)
-        history = History(document.opened.setup.mission)
+    def of(cls, document: Document, options: MissionOptions) -> "Session":
+        """A session that begins with what was opened."""
+        desk = Desk.of(document.setup, options.get("terrain"), read_named_fences(options.get("fence") or ()))
+        judged = desk.judge(document.setup.mission)
+        history = History(document.setup.mission)
         named = None if document.path is None else document.path.resolve()
-        return cls(document, world, desk, history, judged, named=named)
+        return cls(document, options, desk, history, judged, named=named)
 
     def open(self, document: Document) -> None:
         """Open another document; an undo before its first edit brings back the previous one."""
         named = document.path is not None and document.path.resolve() == self.named
-        made = Session.of(document if named else replace(document, path=None), self.world)
-        self.left, self.undone = [*self.left, self._state()][-_MAX_LEFT_DOCUMENTS:], []
-        self._restore_state((made.document, made.desk, made.history))
+        made = Session.of(document if named else replace(document, path=None), self.options)
+        self.left, self.undone = [*self.left, self._place()][-_MOST_LEFT:], []
+        self._go_to((made.document, made.desk, made.history))
 
     def _state(self) -> _OpenedState:
         return self.document, self.desk, self.history
@@ -359,8 +360,8 @@ class Session:
 
     @property
     def has_news(self) -> bool:
-        """True if there is anything to autosave: the mission or its settings differ from the opened ones."""
-        return self.is_changed or self.desk.scenario is not self.document.opened.setup.scenario
+        """Whether anything is to be kept: the mission, or how it is flown, differs from what was opened."""
+        return self.is_changed or self.desk.scenario is not self.document.setup.scenario
 
     def kept_file(self, file: Path) -> Path:
         """Autosave path: the given file for the first document, a sibling for documents opened later."""
@@ -393,7 +394,7 @@ class Session:
         return True
 
 
-def open_session(target: str, world: World, kept: Path | None = None) -> tuple[Session, bool]:
-    """Start a session; return it and whether edits were restored.  Raises PlanflyError."""
-    session = Session.of(open_document(target, world), world)
+def open_session(target: str, options: MissionOptions, kept: Path | None = None) -> tuple[Session, bool]:
+    """Open what a command names; also return True if earlier edits were taken up.  Raises PlanflyError."""
+    session = Session.of(open_document(target, options), options)
     return session, kept is not None and session.restore(kept)

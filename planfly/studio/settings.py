@@ -12,7 +12,7 @@ from flight.autopilots.autopilot import Parameters
 from flight.autopilots.catalog import load_autopilot
 from flight.autopilots.parameter_files import parameters_text, parse_parameters
 from planfly.airframe import Airframe, find_airframe, load_airframe
-from planfly.api.planning import changed_scenario
+from planfly.flight_options import FlightOptions, apply_options
 from planfly.studio.messages import LIMITS, Settings
 from world.errors import PlanflyError
 from world.files import did_you_mean, temporary_folder
@@ -59,10 +59,11 @@ def changed_world(scenario: Scenario, asked: Settings) -> Scenario:
         wind = (float(speed), from_deg)
     if asked.aircraft is not None and ("/" in asked.aircraft or "\\" in asked.aircraft):
         raise PlanflyError("aircraft: a name that planfly aircraft lists is expected", field="aircraft")
-    changed = changed_scenario(
-        scenario, wind=wind, turbulence=asked.turbulence, aircraft=asked.aircraft, airspeed=asked.airspeed,
-        autopilot_law=asked.autopilot,
-    )  # fmt: skip
+    options: FlightOptions = {
+        "wind": wind, "turbulence": asked.turbulence, "aircraft": asked.aircraft, "airspeed": asked.airspeed,
+        "autopilot_law": asked.autopilot,
+    }  # fmt: skip
+    changed = apply_options(scenario, options)
     if asked.limits is None and asked.ceiling is None:
         return changed
     spec = changed.to_json()

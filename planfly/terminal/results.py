@@ -33,6 +33,6 @@ def print_warnings(warnings: Iterable[str]) -> None:
 
 def warn_of_loss(log: "FlightLog") -> None:
     """What is missing in a log that is not complete, on standard error."""
-    from planfly.open_mission import loss_text
+    from planfly.flight_logs import loss_text
 
     print_warnings([loss_text(log)])

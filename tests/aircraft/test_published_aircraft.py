@@ -16,7 +16,7 @@ from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import fastest, linearise, slowest, straight
 from flight.guidance.gains import load_gains
 from flight.guidance.model_gains import gains_of_model
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from tests.setups import setup_maker
 
 NAMES = sorted(PUBLISHED)
@@ -113,7 +113,7 @@ def test_it_flies(name: str, law: str) -> None:
     setup = setup_maker(aircraft)(way, speeds=aircraft.airspeed, wind=(3.0, 60.0), turbulence="light", bank_deg=35.0)
     if law == "arduplane":
         setup = replace(setup, autopilot=ArduPlane(ArduPilotParameters.load(aircraft)))
-    flown = simulate(setup, aircraft)
+    flown = fly_to_end(Flight(setup, aircraft))
     assert flown.ended == "completed"
     if law == "planfly":
         assert np.abs(flown.track.cross_track[300:]).max() < 3.0

@@ -84,7 +84,6 @@ def make_setup(*, with_plan: bool = True, **changes: object) -> FlightSetup:
     return FlightSetup(
         scenario=scenario,
         mission=mission,
-        mission_text="QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t45.99\t7.99\t301.5\t1\n",
         route=route,
         limits=make_limits(scenario, envelope, 25.25, 0.5235987755982988),
         aircraft="aerosonde",

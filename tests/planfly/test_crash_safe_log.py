@@ -6,19 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import track_rows
 from logs.recording.example_log import example_log
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
+from planfly.airframe import airframe_of
 from planfly.cli import main
 from planfly.crash_safe_log import CrashSafeLog, FlightLimits, flight_text, predicted_seconds
-from planfly.open_mission import OpenedMission, open_mission
+from planfly.open_flight import open_flight
 from planfly.pipeline import fly_and_judge
 from tests.planfly.conftest import FIELD
 from tests.planfly.misuse.test_interruptions import LONG
 from world.errors import LogError
 from world.interruption import Interrupted, interrupt
-from world.scenario import Scenario, with_flight, with_wind
 
 
 @pytest.fixture
@@ -64,36 +65,29 @@ def test_a_log_has_a_limit(long: Path, capsys: pytest.CaptureFixture[str]) -> No
 def test_what_a_flight_comes_to_is_told_before(long: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Its predicted time is that of the flight, within a twentieth."""
     opened = opened_calm(long)
-    told = flight_text(opened.setup)
-    flown = fly_and_judge(opened.setup, opened.airframe, None)
+    told = flight_text(opened)
+    flown = fly_and_judge(opened, airframe_of(opened), None)
     assert flown.ended == "completed"
-    assert predicted_seconds(opened.setup) == pytest.approx(float(flown.track.time[-1]), rel=0.05)
-    assert (
-        told
-        == f"{opened.setup.path.length / 1e3:.1f} km, about {predicted_seconds(opened.setup) / 60:.0f} min in the air"
-    )
+    assert predicted_seconds(opened) == pytest.approx(float(flown.track.time[-1]), rel=0.05)
+    assert told == f"{opened.path.length / 1e3:.1f} km, about {predicted_seconds(opened) / 60:.0f} min in the air"
 
 
 def test_energy_ends_a_flight(long: Path) -> None:
     """At what is carried, where that is more than half of what the way takes by prediction; else it does not begin."""
     opened = opened_calm(long)
-    flown = fly_and_judge(opened.setup, opened.airframe, None)
+    flown = fly_and_judge(opened, airframe_of(opened), None)
     used = float(flown.track.energy[-1])
-    less = dataclasses.replace(opened.setup, battery=0.7 * used)
-    short = fly_and_judge(less, opened.airframe, None)
+    less = dataclasses.replace(opened, battery=0.7 * used)
+    short = fly_and_judge(less, airframe_of(less), None)
     assert short.ended == "nothing is left in the battery or the tank"
     assert float(short.track.energy[-1]) == pytest.approx(0.7 * used, rel=1e-3)
-    none = fly_and_judge(dataclasses.replace(opened.setup, battery=0.1 * used), opened.airframe, None)
+    none = fly_and_judge(dataclasses.replace(opened, battery=0.1 * used), airframe_of(opened), None)
     assert (len(none.track), none.ended) == (0, "not started: it takes 10 times the energy carried")
 
 
-def opened_calm(path: Path) -> OpenedMission:
+def opened_calm(path: Path) -> FlightSetup:
     """Opened for planfly's own guidance in still air."""
-
-    def change(scenario: Scenario) -> Scenario:
-        return with_wind(with_flight(scenario, guidance="path"), 0.0, 0.0, "none")
-
-    return open_mission(path, "field.toml", None, change=change)
+    return open_flight(path, {"scenario": "field.toml", "guidance": "path", "wind": (0.0, 0.0), "turbulence": "none"})
 
 
 @pytest.mark.parametrize(("size", "full"), [(20_000_000, False), (20_000_001, True)])

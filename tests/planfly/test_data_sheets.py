@@ -16,7 +16,7 @@ from flight.dynamics.characteristics import modes_at
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import fastest, full_throttle, slowest, straight
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from planfly import data_sheets
 from planfly.data_sheets import change_of, make_data_sheet_folder, stated_parameters, with_parameters
 from tests.setups import setup_maker
@@ -60,7 +60,7 @@ def test_it_flies(foam: Aircraft, law: str) -> None:
     setup = setup_maker(foam)(way, speeds=15.0, wind=(3.0, 200.0), turbulence="light", bank_deg=35.0)
     if law == "arduplane":
         setup = replace(setup, autopilot=ArduPlane(ArduPilotParameters.load(foam)))
-    flown = simulate(setup, foam)
+    flown = fly_to_end(Flight(setup, foam))
     assert flown.ended == "completed"
     if law == "planfly":
         assert np.abs(flown.track.cross_track[300:]).max() < 3.0

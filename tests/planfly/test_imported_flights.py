@@ -18,7 +18,8 @@ from pyproj import Geod
 from logs.importers.imported_flight import make_flight
 from logs.importers.open_log import open_log
 from logs.importers.raw_log import ModeChange, example_raw_log
-from planfly.imported_flights import ImportedFlight, ImportOptions, fly_again, import_flight
+from planfly.flight_options import LogOptions
+from planfly.imported_flights import ImportedFlight, fly_again, import_flight
 from tests.logs.importers.judged_flights import judged
 from tests.logs.importers.pymavlink_rows import FLIGHTS, mission_lines, read_rows
 from world.errors import LogError
@@ -41,7 +42,7 @@ def flights() -> dict[str, ImportedFlight]:
 
 
 def imported(path: Path, name: str) -> ImportedFlight:
-    return import_flight(path, ImportOptions(scenario=SCENARIOS[name]), lambda scenario: scenario)
+    return import_flight(path, LogOptions(scenario=SCENARIOS[name]))
 
 
 def flat(lat: Any, lon: Any, lat0: float, lon0: float) -> Floats:
@@ -185,12 +186,12 @@ def test_whole_logs_agree_with_their_truth(name: str) -> None:
     folder = WHOLE
     truth = json.loads((folder / "truth.json").read_text())[name]
     scenario = str(folder / f"{name}.toml") if (folder / f"{name}.toml").exists() else name
-    options = ImportOptions(scenario=scenario) if name != "demo" else ImportOptions(terrain=str(folder / "terrain.tif"))
+    options = LogOptions(scenario=scenario) if name != "demo" else LogOptions(terrain=str(folder / "terrain.tif"))
     flight, spent = None, []
     for _ in range(2):
         # The first brings the kernels along.
         began = time.process_time()
-        flight = import_flight(folder / f"{name}.BIN", options, lambda world: world)
+        flight = import_flight(folder / f"{name}.BIN", options)
         spent.append(time.process_time() - began)
     assert flight is not None
     assert min(spent) < 5.0 * truth["flight_s"] / 3600.0
@@ -205,7 +206,7 @@ def test_whole_logs_agree_with_their_truth(name: str) -> None:
 def test_a_task_without_heights_gets_those_that_were_flown(tmp_path: Path) -> None:
     raw = example_raw_log()
     task = replace(raw.missions[0], with_heights=False)
-    flight = judged(tmp_path, replace(raw, missions=(task,)), ImportOptions(aircraft="aerosonde"))
+    flight = judged(tmp_path, replace(raw, missions=(task,)), LogOptions(aircraft="aerosonde"))
     assert [item.ok for item in flight.verdict.findings if item.rule == "slope"] == [None, None]
     assert flight.setup.source is not None
     assert not flight.setup.source.plan_heights
@@ -227,7 +228,7 @@ def silent(_done: float, _whole: float, _remark: str) -> None:
 
 
 def test_the_model_flies_the_legs_of_the_longest_stretch_in_the_wind_of_the_log(tmp_path: Path) -> None:
-    flight = judged(tmp_path, options=ImportOptions(aircraft="aerosonde"))
+    flight = judged(tmp_path, options=LogOptions(aircraft="aerosonde"))
     (again,) = fly_again(flight.setup, flight.track, None, None, silent)
     assert (len(again.legs), again.ended, again.stands_in) == (2, "completed", False)
     # 3 m/s from the north: 25 m/s of equivalent airspeed are 25.6 at 500 m, less 3 against the wind.
@@ -254,10 +255,10 @@ def test_a_flight_that_followed_no_mission_is_not_flown_again(tmp_path: Path) ->
 def test_every_stretch_is_flown_again_the_longest_first(tmp_path: Path) -> None:
     """AUTO from 20 s to 75 s, and from 76 s on: the turn is at 70 s, the end at 110 s."""
     modes = (ModeChange(20.0, "AUTO", True), ModeChange(75.0, "FBWA", False), ModeChange(76.0, "AUTO", True))
-    flight = judged(tmp_path, replace(example_raw_log(), modes=modes), ImportOptions(aircraft="aerosonde"))
+    flight = judged(tmp_path, replace(example_raw_log(), modes=modes), LogOptions(aircraft="aerosonde"))
     found = fly_again(flight.setup, flight.track, None, None, silent)
     assert [(again.stretch.start, again.first, len(again.legs)) for again in found] == [(20.0, 0, 2)]
     turned = (ModeChange(20.0, "AUTO", True), ModeChange(40.0, "FBWA", False), ModeChange(68.0, "AUTO", True))
-    flight = judged(tmp_path, replace(example_raw_log(), modes=turned), ImportOptions(aircraft="aerosonde"))
+    flight = judged(tmp_path, replace(example_raw_log(), modes=turned), LogOptions(aircraft="aerosonde"))
     found = fly_again(flight.setup, flight.track, None, None, silent)
     assert [(again.stretch.start, again.first, len(again.legs)) for again in found] == [(20.0, 0, 1), (68.0, 1, 1)]

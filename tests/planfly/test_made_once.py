@@ -43,10 +43,10 @@ STAGES = (
     "flight.mission.itinerary:make_itinerary",
     "flight.mission.placing:place_stops",
     "flight.mission.route:lay_route",
-    "planfly.make_plan:make_setup",
+    "planfly.open_flight:make_setup",
     "flight.guidance.path:fly_by_path",
     "flight.simulation.local_map:LocalMap.around",
-    "flight.simulation.simulate:fly_to_end",
+    "flight.simulation.simulate:simulate",
     "logs.verdict.judge_flight:judge_flight",
     "logs.verdict.judge_flight:judge_geometry",
     "logs.verdict.measures.route_requirements:route_requirements",
@@ -57,9 +57,10 @@ ONCE = dict.fromkeys(("load_airframe", "load_envelope", "make_limits"), 1)
 ROUTED = dict.fromkeys(("make_itinerary", "place_stops", "lay_route", "make_setup", "fly_by_path"), 1)
 OPENED = ROUTED | {"plan_mission": 1}
 ALIGNED = dict.fromkeys(("route_requirements", "align_track"), 1)
-FLIGHT = OPENED | ALIGNED | dict.fromkeys(("around", "fly_to_end", "judge_flight"), 1)
-# An autopilot's flight has the aircraft's own beside it, at true airspeeds along a path of its own.
-BESIDE = dict.fromkeys(("fly_by_path", "around", "fly_to_end", "route_requirements", "align_track", "judge_flight"), 2)
+FLIGHT = OPENED | ALIGNED | dict.fromkeys(("around", "simulate", "judge_flight"), 1)
+# A reference flight is at true airspeeds along a path of its own; its setup's flight is judged before it and after it.
+REFERENCE = dict.fromkeys(("fly_by_path", "around", "simulate", "route_requirements"), 2)
+REFERENCE |= dict.fromkeys(("align_track", "judge_flight"), 3)
 LOG = ALIGNED | dict.fromkeys(("make_limits", "fly_by_path"), 1)
 MISSION = Path(__file__).parents[1] / "flight" / "missions" / "by_hand.waypoints"
 
@@ -152,8 +153,10 @@ def test_a_replay_aligns_its_track_once(count: Count, flight: Path) -> None:
 
 
 def test_a_mission_that_a_person_brought_is_flown_or_judged_along_one_path(count: Count) -> None:
-    flown = count("fly", str(MISSION), "--terrain", "jacksboro", code=0)
-    assert flown == {key: n for key, n in (ONCE | FLIGHT | BESIDE).items() if key != "plan_mission"}
+    flown = {key: number for key, number in (ONCE | FLIGHT).items() if key != "plan_mission"}
+    assert count("fly", str(MISSION), "--terrain", "jacksboro", code=0) == flown
+    explained = count("fly", str(MISSION), "--terrain", "jacksboro", "--levels", code=0)
+    assert explained == flown | REFERENCE
     judged = ONCE | ROUTED | {"judge_geometry": 1, "route_requirements": 1}
     assert count("check", "--geometry", str(MISSION), "--terrain", "jacksboro", code=0) == judged
     assert count("check", "--geometry", str(MISSION), "--scenario", "jacksboro-air", code=4) == judged
@@ -169,7 +172,7 @@ def test_a_log_judged_over_another_terrain_keeps_its_path(count: Count, flight: 
 def test_a_served_mission_is_prepared_once_and_flown_from_that(entered: Counter[str], tmp_path: Path) -> None:
     (tmp_path / "field.toml").write_text(FIELD, encoding="utf-8")
     field = str(tmp_path / "field.toml")
-    flights = ServedFlights(ServeOptions("", field, None, 100.0, tmp_path / "logs"))
+    flights = ServedFlights(ServeOptions("", 100.0, tmp_path / "logs", {"scenario": field}))
     assert dict(entered) == ONCE
     entered.clear()
     points = np.array([[0.0, 0.0, 150.0], [500.0, 0.0, 150.0]])
@@ -184,5 +187,5 @@ def test_a_served_mission_is_prepared_once_and_flown_from_that(entered: Counter[
     link_end.send(EndFlight(quit=True))
     process.join(20.0)
     # The mission is judged before its flight, too.
-    judged = BESIDE | {"judge_geometry": 1, "route_requirements": 3, "fly_to_end": 1}
-    assert dict(entered) == ROUTED | judged
+    judged = ALIGNED | dict.fromkeys(("around", "judge_geometry", "judge_flight"), 1)
+    assert dict(entered) == ROUTED | judged | {"route_requirements": 2}

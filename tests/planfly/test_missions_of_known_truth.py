@@ -13,7 +13,7 @@ from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.verdict import Verdict
 from planfly.airframe import load_airframe
 from planfly.cli import main
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from planfly.pipeline import fly_and_judge
 from tests.mission_lines import ORIGIN, mission, wp
 from tests.setups import spec_around

@@ -9,7 +9,7 @@ import pytest
 from logs.recording.reader import read_log
 from logs.verdict.verdict import verdict_json
 from planfly.airframe import load_airframe
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from planfly.pipeline import fly_and_judge, plan_then_fly
 from tests.setups import small_scenario, waypoint_mission
 

@@ -23,7 +23,7 @@ from logs.verdict.places import Place
 from logs.verdict.verdict import verdict_json
 from logs.verdict.wording import deciding_text
 from planfly.airframe import load_airframe
-from planfly.open_mission import judge_log
+from planfly.flight_logs import judge_log
 from planfly.pipeline import JudgedFlight, fly_and_judge
 from planfly.reference_flights import (
     airframe_answer,

@@ -14,7 +14,8 @@ from logs.verdict.places import FLIGHT, Place
 from logs.verdict.verdict import Verdict
 from planfly.airframe import load_airframe
 from planfly.cli import main
-from planfly.make_plan import make_plan, make_setup
+from planfly.make_plan import make_plan
+from planfly.open_flight import make_setup
 from planfly.refine import GO_ON, refine, tighten_limits
 from tests.planfly.conftest import FIELD
 from tests.synthetic import fly_path

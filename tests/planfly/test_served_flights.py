@@ -51,7 +51,7 @@ def test_a_station_reads_the_words_of_the_terminal() -> None:
 @pytest.fixture
 def options(tmp_path: Path) -> ServeOptions:
     (tmp_path / "field.toml").write_text(FIELD, encoding="utf-8")
-    return ServeOptions("", str(tmp_path / "field.toml"), None, 5.0, tmp_path / "logs")
+    return ServeOptions("", 5.0, tmp_path / "logs", {"scenario": tmp_path / "field.toml"})
 
 
 def mission(options: ServeOptions, *points: tuple[float, float, float]) -> Mission:

@@ -17,9 +17,8 @@ from logs.verdict.measures.route_requirements import surveys_of
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.verdict import Verdict
 from planfly import survey_remedies as remedies
-from planfly.api.flying import opened_mission
-from planfly.api.planning import changed_scenario
-from planfly.open_mission import OpenedMission
+from planfly.airframe import airframe_of
+from planfly.open_flight import open_flight
 from planfly.survey_remedies import TriedRemedies
 from planfly.survey_text import remedy_text
 
@@ -54,16 +53,14 @@ class Flights:
         return SimpleNamespace(verdict=verdict_of(setup, self.answer))
 
 
-def opened(path: Path) -> OpenedMission:
-    return opened_mission(
-        path, None, None, None, (), lambda world: changed_scenario(world, aircraft="x8", autopilot_law="ardupilot")
-    )
+def opened(path: Path) -> FlightSetup:
+    return open_flight(path, {"aircraft": "x8", "autopilot_law": "ardupilot"})
 
 
 def tried(monkeypatch: pytest.MonkeyPatch, answer: Answer, path: Path = FIELD) -> tuple[TriedRemedies, list[float]]:
     flights, mission = Flights(answer), opened(path)
     monkeypatch.setattr(remedies, "fly_and_judge", flights)
-    found = remedies.survey_remedies(mission.setup, mission.airframe, verdict_of(mission.setup, answer))
+    found = remedies.survey_remedies(mission, airframe_of(mission), verdict_of(mission, answer))
     return found, flights.flown
 
 
@@ -95,7 +92,7 @@ def test_every_second_line_is_come_to_as_all_are(monkeypatch: pytest.MonkeyPatch
         return found
 
     monkeypatch.setattr(remedies, "fly_and_judge", fly)
-    found = remedies.survey_remedies(mission.setup, mission.airframe, verdict_of(mission.setup, answer))
+    found = remedies.survey_remedies(mission, airframe_of(mission), verdict_of(mission, answer))
     longer, second = found.remedies
     assert (longer.kind, longer.value, longer.lead_in) == ("turn-around", 150.0, 0.0)
     assert (second.kind, second.value, second.turn_around, second.lead_in) == ("every", 2.0, 50.0, 150.0)
@@ -136,7 +133,7 @@ def judged_by(
 
     mission = opened(path)
     monkeypatch.setattr(remedies, "fly_and_judge", fly)
-    return remedies.survey_remedies(mission.setup, mission.airframe, verdict_of(mission.setup, lambda _: (False, {})))
+    return remedies.survey_remedies(mission, airframe_of(mission), verdict_of(mission, lambda _: (False, {})))
 
 
 def test_where_nothing_alone_helps_two_changes_are_made(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,7 +27,7 @@ from flight.autopilots.sitl.link import AutopilotLink, TcpLink
 from flight.autopilots.sitl.process import AutopilotProcess, check_binary
 from flight.autopilots.sitl.servos import load_servo_map
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import Progress, SimulatedFlight, Sink, fly_to_end
+from flight.simulation.simulate import SimulatedFlight, fly_to_end
 
 # Time for the motor to follow its throttle, s.
 _SPOOL_TIME_S = 0.5
@@ -115,11 +115,9 @@ def fly_autopilot(
     autopilot: ProgramAutopilot,
     own: Mapping[str, float] | None = None,
     *,
-    sink: Sink | None = None,
-    progress: Progress | None = None,
     log: Path | None = None,
 ) -> tuple[SimulatedFlight, FlightSetup]:
-    """Fly a setup with ArduPlane SITL, from its boot to its end.
+    """Fly a setup with ArduPlane SITL, from its boot to its end; arguments as of `AutopilotFlight`.
 
     The arguments are as in `AutopilotFlight` and `simulate`.
     log: file for the autopilot's own log (.BIN).
@@ -128,7 +126,7 @@ def fly_autopilot(
     """
     with AutopilotFlight(setup, aircraft, autopilot, own) as flight:
         flight.prepare()
-        flown = fly_to_end(flight, sink, progress)
+        flown = fly_to_end(flight)
         if log is not None:
             flight.keep_log(log)
         return flown, flight.setup

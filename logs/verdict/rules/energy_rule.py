@@ -2,12 +2,9 @@
 
 import math
 
-import numpy as np
-
-from aircraft.envelope import ground_speed
-from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.energy import leg_energies, predicted_energy
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
@@ -98,57 +95,6 @@ def _used_text(requirements: RouteRequirements, used: float, current: float) -> 
         )
     peak = f", peak current {current:.1f} A" if math.isfinite(current) else ""
     return f"{used:.1f} Wh of {capacity:.0f} Wh used{peak}"
-
-
-def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
-    """Energy (Wh) and peak current (A) of steady flight along a route, NaN where the envelope knows no power.
-
-    Each leg at its commanded airspeed, its slope over the ground in the mean wind, and its middle height; what turns
-    and gusts take beside that is a few per cent.
-    """
-    volts = requirements.setup.envelope.volts
-    energies, most = leg_energies(requirements)
-    return float(sum(energies)), most / volts if volts else math.nan
-
-
-def needed_energy(setup: FlightSetup) -> float:
-    """Energy (Wh) of steady flight along a setup's route, NaN where the envelope knows no power.
-
-    >>> from logs.recording.example_log import example_log
-    >>> needed_energy(example_log().setup)
-    nan
-    """
-    return predicted_energy(route_requirements(setup))[0]
-
-
-def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
-    """Energy (Wh) of steady flight on each leg, and the highest power (W); NaN where the envelope knows none."""
-    envelope, route = requirements.setup.envelope, requirements.route
-    if not np.isfinite(requirements.ground_speed).all():
-        return [math.nan] * requirements.legs, math.nan
-    energies, most = [], 0.0
-    seconds_on = np.bincount(
-        requirements.path.legs, weights=np.diff(requirements.path.times), minlength=requirements.legs
-    )
-    for leg, seconds in enumerate(seconds_on):
-        speed, up = (
-            float(route.airspeed[leg]),
-            float(0.5 * (requirements.points[leg, 2] + requirements.points[leg + 1, 2])),
-        )
-        power = envelope.power(speed, up, air_angle(requirements, leg, speed, up))
-        energies.append(power * float(seconds) / 3600.0)
-        most = max(most, power) if math.isfinite(power) else math.nan
-    return energies, most
-
-
-def air_angle(requirements: RouteRequirements, leg: int, speed: float, up: float) -> float:
-    """Path angle to the air of a leg's slope over the ground in the mean wind at a height (m), rad."""
-    tail, cross = requirements.setup.scenario.wind.along(float(requirements.courses[leg]), up)
-    rise, angle = math.tan(float(requirements.slopes[leg])), 0.0
-    for _ in range(4):
-        along = ground_speed(speed * math.cos(angle), tail, cross)
-        angle = math.asin(min(1.0, max(-1.0, rise * along / speed)))
-    return angle
 
 
 RULE = Rule(

@@ -10,6 +10,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, control_limits, held_at_limit
 from logs.recording.reader import FlightLog
@@ -168,7 +169,7 @@ def _notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[
         ("scenario", a.scenario.name, b.scenario.name),
         ("aircraft", a.aircraft, b.aircraft),
         ("seed", str(a.seed), str(b.seed)),
-        ("mission", a.mission_text, b.mission_text),
+        ("mission", *(mission_text(setup.mission, "waypoints") for setup in (a, b))),
         ("wind", _wind(a), _wind(b)),
         ("guidance", a.autopilot.store().guidance, b.autopilot.store().guidance),
         ("navigation", a.nav, b.nav),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, control_limits, held_at_limit
 from logs.verdict.measures.flown_phases import by_the_ground
@@ -254,7 +255,8 @@ def origin_facts(setup: FlightSetup, versions: Mapping[str, str]) -> Facts:
     wind_seed = setup.scenario.wind.seed
     facts: Facts = [("Seed", f"{setup.seed}" + (f"; turbulence {wind_seed}" if wind_seed is not None else ""))]
     facts += [(name, versions[name]) for name in sorted(versions)]
-    facts.append(("Mission file, SHA-256", hashlib.sha256(setup.mission_text.encode("utf-8")).hexdigest()))
+    text = mission_text(setup.mission, "waypoints")
+    facts.append(("Mission file, SHA-256", hashlib.sha256(text.encode("utf-8")).hexdigest()))
     if setup.envelope.model_hash:
         facts.append(("Aircraft model, hash", setup.envelope.model_hash))
     terrain = setup.scenario.terrain

@@ -17,7 +17,7 @@ from flight.guidance.lateral_reference_laws import (
     l1_reached,
 )
 from flight.guidance.navigation_error import MOTION
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from tests.setups import MakeSetup
 from world.kernels import Record
 
@@ -73,8 +73,8 @@ def test_the_field_points_to_its_path() -> None:
 def test_a_reference_law_flies_the_mission(make_setup: MakeSetup, aerosonde: Aircraft, law: str) -> None:
     way = [[0, 0, 500], [0, 1500, 520], [1000, 2500, 520], [1000, 4000, 500]]
     setup = make_setup(way, wind=(5.0, 70.0))
-    flown = simulate(replace(setup, autopilot=PlanflyGuidance(law)), aerosonde)
-    ours = simulate(setup, aerosonde)
+    flown = fly_to_end(Flight(replace(setup, autopilot=PlanflyGuidance(law)), aerosonde))
+    ours = fly_to_end(Flight(setup, aerosonde))
     assert flown.ended == "completed"
     assert 0.3 < float(np.abs(flown.track.cross_track).max()) < 40.0
     assert float(np.abs(ours.track.cross_track).max()) < float(np.abs(flown.track.cross_track).max())

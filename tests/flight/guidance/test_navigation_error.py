@@ -7,7 +7,7 @@ import pytest
 
 from aircraft.catalog import Aircraft
 from flight.guidance.navigation_error import ERRORS, MOTION, NAVIGATION_LAGS, navigate, start_navigation
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from tests.setups import MakeSetup
 from tests.soak import scaled
 from world.kernels import Record
@@ -36,7 +36,9 @@ def test_guidance_follows_what_navigation_says_and_the_track_is_true(
     make_setup: MakeSetup, aerosonde: Aircraft
 ) -> None:
     setup = make_setup([[0, 0, 500], [0, 3000, 500]])
-    perfect, rtk, gnss = (simulate(replace(setup, nav=nav), aerosonde).track for nav in ("perfect", "rtk", "gnss"))
+    perfect, rtk, gnss = (
+        fly_to_end(Flight(replace(setup, nav=nav), aerosonde)).track for nav in ("perfect", "rtk", "gnss")
+    )
     away = [float(np.abs(track.position[300:, 0]).max()) for track in (perfect, rtk, gnss)]
     assert away[0] < 0.05 < 0.3 < away[2] < 8.0
     assert away[0] < away[1] < 0.5

@@ -16,7 +16,7 @@ from flight.mission.itinerary import UNLIMITED
 from flight.mission.loiter_circles import LoiterRules
 from flight.mission.route import Route, RouteRules, make_route
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.judge_flight import judge_flight, judge_geometry
@@ -146,7 +146,7 @@ def flight() -> tuple[FlightSetup, Any]:
         "2 178 0 22 -1 0 0 0 0", wp(1500, 0, 260, command=31, p="1 0 0 0"), wp(1500, -1500, 260),
         wp(0, -1500, 260, command=17, p="0 0 140 0"),
     )  # fmt: skip
-    return setup, simulate(setup, load_aircraft("aerosonde"))
+    return setup, fly_to_end(Flight(setup, load_aircraft("aerosonde")))
 
 
 def test_every_kind_of_loiter_is_flown(flight: tuple[FlightSetup, Any]) -> None:
@@ -181,7 +181,7 @@ def test_a_circle_tighter_than_the_wind_allows_fails() -> None:
     (loiter,) = [item for item in verdict.findings if item.rule == "loiter"]
     assert loiter.limit == pytest.approx(169.7, abs=0.5)
     assert "needs 170 m in this wind" in loiter.reason
-    flown = simulate(windy, load_aircraft("aerosonde"))
+    flown = fly_to_end(Flight(windy, load_aircraft("aerosonde")))
     assert not judge_flight(windy, flown.track, flown.ended).flyable
 
 

@@ -9,7 +9,6 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,9 +17,9 @@ from numpy.typing import NDArray
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Variation
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import BANK_RESERVE, Flight, make_loop, simulate
+from flight.simulation.simulate import BANK_RESERVE, Flight, fly_to_end, make_loop, simulate, track_of
 from flight.simulation.tick import OUTPUT, READ_FIELDS, Workspace
-from flight.simulation.track import COLUMNS, Rows, Track, as_track, join_tracks
+from flight.simulation.track import COLUMNS, Track
 from tests.flight.simulation.hand_made import make_workspace
 from tests.setups import MakeSetup, standard
 from tests.soak import SOAK, some
@@ -128,7 +127,7 @@ def _digest(track: Track) -> str:
 
 
 def test_calm(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
-    flown = simulate(make_setup(WAY), aerosonde)
+    flown = fly_to_end(Flight(make_setup(WAY), aerosonde))
     track = flown.track
     assert flown.ended == "completed"
     _within(track, (0.10, 0.6), (0.05, 0.3))
@@ -147,7 +146,7 @@ def test_what_the_track_says_of_itself(make_setup: MakeSetup, aerosonde: Aircraf
     # 60 km from the map's origin, where north is not the map's: velocity, attitude and wind stand in map axes.
     way = WAY[:4] + np.array([60_000.0, 20_000.0, 0.0])
     setup = make_setup(way, wind=(8.0, 60.0), origin={"lat_deg": 60.0, "lon_deg": 10.0})
-    flown = simulate(setup, aerosonde)
+    flown = fly_to_end(Flight(setup, aerosonde))
     track = flown.track
     assert flown.ended == "completed"
     _within(track, (0.10, 0.6), (0.10, 0.4))
@@ -170,7 +169,7 @@ def test_what_the_track_says_of_itself(make_setup: MakeSetup, aerosonde: Aircraf
 
 @pytest.mark.parametrize(("from_deg", "seed"), some([(0.0, 1), (120.0, 2), (240.0, 3)], 3))
 def test_wind_and_moderate_turbulence(make_setup: MakeSetup, aerosonde: Aircraft, from_deg: float, seed: int) -> None:
-    flown = simulate(make_setup(WAY, wind=(10.0, from_deg), turbulence="moderate", seed=seed), aerosonde)
+    flown = fly_to_end(Flight(make_setup(WAY, wind=(10.0, from_deg), turbulence="moderate", seed=seed), aerosonde))
     assert flown.ended == "completed"
     _within(flown.track, (0.15, 1.0), (0.3, 1.0))
     gusts = flown.track.wind - flown.track.wind.mean(axis=0)
@@ -185,22 +184,24 @@ def test_wind_and_moderate_turbulence(make_setup: MakeSetup, aerosonde: Aircraft
 def test_an_aircraft_that_differs_from_its_model(
     make_setup: MakeSetup, aerosonde: Aircraft, variation: Variation
 ) -> None:
-    calm = simulate(make_setup(WAY), aerosonde, variation=variation)
+    calm = fly_to_end(Flight(make_setup(WAY), aerosonde, variation=variation))
     assert calm.ended == "completed"
     _within(calm.track, (0.15, 1.5), (0.15, 1.5))
-    windy = simulate(make_setup(WAY, wind=(10.0, 200.0), turbulence="moderate"), aerosonde, variation=variation)
+    windy = fly_to_end(
+        Flight(make_setup(WAY, wind=(10.0, 200.0), turbulence="moderate"), aerosonde, variation=variation)
+    )
     assert windy.ended == "completed"
     _within(windy.track, (0.25, 2.0), (0.3, 1.5))
-    assert _digest(calm.track) != _digest(simulate(make_setup(WAY), aerosonde).track)
+    assert _digest(calm.track) != _digest(fly_to_end(Flight(make_setup(WAY), aerosonde)).track)
 
 
 _FLY_AGAIN = """
 import hashlib, pickle, sys
 from aircraft.catalog import load_aircraft
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import COLUMNS
 with open(sys.argv[1], "rb") as file:
-    track = simulate(pickle.load(file), load_aircraft("aerosonde")).track
+    track = fly_to_end(Flight(pickle.load(file), load_aircraft("aerosonde"))).track
 print(hashlib.sha256(b"".join(getattr(track, name).tobytes() for name in COLUMNS)).hexdigest())
 """
 
@@ -209,18 +210,21 @@ def test_the_same_setup_gives_the_same_bytes(make_setup: MakeSetup, aerosonde: A
     def setup(seed: int) -> FlightSetup:
         return make_setup(WAY[:4], wind=(7.0, 30.0), turbulence="light", seed=seed)
 
-    def fly(seed: int, **more: Any) -> str:
-        return _digest(simulate(setup(seed), aerosonde, **more).track)
+    def fly(seed: int) -> str:
+        return _digest(fly_to_end(Flight(setup(seed), aerosonde)).track)
 
     first = fly(5)
-    parts: list[Rows] = []
-    reported: list[tuple[float, float]] = []
-    # Listening changes nothing.
-    assert fly(5, sink=parts.append, progress=lambda done, whole: reported.append((done, whole))) == first
+    assert fly(5) == first
     assert fly(6) != first
-    assert _digest(join_tracks([as_track(part) for part in parts])) == first
-    assert [done for done, _ in reported] == sorted(done for done, _ in reported)
-    assert reported[-1][0] == reported[-1][1]
+    flight = Flight(setup(5), aerosonde)
+    blocks = list(simulate(flight))
+    assert _digest(track_of(blocks)) == first
+    # A second of flight each, up to the end of the path.
+    assert {len(block.rows) for block in blocks[:-1]} == {60}
+    assert [block.ended for block in blocks] == [""] * (len(blocks) - 1) + ["completed"]
+    distances = [block.distance for block in blocks]
+    assert distances == sorted(distances)
+    assert distances[-1] == flight.path.length
     if not SOAK:
         return  # Other processes are tried in test_same_bytes_in_any_process.
     # Nor does another process, with another order of hashes.
@@ -236,7 +240,7 @@ def test_a_seed_of_the_wind_wins(make_setup: MakeSetup, aerosonde: Aircraft) -> 
     def fly(seed: int, own: int | None) -> str:
         setup = make_setup(WAY[:2], turbulence="light", seed=seed)
         scenario = replace(setup.scenario, wind=replace(setup.scenario.wind, seed=own))
-        return _digest(simulate(replace(setup, scenario=scenario), aerosonde).track)
+        return _digest(fly_to_end(Flight(replace(setup, scenario=scenario), aerosonde)).track)
 
     assert fly(1, 9) == fly(2, 9)
     assert fly(1, None) != fly(2, None)
@@ -257,7 +261,7 @@ def test_not_a_number(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
 
 def test_dive_into_a_hill(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     peaks = {"kind": "peaks", "peak": [{"east_m": 0.0, "north_m": 3000.0, "height_m": 600.0, "sigma_m": 400.0}]}
-    flown = simulate(make_setup([[0, 0, 300], [0, 6000, 300]], terrain=peaks), aerosonde)
+    flown = fly_to_end(Flight(make_setup([[0, 0, 300], [0, 6000, 300]], terrain=peaks), aerosonde))
     assert flown.ended == "ground contact"
     last = flown.track.position[-1]
     assert flown.track.clearance[-1] <= 0.0
@@ -271,12 +275,12 @@ def test_start_under_the_terrain(make_setup: MakeSetup, aerosonde: Aircraft) -> 
     setup = make_setup([[0, 0, 500], [0, 3000, 500]])
     route = replace(setup.route, waypoints=np.array([[0.0, 0.0, 99.0], [0.0, 3000.0, 500.0]]))
     with pytest.raises(FlightError, match="start at 99 m AMSL: not above the terrain, which is at 100 m"):
-        simulate(replace(setup, route=route), aerosonde)
+        fly_to_end(Flight(replace(setup, route=route), aerosonde))
 
 
 def test_a_corner_that_cannot_be_flown(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     # A hairpin of 60 m: its arcs are of 30 m, a quarter of what the bank allows.
-    flown = simulate(make_setup([[0, 0, 500], [0, 1500, 500], [60, 1500, 500], [60, 0, 500]]), aerosonde)
+    flown = fly_to_end(Flight(make_setup([[0, 0, 500], [0, 1500, 500], [60, 1500, 500], [60, 0, 500]]), aerosonde))
     assert float(np.abs(flown.track.cross_track).max()) > 20.0
     assert math.degrees(np.abs(flown.track.attitude[:, 0]).max()) < 36.0
     assert flown.ended == "completed"  # it comes back; that it left the path is for the verdict
@@ -285,7 +289,7 @@ def test_a_corner_that_cannot_be_flown(make_setup: MakeSetup, aerosonde: Aircraf
 def test_a_climb_that_cannot_be_flown(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     # 25 degrees, where 14 can be climbed at 25 m/s: height is given up for speed, and the flight does not stall.
     setup = make_setup([[0, 0, 300], [0, 1000, 300], [0, 2500, 1000], [0, 4500, 1000]])
-    flown = simulate(setup, aerosonde)
+    flown = fly_to_end(Flight(setup, aerosonde))
     assert flown.ended == "completed"
     assert float(flown.track.height_error.min()) < -120.0
     assert float(flown.track.airspeed.min()) > 19.0
@@ -296,7 +300,7 @@ def test_a_climb_that_cannot_be_flown(make_setup: MakeSetup, aerosonde: Aircraft
 
 
 def test_u_turn_comes_back(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
-    flown = simulate(make_setup([[0, 0, 500], [0, 2000, 500], [0, 20, 500]]), aerosonde)
+    flown = fly_to_end(Flight(make_setup([[0, 0, 500], [0, 2000, 500], [0, 20, 500]]), aerosonde))
     assert flown.ended == "completed"
     for point in ([0, 2000, 500], [0, 20, 500]):
         assert np.linalg.norm(flown.track.position - point, axis=1).min() < 2.0
@@ -306,27 +310,29 @@ def test_a_wind_that_cannot_be_beaten_ends(make_setup: MakeSetup, aerosonde: Air
     # 30 m/s from ahead of an aircraft that holds 25.
     setup = make_setup([[0, 0, 500], [0, 1500, 500]], wind=(30.0, 0.0))
     with pytest.raises(FlightError, match=r"^made: no way made along the course of -?0 degrees") as caught:
-        simulate(setup, aerosonde)
+        fly_to_end(Flight(setup, aerosonde))
     assert "\n" not in str(caught.value)
 
 
 def test_time_limit(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     # It starts downwind and can, but the leg back against 27 m/s never ends.
     setup = make_setup([[0, 0, 500], [0, 1000, 500], [300, 0, 500]], wind=(27.0, 180.0))
-    flown = simulate(setup, aerosonde)
+    flown = fly_to_end(Flight(setup, aerosonde))
     assert flown.ended.startswith("time limit: not finished after")
     assert len(flown.track) < 60_000
 
 
 def test_unknown_ground(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     setup = make_setup([[0, 0, 500], [0, 1500, 500]], terrain={"kind": "none"}, turbulence="light")
-    flown = simulate(setup, aerosonde)
+    flown = fly_to_end(Flight(setup, aerosonde))
     assert flown.ended == "completed"
     assert np.isnan(flown.track.clearance).all()
 
 
 def test_each_leg_at_its_speed(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
-    flown = simulate(make_setup([[0, 0, 500], [0, 2000, 500], [0, 4500, 500]], speeds=[22.0, 28.0]), aerosonde)
+    flown = fly_to_end(
+        Flight(make_setup([[0, 0, 500], [0, 2000, 500], [0, 4500, 500]], speeds=[22.0, 28.0]), aerosonde)
+    )
     track = flown.track
     assert track.speed_command[track.leg == 0] == pytest.approx(22.0)
     assert track.speed_command[track.leg == 1] == pytest.approx(28.0)
@@ -335,8 +341,8 @@ def test_each_leg_at_its_speed(make_setup: MakeSetup, aerosonde: Aircraft) -> No
 
 def test_a_flight_crosses_the_180th_meridian(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     points = [[-2000, 0, 500], [2000, 500, 520]]
-    here = simulate(make_setup(points, origin={"lat_deg": -17.0, "lon_deg": 179.999}), aerosonde)
-    there = simulate(make_setup(points, origin={"lat_deg": -17.0, "lon_deg": 100.0}), aerosonde)
+    here = fly_to_end(Flight(make_setup(points, origin={"lat_deg": -17.0, "lon_deg": 179.999}), aerosonde))
+    there = fly_to_end(Flight(make_setup(points, origin={"lat_deg": -17.0, "lon_deg": 100.0}), aerosonde))
     assert here.ended == there.ended == "completed"
     assert np.abs(here.track.cross_track).max() < 0.5
     assert np.allclose(here.track.position, there.track.position, atol=0.01)
@@ -344,6 +350,6 @@ def test_a_flight_crosses_the_180th_meridian(make_setup: MakeSetup, aerosonde: A
 
 def test_guidance_at_thirty_hertz_follows_too(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     setup = make_setup([[0, 0, 500], [0, 1500, 500], [800, 2600, 520]])
-    track = simulate(replace(setup, guidance_hz=30), aerosonde).track
+    track = fly_to_end(Flight(replace(setup, guidance_hz=30), aerosonde)).track
     assert np.diff(track.time) == pytest.approx(1 / 30, abs=1e-9)
     assert float(np.abs(track.cross_track[150:]).max()) < 0.6

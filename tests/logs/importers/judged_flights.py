@@ -5,11 +5,12 @@ from pathlib import Path
 
 from logs.importers.raw_log import RawLog, example_raw_log
 from planfly import imported_flights
-from planfly.imported_flights import ImportedFlight, ImportOptions
+from planfly.flight_options import LogOptions
+from planfly.imported_flights import ImportedFlight
 
 
 def judged(
-    folder: Path, raw: RawLog | None = None, options: ImportOptions | None = None, name: str = "example.BIN"
+    folder: Path, raw: RawLog | None = None, options: LogOptions | None = None, name: str = "example.BIN"
 ) -> ImportedFlight:
     """Import a log as its reader would give it."""
     given = replace(example_raw_log() if raw is None else raw)
@@ -18,7 +19,7 @@ def judged(
     reader = imported_flights.open_log
     imported_flights.open_log = lambda _: given
     try:
-        return imported_flights.import_flight(path, options or ImportOptions(), lambda scenario: scenario)
+        return imported_flights.import_flight(path, options or LogOptions())
     finally:
         imported_flights.open_log = reader
 

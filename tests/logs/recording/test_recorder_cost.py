@@ -8,7 +8,8 @@ from benchmarks.chain import in_child, long_flight, recording
 from flight.mission.from_plan import plan_mission
 from logs.recording.reader import read_log
 from planfly.airframe import load_airframe
-from planfly.make_plan import make_plan, make_setup
+from planfly.make_plan import make_plan
+from planfly.open_flight import make_setup
 from tests.soak import SOAK
 from world.scenario import load_scenario
 

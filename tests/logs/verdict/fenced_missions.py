@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
 from flight.simulation.setup import FlightSetup
 from planfly.airframe import load_airframe
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from tests.setups import spec_around
 from tests.synthetic import bank_radius
 from world.frames import GeoOrigin, to_geo

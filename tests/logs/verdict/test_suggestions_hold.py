@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.places import Suggestion
@@ -83,6 +83,6 @@ def test_taken_until_none_is_left_the_mission_flies(number: int) -> None:
         if not wrong:
             break
         setup = taken(setup, wrong[0].suggestions[0])
-    flown = simulate(setup, made.airframe.aircraft)
+    flown = fly_to_end(Flight(setup, made.airframe.aircraft))
     still = failed(made, judge_flight(setup, flown.track, flown.ended))
     assert not still, [item.reason for item in still]

@@ -5,7 +5,7 @@
 
 import pytest
 
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import bare
@@ -18,7 +18,7 @@ BEYOND, INSIDE = range(scaled(100, len(KINDS))), range(scaled(100, 4))
 
 def levels(made: MadeMission) -> dict[str, Verdict]:
     """Verdicts by geometry, of the flight, and of the flight without the aircraft's envelope."""
-    flown = simulate(made.setup, made.airframe.aircraft)
+    flown = fly_to_end(Flight(made.setup, made.airframe.aircraft))
     return {
         "geometric": judge_geometry(made.setup),
         "flown": judge_flight(made.setup, flown.track, flown.ended),

@@ -120,8 +120,11 @@ def test_a_fence_that_is_named_is_kept_to(tmp_path: Path) -> None:
     ring = [[8.0, 46.01], [8.01, 46.01], [8.01, 46.02], [8.0, 46.01]]
     zone.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
     with_both, without = (
-        campaigns._asked(mission, scenario, None, fences, None, wind=None).open(
-            default_dispersions(), OutputDirectory(tmp_path / name, DATABASE, resume=False, overwrite=False)
+        campaigns._open(
+            mission,
+            {"scenario": scenario, "fence": fences},
+            default_dispersions(),
+            OutputDirectory(tmp_path / name, DATABASE, resume=False, overwrite=False),
         )
         for name, fences in (("a", [circle, zone]), ("b", []))
     )
@@ -148,8 +151,11 @@ def test_a_plan_at_hand_is_flown_as_its_file_is(tmp_path: Path, monkeypatch: pyt
     (tmp_path / "field.toml").write_text(f"{FIELD}[planner]\npopulation = 20\ngenerations = 5\n", encoding="utf-8")
     plan = planfly.plan(tmp_path / "field.toml", seed=1, out=tmp_path / "plan.json")
     bases = [
-        campaigns._asked(target, None, None, (), 3, wind=(4.0, 90.0)).open(
-            default_dispersions(), OutputDirectory(tmp_path / name, DATABASE, resume=False, overwrite=False)
+        campaigns._open(
+            target,
+            {"seed": 3, "wind": (4.0, 90.0)},
+            default_dispersions(),
+            OutputDirectory(tmp_path / name, DATABASE, resume=False, overwrite=False),
         )
         for name, target in (("a", plan), ("b", tmp_path / "plan.json"))
     ]

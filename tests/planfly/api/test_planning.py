@@ -10,8 +10,8 @@ import pytest
 import planfly
 from aircraft.catalog import aircraft_names, load_aircraft
 from planfly.airframe import load_airframe
-from planfly.api.planning import changed_scenario, opened_scenario
 from planfly.cli import main
+from planfly.flight_options import FlightOptions, apply_options, named_scenario
 from planner.plan import plan_json, read_plan
 from planner.search.plan_path import plan_path
 from tests.planfly.conftest import FIELD
@@ -23,59 +23,59 @@ from world.scenario import embedded_names, load_scenario, with_wind
 def test_a_scenario_is_named_in_three_ways(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(FIELD)
     named = load_scenario("tight")
-    assert opened_scenario(named) is named
-    assert opened_scenario("tight").name == "tight"
-    as_text, as_path = opened_scenario(str(tmp_path / "mine.toml")), opened_scenario(tmp_path / "mine.toml")
+    assert named_scenario(named, {}).to_json() == named.to_json()
+    assert named_scenario("tight", {}).name == "tight"
+    as_text, as_path = named_scenario(str(tmp_path / "mine.toml"), {}), named_scenario(tmp_path / "mine.toml", {})
     assert as_text.to_json() == as_path.to_json()
 
 
 def test_nothing_asked_changes_nothing() -> None:
     scenario = load_scenario("tight")
-    assert changed_scenario(scenario).to_json() == scenario.to_json()
+    assert apply_options(scenario, {}).to_json() == scenario.to_json()
 
 
 def test_each_keyword_changes_its_own(tmp_path: Path) -> None:
     scenario = load_scenario("tight")
     (tmp_path / "my.parm").write_text("WP_RADIUS 50\n")
-    windy = changed_scenario(scenario, wind=(8.0, 270.0))
+    windy = apply_options(scenario, FlightOptions(wind=(8.0, 270.0)))
     assert windy.wind.speed == 8.0
     assert np.degrees(windy.wind.from_course) == pytest.approx(270.0)
-    assert changed_scenario(scenario, turbulence="light").wind.turbulence == "light"
-    assert changed_scenario(scenario, airspeed=28.0).flight.airspeed_mps == 28.0
-    assert changed_scenario(scenario, guidance="l1").flight.steering.guidance == "l1"
-    assert changed_scenario(scenario, nav="rtk").flight.steering.nav == "rtk"
+    assert apply_options(scenario, FlightOptions(turbulence="light")).wind.turbulence == "light"
+    assert apply_options(scenario, FlightOptions(airspeed=28.0)).flight.airspeed_mps == 28.0
+    assert apply_options(scenario, FlightOptions(guidance="l1")).flight.steering.guidance == "l1"
+    assert apply_options(scenario, FlightOptions(nav="rtk")).flight.steering.nav == "rtk"
     for params in (tmp_path / "my.parm", str(tmp_path / "my.parm")):
-        assert changed_scenario(scenario, params=params).flight.params == str(tmp_path / "my.parm")
+        assert apply_options(scenario, FlightOptions(params=params)).flight.params == str(tmp_path / "my.parm")
 
 
 def test_parameters_mean_arduplane_and_a_law_of_guidance_takes_its_place(tmp_path: Path) -> None:
     mine = tmp_path / "mine.parm"
     mine.write_text("WP_RADIUS 80\n", encoding="utf-8")
     scenario = small_scenario(wind={"speed_mps": 3.0, "from_deg": 200.0, "turbulence": "light"})
-    by_arduplane = changed_scenario(scenario, params=mine)
+    by_arduplane = apply_options(scenario, FlightOptions(params=mine))
     assert by_arduplane.flight.steering == ("ardupilot", "path", "gnss")
     assert by_arduplane.flight.params == str(mine)
-    again = changed_scenario(by_arduplane, guidance="l1").flight
+    again = apply_options(by_arduplane, FlightOptions(guidance="l1")).flight
     assert (again.params, again.steering) == (None, ("ideal", "l1", "perfect"))
-    assert changed_scenario(scenario, params=mine, nav="rtk").flight.steering.nav == "rtk"
+    assert apply_options(scenario, FlightOptions(params=mine, nav="rtk")).flight.steering.nav == "rtk"
     # A program is an ArduPlane, whatever the scenario says.
     assert (
-        changed_scenario(changed_scenario(scenario, guidance="l1"), autopilot="arduplane").flight.steering.autopilot
+        apply_options(apply_options(scenario, {"guidance": "l1"}), {}, Path("arduplane")).flight.steering.autopilot
         == "ardupilot"
     )
 
 
 def test_an_aircraft_is_a_name_or_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = load_scenario("tight")
-    assert changed_scenario(scenario, aircraft="c172x").flight.aircraft == "c172x"
+    assert apply_options(scenario, FlightOptions(aircraft="c172x")).flight.aircraft == "c172x"
     monkeypatch.chdir(tmp_path)
     # A path is a folder even where it looks like a name.
-    assert changed_scenario(scenario, aircraft=Path("c172x")).flight.aircraft == str(tmp_path / "c172x")
+    assert apply_options(scenario, FlightOptions(aircraft=Path("c172x"))).flight.aircraft == str(tmp_path / "c172x")
 
 
 def test_a_value_that_no_scenario_may_have_is_refused() -> None:
     with pytest.raises(ScenarioError, match="speed_mps: 50"):
-        changed_scenario(load_scenario("tight"), wind=(50.0, 0.0))
+        apply_options(load_scenario("tight"), FlightOptions(wind=(50.0, 0.0)))
 
 
 # ----------------------------------------------------------------------

@@ -61,7 +61,7 @@ def write_short(folder: Path) -> tuple[Path, Path]:
 
 def short_base(folder: Path, dispersions: Dispersions | None = None, seed: int = 1) -> CampaignBase:
     mission, scenario = write_short(folder)
-    return open_campaign(str(mission), dispersions or default_dispersions(), scenario_name=str(scenario), seed=seed)
+    return open_campaign(str(mission), dispersions or default_dispersions(), {"scenario": scenario, "seed": seed})
 
 
 def table(path: Path) -> list[tuple[Any, ...]]:

@@ -20,17 +20,16 @@ from planfly.campaigns.dispersions import (
     read_dispersions,
 )
 from planfly.data_sheets import make_data_sheet_folder
-from planfly.open_mission import open_mission
+from planfly.open_flight import open_flight
 from tests.planfly.campaigns.made_campaigns import write_short
 from world.errors import MissionError
-from world.scenario import Scenario, with_flight
 
 
 def test_it_has_the_mission_as_fly_opens_it(base: CampaignBase, tmp_path: Path) -> None:
     mission, scenario = write_short(tmp_path)
-    opened = open_mission(mission, str(scenario), None)
-    assert base.mission.items == opened.setup.mission.items
-    assert base.scenario.to_json() == opened.setup.scenario.to_json()
+    opened = open_flight(mission, {"scenario": scenario})
+    assert base.mission.items == opened.mission.items
+    assert base.scenario.to_json() == opened.scenario.to_json()
     # Whatever folder it lies in.
     assert base.mission.source == "short.waypoints"
 
@@ -57,7 +56,7 @@ def test_an_aircraft_that_cannot_fly_is_refused(base: CampaignBase, mass: float,
 
 def test_a_missing_mission_is_one_line() -> None:
     with pytest.raises(MissionError, match="no such file"):
-        open_campaign("none.waypoints", default_dispersions())
+        open_campaign("none.waypoints", default_dispersions(), {})
 
 
 # ----------------------------------------------------------------------
@@ -137,10 +136,7 @@ def sheet(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _opened(place: Path, dispersions: Dispersions) -> CampaignBase:
-    def with_foam(scenario: Scenario) -> Scenario:
-        return with_flight(scenario, aircraft=str(place / "foam"))
-
-    return open_campaign(str(place / "hop.waypoints"), dispersions, change=with_foam)
+    return open_campaign(str(place / "hop.waypoints"), dispersions, {"aircraft": place / "foam"})
 
 
 def test_an_aircraft_brings_its_draws(sheet: Path) -> None:

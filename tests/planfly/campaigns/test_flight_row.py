@@ -1,5 +1,6 @@
 """Every rule has a scale, and those without a distance are rules."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from flight.simulation.track import TRACK_ROW, as_track
 from logs.verdict.findings import GROUND_WAY, UNKNOWN_AIRCRAFT, Finding, make_finding
 from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
+from planfly.airframe import airframe_of
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import parse_dispersions
 from planfly.campaigns.flight_row import (
@@ -25,12 +27,11 @@ from planfly.campaigns.flight_row import (
     waypoint_crossings,
 )
 from planfly.campaigns.tables import same_flight
-from planfly.open_mission import open_mission
+from planfly.open_flight import open_flight
 from planfly.pipeline import fly_and_judge
 from tests.planfly.campaigns.made_campaigns import write_short
 from tests.setups import route_along
 from tests.synthetic import fly_path, make_setup
-from world.scenario import with_wind
 
 CHECKS = (GROUND_WAY, UNKNOWN_AIRCRAFT)
 
@@ -177,10 +178,9 @@ def test_a_flight_is_that_of_fly_in_the_same_wind(base: CampaignBase, tmp_path: 
     mission, scenario = write_short(tmp_path)
     own = base.scenario.wind
     speed = own.speed + row.draw.values["wind_speed"]
-    opened = open_mission(
-        mission, str(scenario), None, seed=row.draw.seed, change=lambda s: with_wind(s, speed, own.from_course, None)
-    )
-    flown = fly_and_judge(opened.setup, opened.airframe, None)
+    wind = (speed, math.degrees(own.from_course))
+    opened = open_flight(mission, {"scenario": scenario, "seed": row.draw.seed, "wind": wind})
+    flown = fly_and_judge(opened, airframe_of(opened), None)
     assert speed != own.speed
     assert (row.outcome == "flyable") is flown.verdict.flyable
     assert row.duration == float(flown.track.time[-1])

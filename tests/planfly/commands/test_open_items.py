@@ -21,7 +21,7 @@ from flight.mission.items import Mission
 from logs.verdict.judge_geometry import judge_geometry
 from planfly.airframe import load_airframe
 from planfly.cli import main
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from tests.mission_lines import mission, wp
 from world.scenario import from_spec
 

@@ -6,7 +6,8 @@ import pytest
 
 from flight.mission.from_plan import plan_mission
 from planfly.airframe import load_airframe
-from planfly.make_plan import make_plan, make_setup
+from planfly.make_plan import make_plan
+from planfly.open_flight import make_setup
 from planfly.pipeline import fly_and_judge
 from tests.autopilot_plans import TERRAINS, harm_of, plan_scenario
 from tests.autopilots import need_arduplane

@@ -15,7 +15,8 @@ from flight.mission.from_plan import plan_mission
 from flight.mission.items import Command, Mission, MissionItem
 from logs.verdict.judge_geometry import judge_geometry
 from planfly.airframe import Airframe, load_airframe
-from planfly.make_plan import make_plan, make_setup
+from planfly.make_plan import make_plan
+from planfly.open_flight import make_setup
 from planfly.pipeline import fly_and_judge
 from tests.autopilots import need_arduplane
 from tests.ground_missions import draw_field

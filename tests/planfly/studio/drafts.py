@@ -7,9 +7,9 @@ import numpy as np
 
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
 from planfly.airframe import Airframe, load_airframe
-from planfly.make_plan import make_setup
-from planfly.open_mission import OpenedMission
-from planfly.studio.documents import Document, World
+from planfly.flight_options import MissionOptions
+from planfly.open_flight import make_setup
+from planfly.studio.documents import Document
 from planfly.studio.session import Session
 from world.errors import MissionError
 from world.frames import to_geo
@@ -70,8 +70,8 @@ def _item(before: int, command: Command, frame: Frame, params: tuple[float, floa
 def session_of(mission: Mission, name: str = "jacksboro") -> Session:
     """A session of a mission in a scenario's world."""
     scenario, airframe = world_of(name)
-    opened = OpenedMission(make_setup(scenario, airframe, mission, 1), airframe, "drawn")
-    return Session.of(Document("drawn.waypoints", "drawn", opened, "waypoints"), World(scenario=name))
+    setup = make_setup(scenario, airframe, mission, 1)
+    return Session.of(Document("drawn.waypoints", "drawn", setup, "waypoints"), MissionOptions(scenario=name))
 
 
 def drawn_session(seed: int, count: int, name: str = "jacksboro", *, jumps: bool = True) -> Session:

@@ -8,7 +8,8 @@ import pytest
 
 from flight.mission_files.formats import mission_text
 from logs.recording.example_log import write_example_log
-from planfly.studio.documents import DROPPED, World, open_dropped, straight_plan
+from planfly.flight_options import MissionOptions
+from planfly.studio.documents import DROPPED, open_dropped, straight_plan
 from planfly.studio.folder import file_inside, folder_json
 from planner.plan import plan_json
 from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, telemetry
@@ -62,11 +63,11 @@ def test_a_file_of_each_suffix_is_opened(suffix: str, tmp_path: Path) -> None:
     assert f"a{suffix}" in folder_json(tmp_path)["files"]
     if not items:
         with pytest.raises(PlanflyError, match=f"^A{suffix.upper()}: a flight's track without a mission"):
-            open_dropped(f"A{suffix.upper()}", data, World())
+            open_dropped(f"A{suffix.upper()}", data, MissionOptions())
         return
-    world = World(scenario="jacksboro") if write is written_mission else World()
+    world = MissionOptions(scenario="jacksboro") if write is written_mission else MissionOptions()
     document = open_dropped(f"A{suffix.upper()}", data, world)
-    mission = document.opened.setup.mission
+    mission = document.setup.mission
     assert len([item for item in mission.items if item.has_position]) == items
     assert (document.name, document.path) == (f"A{suffix.upper()}", None)
 

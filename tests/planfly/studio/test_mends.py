@@ -15,8 +15,9 @@ import planfly
 from flight.mission.items import Command, Frame, Mission, MissionItem
 from flight.mission_files.formats import mission_text
 from logs.recording.example_log import write_example_log
+from planfly.flight_options import MissionOptions
 from planfly.studio import documents, edits, messages
-from planfly.studio.documents import World, open_document, open_dropped, straight_plan
+from planfly.studio.documents import open_document, open_dropped, straight_plan
 from planfly.studio.jobs import LONG, Jobs
 from planfly.studio.pilot import Answer, Work
 from planfly.studio.server import MAX_UNWELCOMED, NO_TOKEN, TOO_MANY, Page, Server
@@ -102,8 +103,8 @@ def test_a_failed_undo_leaves_what_is_shown() -> None:
 
 
 def planned_session() -> Session:
-    document = open_document("jacksboro", World())
-    return Session.of(document, World())
+    document = open_document("jacksboro", MissionOptions())
+    return Session.of(document, MissionOptions())
 
 
 def test_what_a_plan_of_waypoints_would_drop_is_refused() -> None:
@@ -126,7 +127,7 @@ def test_an_edited_plan_keeps_its_ways_to_the_ground_while_the_legs_next_to_them
     file.write_bytes(default_run()[2]["plan.json"])
     base = read_plan(file)
     assert base.ways is not None
-    session, _ = open_session(str(file), World())
+    session, _ = open_session(str(file), MissionOptions())
     places = edits.places(session.mission)
     first = next(
         n
@@ -142,7 +143,7 @@ def test_an_edited_plan_keeps_its_ways_to_the_ground_while_the_legs_next_to_them
     assert raised[len(raised) // 2] == pytest.approx([0.0, 0.0, -2.0], abs=0.02)
     assert np.abs(np.delete(raised, len(raised) // 2, axis=0)).max() < 0.02
     assert (made.certificate.problems, made.certificate == base.certificate) == ((), False)
-    reopened, _ = open_session(str(again), World())
+    reopened, _ = open_session(str(again), MissionOptions())
     kinds = [item.command for item in reopened.mission.items]
     assert kinds == [item.command for item in session.mission.items]
     assert kinds[-1] == Command.NAV_LAND
@@ -206,10 +207,10 @@ def test_a_certificate_does_not_outlive_settings() -> None:
 
 def test_a_log_that_names_other_files_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     data = write_example_log(tmp_path / "l.mcap").read_bytes()
-    open_dropped("l.mcap", data, World())
+    open_dropped("l.mcap", data, MissionOptions())
     seen: list[bytes] = []
     monkeypatch.setattr(documents, "_refuse_other_files", lambda name, text: seen.append(text))
-    open_dropped("l.waypoints", data, World())
+    open_dropped("l.waypoints", data, MissionOptions())
     monkeypatch.undo()
     scenario = json.loads(seen[0])
     scenario["scenario"].setdefault("flight", {})["params"] = "/etc/passwd"
@@ -221,12 +222,12 @@ def test_only_the_commands_file_is_written_over_and_not_if_it_was_changed(tmp_pa
     file, other = tmp_path / "m.waypoints", tmp_path / "other.waypoints"
     for one, seed in ((file, 8), (other, 9)):
         one.write_text(mission_text(drawn_session(seed, 8).mission, "waypoints"), encoding="utf-8")
-    session, _ = open_session(str(file), World(scenario="jacksboro"))
-    session.open(open_document(str(other), session.world))
+    session, _ = open_session(str(file), MissionOptions(scenario="jacksboro"))
+    session.open(open_document(str(other), session.options))
     assert session.sheet()["over"] == ""
     with pytest.raises(PlanflyError, match="no mission file was named"):
         session.save_over()
-    session.open(open_document(str(file), session.world))
+    session.open(open_document(str(file), session.options))
     for _ in range(2):
         session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
         session.save_over()
@@ -241,17 +242,17 @@ def test_an_opening_is_undone_and_each_document_is_kept_for_itself(tmp_path: Pat
     for one, seed in ((file, 8), (other, 9)):
         one.write_text(mission_text(drawn_session(seed, 8).mission, "waypoints"), encoding="utf-8")
     kept = tmp_path / "kept.json"
-    session, _ = open_session(str(file), World(scenario="jacksboro"), kept)
+    session, _ = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
     mine = session.mission
     session.keep(kept)
     number = session.sheet()["document"]
-    session.open(open_document(str(other), session.world))
+    session.open(open_document(str(other), session.options))
     assert session.sheet()["document"] > number
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=20.0))
     theirs = session.mission
     session.keep(kept)
-    assert open_session(str(file), World(scenario="jacksboro"), kept)[0].mission.items == mine.items
+    assert open_session(str(file), MissionOptions(scenario="jacksboro"), kept)[0].mission.items == mine.items
     session.step("undo")
     assert session.sheet()["undo"] == "open other.waypoints"
     session.step("undo")
@@ -274,7 +275,7 @@ def test_the_zones_of_a_named_fence_stand_in_the_next_world(tmp_path: Path) -> N
     shape = {"type": "Feature", "properties": {"name": "Z"}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
     fence = tmp_path / "z.geojson"
     fence.write_text(json.dumps({"type": "FeatureCollection", "features": [shape]}), encoding="utf-8")
-    world = World(terrain="jacksboro", fence=(str(fence),))
+    world = MissionOptions(terrain="jacksboro", fence=(str(fence),))
     session = Session.of(open_dropped("m.waypoints", mission_text(mission, "waypoints").encode(), world), world)
     assert len(session.desk.scenario.zones) == 1
     k = edits.places(session.mission)[-1]

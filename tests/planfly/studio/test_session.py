@@ -10,8 +10,9 @@ import planfly
 from flight.mission.items import Frame, Mission, MissionItem
 from flight.mission_files.formats import mission_text, parse_mission
 from logs.verdict.verdict import verdict_json
+from planfly.flight_options import MissionOptions
 from planfly.studio import edits, messages
-from planfly.studio.documents import World, open_document, open_dropped, straight_plan
+from planfly.studio.documents import open_document, open_dropped, straight_plan
 from planfly.studio.kept import mission_data, mission_from
 from planfly.studio.session import Session, StaleEdit, open_session
 from tests.planfly.studio.drafts import drawn_session, session_of, world_of
@@ -116,7 +117,7 @@ def test_a_preview_changes_nothing_and_is_what_the_move_comes_to() -> None:
 @pytest.mark.parametrize("name", ["by_hand.waypoints", "mission_planner.waypoints", "qgc_amsl.plan", "mavproxy.txt"])
 def test_an_unmoved_mission_saved_is_the_file(name: str) -> None:
     file = Path(__file__).parents[2] / "flight" / "missions" / name
-    session, _ = open_session(str(file), World(terrain=None))
+    session, _ = open_session(str(file), MissionOptions(terrain=None))
     assert session.save(session.document.kind).data == file.read_bytes()
 
 
@@ -146,11 +147,11 @@ def test_what_a_form_does_not_hold_is_said() -> None:
 def test_only_the_named_file_is_written_over(tmp_path: Path) -> None:
     file = tmp_path / "m.waypoints"
     file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
-    session, _ = open_session(str(file), World(scenario="jacksboro"))
+    session, _ = open_session(str(file), MissionOptions(scenario="jacksboro"))
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
     session.save_over()
     assert parse_mission(file.read_text(encoding="utf-8"), "m").items == session.mission.items
-    session.open(open_dropped("other.waypoints", file.read_bytes(), session.world))
+    session.open(open_dropped("other.waypoints", file.read_bytes(), session.options))
     with pytest.raises(PlanflyError, match="no mission file was named"):
         session.save_over()
 
@@ -170,7 +171,7 @@ def test_only_the_named_file_is_written_over(tmp_path: Path) -> None:
 )
 def test_a_dropped_file_is_refused_in_a_line(name: str, data: bytes, words: str) -> None:
     with pytest.raises(PlanflyError, match=words) as refused:
-        open_dropped(name, data, World())
+        open_dropped(name, data, MissionOptions())
     assert "planfly-studio-" not in str(refused.value)
     assert "\n" not in str(refused.value)
 
@@ -182,25 +183,25 @@ def test_a_dropped_file_is_refused_in_a_line(name: str, data: bytes, words: str)
 def test_what_was_done_is_there_after_the_server_died(tmp_path: Path) -> None:
     file, kept = tmp_path / "m.waypoints", tmp_path / "kept" / "m.json"
     file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
-    session, restored = open_session(str(file), World(scenario="jacksboro"), kept)
+    session, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     assert not restored
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
     session.keep(kept)
-    again, restored = open_session(str(file), World(scenario="jacksboro"), kept)
+    again, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     assert restored
     assert again.mission.items == session.mission.items
     again.step("undo")
     assert again.mission is again.history.first
     file.write_text(mission_text(drawn_session(9, 10).mission, "waypoints"), encoding="utf-8")
-    other, restored = open_session(str(file), World(scenario="jacksboro"), kept)
+    other, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     assert not restored
     kept.write_text("{", encoding="utf-8")
-    assert not open_session(str(file), World(scenario="jacksboro"), kept)[1]
+    assert not open_session(str(file), MissionOptions(scenario="jacksboro"), kept)[1]
     assert not other.is_changed
 
 
 def test_settings_and_a_planned_path_are_there_after_the_server_died(tmp_path: Path) -> None:
-    file, kept, world = tmp_path / "m.waypoints", tmp_path / "m.json", World(scenario="jacksboro-air")
+    file, kept, world = tmp_path / "m.waypoints", tmp_path / "m.json", MissionOptions(scenario="jacksboro-air")
     file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
     session, _ = open_session(str(file), world, kept)
     assert not session.has_news
@@ -283,17 +284,19 @@ def test_a_sphere_is_passed_with_what_navigation_may_be_off_to_spare() -> None:
 
 
 def test_a_scenario_opens_with_its_straight_line() -> None:
-    document = open_document("jacksboro", World())
+    document = open_document("jacksboro", MissionOptions())
     assert document.to_plan
-    session = Session.of(document, World())
+    session = Session.of(document, MissionOptions())
     assert len(edits.places(session.mission)) == 2
     assert session.sheet()["verdict"]["state"] == "fail"
 
 
 def test_a_mission_without_a_scenario_takes_its_world_along() -> None:
     mission = drawn_session(8, 6).mission
-    document = open_dropped("m.waypoints", mission_text(mission, "waypoints").encode(), World(terrain="jacksboro"))
-    session = Session.of(document, World(terrain="jacksboro"))
+    document = open_dropped(
+        "m.waypoints", mission_text(mission, "waypoints").encode(), MissionOptions(terrain="jacksboro")
+    )
+    session = Session.of(document, MissionOptions(terrain="jacksboro"))
     k = edits.places(session.mission)[-1]
     east, north, _ = session.place_of(k)
     world = session.world_rev

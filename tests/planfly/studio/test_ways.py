@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from planfly.flight_options import MissionOptions
 from planfly.studio import messages
-from planfly.studio.documents import World, open_document
+from planfly.studio.documents import open_document
 from planfly.studio.jobs import LONG, Jobs
 from planfly.studio.pilot import Answer, Work
 from planfly.studio.session import Session
@@ -17,7 +18,10 @@ def test_other_ways_are_of_one_search_and_none_is_better_than_another(monkeypatc
     monkeypatch.setattr("planfly.studio.works.SECONDS_FOR_SEVERAL", 600.0)
     asked: list[Work] = []
     monkeypatch.setattr("planfly.studio.jobs.Pilot.ask", lambda self, work: asked.append(work))
-    session, jobs = Session.of(open_document("hard-07", World()), World()), Jobs(lambda name, answer: None)
+    session, jobs = (
+        Session.of(open_document("hard-07", MissionOptions()), MissionOptions()),
+        Jobs(lambda name, answer: None),
+    )
     with pytest.raises(PlanflyError, match="algorithm"):
         jobs.plan(messages.Plan(kind="plan", ways=3, algorithm="umda"), session)
     jobs.plan(messages.Plan(kind="plan", seed=1, ways=3), session)

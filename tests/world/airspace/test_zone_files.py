@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from planfly.open_mission import read_named_fences
+from planfly.named_fences import read_named_fences
 from tests.soak import at_most
 from tests.world.made.made_scenario import SMALL
 from world.airspace import zone_files

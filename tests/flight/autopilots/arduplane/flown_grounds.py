@@ -17,10 +17,10 @@ from aircraft.catalog import find_again
 from flight.mission.ground_ways import Approach
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import SimulatedFlight, simulate
+from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from flight.simulation.track import Track
 from planfly.airframe import load_airframe
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from tests.setups import spec_around
 from world.airfield import LandingStrip, Launch
 from world.frames import to_geo
@@ -75,7 +75,7 @@ def make_ground_setup(scenario: Scenario, mission: Mission, **parameters: float)
 
 def fly(setup: FlightSetup) -> Flown:
     """Fly a setup to its end."""
-    return Flown(setup, simulate(setup, find_again(setup.aircraft, setup.scenario.flight.aircraft)))
+    return Flown(setup, fly_to_end(Flight(setup, find_again(setup.aircraft, setup.scenario.flight.aircraft))))
 
 
 @functools.cache

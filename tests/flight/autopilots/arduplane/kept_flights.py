@@ -14,10 +14,10 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from planfly.airframe import load_airframe
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from world.frames import to_geo
 from world.scenario import Scenario, load_scenario
 from world.wind import Wind
@@ -125,7 +125,7 @@ def return_setup(flight: str, **parameters: float) -> FlightSetup:
 def flown_return(flight: str) -> Flown:
     """A kept flight's return by planfly's law."""
     setup = return_setup(flight)
-    done = simulate(setup, load_airframe(jacksboro()).aircraft)
+    done = fly_to_end(Flight(setup, load_airframe(jacksboro()).aircraft))
     return _measured(setup, flight, done.track, done.ended)
 
 

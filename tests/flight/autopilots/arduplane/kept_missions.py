@@ -15,9 +15,9 @@ from flight.mission.items import Mission
 from flight.mission.itinerary import loiter_of
 from flight.mission_files.formats import parse_mission
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import SimulatedFlight, simulate
+from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from planfly.airframe import load_airframe
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from world.frames import GeoOrigin, to_map
 from world.scenario import from_spec
 
@@ -142,7 +142,7 @@ def setup_by_law(mission: Mission, flight: str = "") -> FlightSetup:
 def simulated(flight: str) -> SimulatedFlight:
     """The same mission by planfly's law, as it was recorded."""
     setup = kept_setup(flight)
-    return simulate(setup, load_airframe(setup.scenario).aircraft)
+    return fly_to_end(Flight(setup, load_airframe(setup.scenario).aircraft))
 
 
 def by_law(flight: str) -> Flown:

@@ -28,9 +28,9 @@ from flight.guidance.gains import GAINS
 from flight.guidance.inner_loops import GUIDANCE_MEMORY, steer_elevator
 from flight.guidance.navigation_error import MOTION
 from flight.mission_files.formats import parse_mission
-from flight.simulation.simulate import Flight, simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from planfly.airframe import load_airframe
-from planfly.make_plan import make_setup as setup_of
+from planfly.open_flight import make_setup as setup_of
 from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, record, state, waypoints
 from tests.setups import MakeSetup
 from tests.soak import SOAK
@@ -357,7 +357,7 @@ def test_it_holds_an_equivalent_airspeed(
     make_setup: MakeSetup, aerosonde: Aircraft, usual: ArduPilotParameters
 ) -> None:
     setup = make_setup([[0, 0, 2000.0], [0, 3000, 2000.0]], speeds=24.0)
-    track = simulate(replace(setup, autopilot=ArduPlane(usual)), aerosonde).track
+    track = fly_to_end(Flight(replace(setup, autopilot=ArduPlane(usual)), aerosonde)).track
     late = track.airspeed[track.time > 40.0]
     # Standard density at 2,000 m: 1.0066.
     assert float(late.mean()) == pytest.approx(24.0 * math.sqrt(1.2250 / 1.0066), rel=0.005)
@@ -369,7 +369,7 @@ def test_it_flies_no_faster_than_airspeed_max(
 ) -> None:
     setup = make_setup([[0, 0, 0.0], [0, 1500, 0.0]], speeds=25.0, terrain={"kind": "flat", "amsl_m": -500.0})
     slow = usual.changed(AIRSPEED_MAX=22.0)
-    track = simulate(replace(setup, autopilot=ArduPlane(slow)), aerosonde).track
+    track = fly_to_end(Flight(replace(setup, autopilot=ArduPlane(slow)), aerosonde)).track
     assert float(track.speed_command[-1]) == pytest.approx(22.0, rel=1e-3)
 
 
@@ -379,7 +379,9 @@ def test_a_climbing_leg_is_flown_a_time_constant_low(
     # 120 m in 3 km: 1 m/s of climb.
     setup = make_setup([[0, 0, 500.0], [0, 3000, 620.0]])
     for time in (1.0, 3.0):
-        track = simulate(replace(setup, autopilot=ArduPlane(usual.changed(TECS_HDEM_TCONST=time))), aerosonde).track
+        track = fly_to_end(
+            Flight(replace(setup, autopilot=ArduPlane(usual.changed(TECS_HDEM_TCONST=time))), aerosonde)
+        ).track
         late = (track.time > 50.0) & (track.time < 100.0)
         climb = float(track.velocity[late, 2].mean())
         assert float(track.height_error[late].mean()) == pytest.approx(-time * climb, abs=0.15)
@@ -409,7 +411,9 @@ def test_bank_follows_its_demand_late(make_setup: MakeSetup, aerosonde: Aircraft
 def test_bank_keeps_roll_limit_deg(make_setup: MakeSetup, aerosonde: Aircraft, usual: ArduPilotParameters) -> None:
     setup = make_setup([[0, 0, 500.0], [0, 1000, 500.0], [1000, 1000, 500.0]])
     for limit in (20.0, 35.0):
-        track = simulate(replace(setup, autopilot=ArduPlane(usual.changed(ROLL_LIMIT_DEG=limit))), aerosonde).track
+        track = fly_to_end(
+            Flight(replace(setup, autopilot=ArduPlane(usual.changed(ROLL_LIMIT_DEG=limit))), aerosonde)
+        ).track
         assert math.degrees(float(np.abs(track.attitude[:, 0]).max())) == pytest.approx(limit, abs=0.5)
 
 
@@ -417,7 +421,9 @@ def test_a_wider_radius_turns_earlier(make_setup: MakeSetup, aerosonde: Aircraft
     setup = make_setup([[0, 0, 500.0], [0, 1000, 500.0], [1000, 1000, 500.0]])
     past = []
     for radius in (20.0, 60.0, 90.0):
-        track = simulate(replace(setup, autopilot=ArduPlane(usual.changed(WP_RADIUS=radius))), aerosonde).track
+        track = fly_to_end(
+            Flight(replace(setup, autopilot=ArduPlane(usual.changed(WP_RADIUS=radius))), aerosonde)
+        ).track
         past.append(float(track.position[:, 1].max()) - 1000.0)
     # Each metre of radius is a metre less overshot.
     assert past[0] - past[1] == pytest.approx(40.0, abs=6.0)
@@ -431,7 +437,7 @@ def test_the_same_setup_gives_the_same_flight(
         make_setup([[0, 0, 500.0], [0, 800, 520.0], [800, 1000, 500.0]], wind=(6.0, 200.0), turbulence="moderate"),
         autopilot=ArduPlane(usual), nav="gnss",
     )  # fmt: skip
-    first, second = (simulate(setup, aerosonde) for _ in range(2))
+    first, second = (fly_to_end(Flight(setup, aerosonde)) for _ in range(2))
     assert first.ended == "completed"
     assert np.array_equal(first.track.position, second.track.position)
 
@@ -441,7 +447,7 @@ def test_it_flies_as_arduplane_flew(kept: dict[str, Any]) -> None:
     scenario = from_spec(kept["scenario"], "kept")
     airframe = load_airframe(scenario)
     setup = setup_of(scenario, airframe, parse_mission(kept["mission"], "kept.waypoints"), kept["seed"])
-    law = simulate(setup, airframe.aircraft)
+    law = fly_to_end(Flight(setup, airframe.aircraft))
     ours, real = flown_figures(setup, law.track, law.ended), kept["real"]
     assert ours.ended == real["ended"] == "completed"
     assert ours.clearance == pytest.approx(real["clearance"], abs=3.0)

@@ -8,10 +8,10 @@ import pytest
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from planfly.airframe import load_airframe
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from tests.flight.autopilots.arduplane.kept_missions import (
     CIRCLES,
     CORNERS,
@@ -130,7 +130,7 @@ def test_without_end_the_items_radius_is_flown_and_for_a_time_never(command: int
     airframe = replace(load_airframe(setup.scenario), autopilot=law)
     setup = replace(make_setup(setup.scenario, airframe, read, 1), nav="perfect")
     assert setup.route.arcs.max() == pytest.approx(radius, abs=0.5)
-    done = simulate(setup, airframe.aircraft)
+    done = fly_to_end(Flight(setup, airframe.aircraft))
     assert done.ended == "completed"
     track = Flown(done.track.time[::20], done.track.position[::20], np.zeros((0, 2)))
     assert track.radius(np.array([0.0, 1500.0])) == pytest.approx(radius, rel=0.02)
@@ -152,7 +152,7 @@ def test_loiters_that_a_jump_leads_back_to_are_flown_each_time(
     law = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))).with_parameters(WP_LOITER_RAD=250.0)
     airframe = replace(load_airframe(setup.scenario), autopilot=law)
     setup = replace(make_setup(setup.scenario, airframe, setup.mission, 1), nav="perfect")
-    done = simulate(setup, airframe.aircraft)
+    done = fly_to_end(Flight(setup, airframe.aircraft))
     assert done.ended == "completed"
     east, north = done.track.position[:, 0], done.track.position[:, 1]
     near = np.hypot(east, north) < 400.0
@@ -197,6 +197,6 @@ def test_a_last_loiter_whose_height_was_given_up_has_not_been_flown(climb: float
     law = made.with_parameters(TECS_CLMB_MAX=climb, ROLL_LIMIT_DEG=55.0)
     airframe = replace(load_airframe(setup.scenario), autopilot=law)
     setup = replace(make_setup(setup.scenario, airframe, setup.mission, 1), nav="perfect")
-    done = simulate(setup, airframe.aircraft)
+    done = fly_to_end(Flight(setup, airframe.aircraft))
     assert done.ended.startswith(ended)
     assert (abs(done.track.position[-1, 2] - 700.0) < 10.0) == (ended == "completed")

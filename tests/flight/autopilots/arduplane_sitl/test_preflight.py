@@ -46,7 +46,7 @@ def setup_of(*items: MissionItem, home: Home | None = HOME) -> FlightSetup:
     mission = Mission(home, items)
     limits = make_limits(SCENARIO, ENVELOPE, 25.0, 0.5)
     route = make_route(mission, SCENARIO.origin, SCENARIO.terrain, 25.0, False, limits)
-    return FlightSetup(SCENARIO, mission, "", route, limits, "aerosonde", 100.0, 1)
+    return FlightSetup(SCENARIO, mission, route, limits, "aerosonde", 100.0, 1)
 
 
 def flown(setup: FlightSetup) -> list[tuple[int, int, int, int]]:

@@ -10,7 +10,7 @@ from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.mission.route import make_route
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import SimulatedFlight, simulate
+from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from flight.simulation.track import Track
 from logs.verdict.judge_flight import judge_flight
 from tests.mission_lines import ORIGIN, setup_of, wp
@@ -23,7 +23,7 @@ def flown(aerosonde: Aircraft, *lines: str, **values: float) -> tuple[FlightSetu
     made = setup_of(*lines)
     route = make_route(made.mission, ORIGIN, made.scenario.terrain, 25.0, False, made.limits, law.route_rules)
     setup = replace(made, route=route, autopilot=law)
-    return setup, simulate(setup, aerosonde)
+    return setup, fly_to_end(Flight(setup, aerosonde))
 
 
 def until(track: Track, east: float, north: float) -> slice:
@@ -35,7 +35,7 @@ def test_the_circle_at_the_gate_has_the_radius_of_loiters(make_setup: MakeSetup,
     # 250 m down in 1 km takes 125 s at 2 m/s, of which 85 s are circled.
     setup = make_setup([[0, 0, 650.0], [0, 1000, 400.0], [0, 3000, 400.0]])
     law = Px4(Px4Parameters.load(aerosonde).changed(NAV_LOITER_RAD=150.0))
-    track = simulate(replace(setup, autopilot=law), aerosonde).track
+    track = fly_to_end(Flight(replace(setup, autopilot=law), aerosonde)).track
     circles = (track.time > 65.0) & (track.position[:, 2] > 415.0)
     assert np.ptp(track.time[circles]) > 50.0
     away = np.hypot(track.position[circles, 0], track.position[circles, 1] - 1000.0)
@@ -50,7 +50,7 @@ def test_a_circle_begun_before_the_last_waypoint_does_not_end_the_flight(
     # second later it is within 10 m, and flies on.
     setup = make_setup([[0, 0, 500.0], [0, 1500, 673.0]])
     law = Px4(Px4Parameters.load(aerosonde))
-    result = simulate(replace(setup, autopilot=law), aerosonde)
+    result = fly_to_end(Flight(replace(setup, autopilot=law), aerosonde))
     track = result.track
     assert result.ended == "completed"
     low = 673.0 - track.position[:, 2]
@@ -122,7 +122,7 @@ def test_after_the_last_waypoint_it_goes_once_around(aerosonde: Aircraft, versio
     law = Px4(Px4Parameters.load(aerosonde, None, version))
     made = setup_of(wp(0, -1500, 300), wp(0, 0, 300))
     setup = replace(made, autopilot=law)
-    result = simulate(setup, aerosonde)
+    result = fly_to_end(Flight(setup, aerosonde))
     assert result.ended == "completed"
     east, north, up = result.track.position.T
     # It is reached where any other waypoint is: 2.24 s before it up to 1.16, NAV_ACC_RAD (10 m) before it from 1.17 on.
@@ -148,7 +148,7 @@ def test_what_stands_beside_the_last_waypoint_is_met_in_its_circle(aerosonde: Ai
     for count, flies in ((2, False), (3, True)):
         made = setup_of(*way[:count], threats=[missile])
         setup = replace(made, scenario=replace(made.scenario, external=False), autopilot=law)
-        result = simulate(setup, aerosonde)
+        result = fly_to_end(Flight(setup, aerosonde))
         assert result.ended == "completed"
         assert judge_flight(setup, result.track, result.ended).flyable is flies
 
@@ -160,7 +160,7 @@ def test_a_speed_after_a_gate_counts_from_where_it_is_crossed(aerosonde: Aircraf
     law = Px4(Px4Parameters.load(aerosonde, None, "1.17"))
     made = setup_of(wp(0, 0, 300), gate, slow, wp(0, 1800, 300))
     route = make_route(made.mission, ORIGIN, made.scenario.terrain, 25.0, False, made.limits, law.route_rules)
-    result = simulate(replace(made, route=route, autopilot=law), aerosonde)
+    result = fly_to_end(Flight(replace(made, route=route, autopilot=law), aerosonde))
     assert result.ended == "completed"
     track = result.track
     slowed = int(np.argmax(np.diff(track.speed_command) < -1.0))

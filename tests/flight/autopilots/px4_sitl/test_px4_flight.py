@@ -65,7 +65,7 @@ def make_setup(way: Floats = SHORT, **keywords: object) -> FlightSetup:
 def fly(setup: FlightSetup, program: Path, log: Path | None = None) -> tuple[SimulatedFlight, FlightSetup]:
     with Px4Flight(setup, AEROSONDE, Px4Sitl(Px4Parameters.load(AEROSONDE), binary=program)) as flight:
         flight.prepare()
-        flown = fly_to_end(flight, None, None)
+        flown = fly_to_end(flight)
         if log is not None:
             assert flight.keep_log(log)
         lock = Path(f"/tmp/px4_lock-{flight._lockstep._port.port}")

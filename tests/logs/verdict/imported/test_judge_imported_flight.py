@@ -13,10 +13,10 @@ from logs.importers.raw_log import LogSeries, ModeChange, RawLog, example_raw_lo
 from logs.verdict.imported.judge_imported_flight import damage_text, heights_text, rows_text
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import verdict_json
-from planfly.imported_flights import ImportOptions
+from planfly.flight_options import LogOptions
 from tests.logs.importers.judged_flights import judged, outcome, reasons
 
-AEROSONDE = ImportOptions(aircraft="aerosonde")
+AEROSONDE = LogOptions(aircraft="aerosonde")
 
 
 def without(*names: str) -> RawLog:

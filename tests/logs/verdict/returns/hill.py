@@ -15,7 +15,7 @@ from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import judge_returns, return_world
 from logs.verdict.returns.return_starts import planned_starts
 from planfly.airframe import load_airframe
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from world.scenario import load_scenario
 
 SCENARIO = """

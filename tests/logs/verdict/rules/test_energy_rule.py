@@ -12,11 +12,11 @@ from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import straight
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.measures.energy import air_angle, predicted_energy
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT
-from logs.verdict.rules.energy_rule import air_angle, predicted_energy
 from tests.logs.verdict.judging import failing, judge, of
 from tests.synthetic import bank_radius, fly_path, make_scenario, make_setup
 from world.scenario import Scenario
@@ -44,7 +44,7 @@ def test_the_parabola_through_three_trims_is_the_trims_between_them(airspeed: fl
 def test_prediction_and_flight_agree() -> None:
     setup = real_setup()
     predicted, peak = predicted_energy(route_requirements(setup))
-    flown = simulate(setup, AEROSONDE)
+    flown = fly_to_end(Flight(setup, AEROSONDE))
     item = of(judge_flight(setup, flown.track, flown.ended), "energy")
     assert item.planned == pytest.approx(predicted, abs=1e-5)
     assert item.flown is not None
@@ -137,7 +137,7 @@ def test_an_aircraft_that_burns_fuel_has_no_current() -> None:
     envelope = replace(load_envelope(AEROSONDE), volts=0.0)
     for verdict in (
         judge_geometry(real_setup(table=envelope)),
-        judge_flight(real_setup(table=envelope), simulate(real_setup(), AEROSONDE).track, "completed"),
+        judge_flight(real_setup(table=envelope), fly_to_end(Flight(real_setup(), AEROSONDE)).track, "completed"),
     ):
         reason = of(verdict, "energy").reason
         assert "of fuel heat used" in reason

@@ -14,11 +14,11 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission_files.formats import parse_mission
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.verdict import Verdict
 from planfly.airframe import bank_limit, load_airframe
-from planfly.make_plan import make_setup
+from planfly.open_flight import make_setup
 from tests.logs.verdict.judging import of
 from tests.mission_lines import ORIGIN, wp
 from tests.soak import some
@@ -58,7 +58,7 @@ def loiter(item: str, parameters: dict[str, float], **tables: Any) -> FlightSetu
 @functools.cache
 def flown(item: str, **parameters: float) -> Verdict:
     setup = loiter(item, parameters)
-    done = simulate(setup, load_airframe(setup.scenario).aircraft)
+    done = fly_to_end(Flight(setup, load_airframe(setup.scenario).aircraft))
     return judge_flight(setup, done.track, done.ended)
 
 
@@ -158,7 +158,7 @@ def test_a_stated_circle_needs_the_autopilots_own_bank() -> None:
 def judged_with(setup: FlightSetup, item: str, **parameters: float) -> Verdict:
     """A flight by the law with these parameters, judged as one of another setup."""
     own = loiter(item, parameters)
-    done = simulate(own, load_airframe(own.scenario).aircraft)
+    done = fly_to_end(Flight(own, load_airframe(own.scenario).aircraft))
     return judge_flight(setup, done.track, done.ended)
 
 

@@ -13,7 +13,7 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission.route import make_route
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import make_finding
@@ -44,7 +44,7 @@ def by_arduplane(setup: FlightSetup, **parameters: float) -> FlightSetup:
 
 
 def flown(setup: FlightSetup) -> tuple[Verdict, str]:
-    done = simulate(setup, load_aircraft("aerosonde"))
+    done = fly_to_end(Flight(setup, load_aircraft("aerosonde")))
     return judge_flight(setup, done.track, done.ended), done.ended
 
 
@@ -107,7 +107,7 @@ def test_the_waypoint_before_a_return_is_reached_as_at_a_missions_end() -> None:
 
 def test_a_replay_tells_the_way_back_as_a_return(tmp_path: Path) -> None:
     setup = by_arduplane(setup_of(*WAY, home=HOME))
-    done = simulate(setup, load_aircraft("aerosonde"))
+    done = fly_to_end(Flight(setup, load_aircraft("aerosonde")))
     with Recorder(tmp_path / "a.mcap", setup) as recorder:
         recorder.write(done.track)
         recorder.finish(done.ended, judge_flight(setup, done.track, done.ended))
@@ -200,7 +200,7 @@ def test_a_return_to_a_wide_circle_comes_to_its_end() -> None:
 def test_an_imported_return_has_circled_at_its_height(seconds: float, radius: float, arrived: bool) -> None:
     # Of an imported flight nobody knows how it ended but by its rows.  Around 500 m it flies for two minutes and more.
     setup = by_arduplane(setup_of(*WAY, home=HOME), RTL_RADIUS=radius)
-    done = simulate(setup, load_aircraft("aerosonde"))
+    done = fly_to_end(Flight(setup, load_aircraft("aerosonde")))
     rows = done.track.rows(0, len(done.track) + round(seconds / float(done.track.time[1] - done.track.time[0])))
     requirements = route_requirements(setup)
     aligned = align_track(requirements, rows)

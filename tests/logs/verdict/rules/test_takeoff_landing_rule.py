@@ -7,7 +7,7 @@ import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.simulation.simulate import simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
@@ -81,7 +81,7 @@ def test_a_landing_of_45_degrees_fails_in_flight_too() -> None:
     from aircraft.catalog import load_aircraft
 
     setup = setup_of(*landing(45.0), home=HOME)
-    flown = simulate(setup, load_aircraft("aerosonde"))
+    flown = fly_to_end(Flight(setup, load_aircraft("aerosonde")))
     verdict = judge_flight(setup, flown.track, flown.ended)
     assert flown.ended == "completed"
     assert not verdict.flyable

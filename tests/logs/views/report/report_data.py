@@ -55,7 +55,6 @@ def make_setup(**changes: Any) -> FlightSetup:
     return FlightSetup(
         scenario=scenario,
         mission=Mission(None, items, warnings=("line 7: CRLF",), source="his.waypoints"),
-        mission_text="QGC WPL 110\n",
         route=Route(
             ROUTE,
             np.full(3, 25.0),

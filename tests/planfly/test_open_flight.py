@@ -1,6 +1,5 @@
 """``--fence``: fences named beside a mission, a plan or a log, by every command that takes them."""
 
-import dataclasses
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -14,10 +13,14 @@ from flight.mission_files.formats import read_fence, read_mission
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import read_log
 from logs.verdict.judge_flight import judge_geometry
-from planfly.airframe import load_airframe
+from planfly.airframe import airframe_of, load_airframe
 from planfly.cli import main
+from planfly.flight_logs import is_log
+from planfly.flight_options import MissionOptions
 from planfly.make_plan import make_plan
-from planfly.open_mission import fence_of_plan, is_log, open_mission, open_plan, read_named_fences
+from planfly.named_fences import read_named_fences
+from planfly.open_flight import mission_of_plan, open_flight
+from planfly.plan_fence import fence_of_plan
 from planfly.served_flights import ServeOptions, open_served
 from planner.plan import plan_json
 from tests.mission_lines import a_plan, setup_of, wp
@@ -25,7 +28,6 @@ from tests.planfly.conftest import FIELD
 from tests.setups import small_scenario
 from world.errors import MissionError, PlanflyError
 from world.frames import GeoOrigin, to_geo
-from world.scenario import with_flight
 
 ORIGIN = GeoOrigin(36.5, -84.2)
 HEAD = "QGC WPL 110\n"
@@ -140,8 +142,8 @@ def test_export_of_a_plan_adds_the_fence_to_area_and_threats(mission: Path) -> N
 def test_serve_begins_with_the_fence_that_is_named(mission: Path) -> None:
     Path("a.fence").write_text(circle(0.0), encoding="ascii")
     Path("mill.geojson").write_text(feature(650.0), encoding="ascii")
-    fences = read_named_fences(["a.fence", "mill.geojson"])
-    served = open_served(ServeOptions(str(mission), None, None, 1.0, Path("logs"), {}, fences))
+    options: MissionOptions = {"fence": ["a.fence", "mill.geojson"]}
+    served = open_served(ServeOptions(str(mission), 1.0, Path("logs"), options))
     assert served.mission is not None
     assert len(served.mission.fences) == 1
     assert [zone.name for zone in served.scenario.zones] == ["mill"]
@@ -166,8 +168,7 @@ def test_export_and_serve_leave_out_what_is_not_active_then(at: str | None, coun
     assert main(["export", str(mission), "map.kml", "out.plan", *fenced]) == 0
     assert Path("map.kml").read_text(encoding="utf-8").count("<name>mill (R) (keep out)") == count
     assert bool(read_mission(Path("out.plan")).fences) == bool(count)
-    fences = read_named_fences(["mill.openair"])
-    served = open_served(ServeOptions(str(mission), None, None, 1.0, Path("logs"), {}, fences, at))
+    served = open_served(ServeOptions(str(mission), 1.0, Path("logs"), {"fence": "mill.openair", "at": at}))
     assert len(served.scenario.zones) == count
 
 
@@ -266,26 +267,20 @@ def test_a_log_is_known_by_its_first_bytes_or_its_name(tmp_path: Path) -> None:
 
 
 def test_a_mission_without_a_scenario_gets_one_made_around_it(short_mission: Path) -> None:
-    opened = open_mission(short_mission, None, None)
-    assert (opened.name, opened.setup.seed) == ("m", 1)
-    assert opened.setup.scenario.external
-    assert opened.setup.scenario.terrain is None
+    setup = open_flight(short_mission, {})
+    assert (setup.name, setup.seed) == ("m", 1)
+    assert setup.scenario.external
+    assert setup.scenario.terrain is None
     # 0.01 degrees of a meridian near 46 degrees north are 1111.5 m.
-    assert np.linalg.norm(np.diff(opened.setup.route.waypoints[:, :2], axis=0)) == pytest.approx(1111.5, abs=0.5)
+    assert np.linalg.norm(np.diff(setup.route.waypoints[:, :2], axis=0)) == pytest.approx(1111.5, abs=0.5)
 
 
 def test_a_mission_is_judged_in_the_scenario_that_is_named(short_mission: Path) -> None:
-    slower = open_mission(
-        short_mission,
-        str(short_mission.parent / "field.toml"),
-        None,
-        seed=9,
-        change=lambda s: with_flight(s, airspeed_mps=21.0),
-    )
-    assert (slower.setup.scenario.name, slower.setup.seed) == ("field", 9)
-    assert slower.setup.scenario.wind.speed == 3.0
-    assert slower.airframe.airspeed == 21.0
-    assert (slower.setup.route.airspeed == 21.0).all()
+    slower = open_flight(short_mission, {"scenario": short_mission.parent / "field.toml", "seed": 9, "airspeed": 21.0})
+    assert (slower.scenario.name, slower.seed) == ("field", 9)
+    assert slower.scenario.wind.speed == 3.0
+    assert slower.airspeed == airframe_of(slower).airspeed == 21.0
+    assert (slower.route.airspeed == 21.0).all()
 
 
 def test_a_plan_is_opened_in_its_own_scenario_unless_another_is_named(short_mission: Path, tmp_path: Path) -> None:
@@ -293,26 +288,25 @@ def test_a_plan_is_opened_in_its_own_scenario_unless_another_is_named(short_miss
     plan = make_plan(scenario, load_airframe(scenario), 3)
     file = tmp_path / "plan.json"
     file.write_text(plan_json(plan), encoding="utf-8")
-    opened = open_plan(file)
-    np.testing.assert_array_equal(opened.plan.waypoints, plan.waypoints)
-    own = open_mission(file, None, None)
-    assert (own.setup.scenario.name, own.setup.seed, own.name) == ("small", 3, "small")
-    assert own.setup.plan is not None
-    np.testing.assert_allclose(own.setup.route.waypoints, plan.waypoints, atol=0.02)
-    other = open_mission(file, str(short_mission.parent / "field.toml"), None, seed=4)
-    assert (other.setup.scenario.name, other.setup.seed, other.name) == ("field", 4, "plan")
-    assert other.setup.plan is None
-    assert dataclasses.replace(other.setup.mission, source="") == dataclasses.replace(opened.mission, source="")
+    own = open_flight(file, {})
+    assert (own.scenario.name, own.seed, own.name) == ("small", 3, "small")
+    assert own.plan is not None
+    np.testing.assert_array_equal(own.plan.waypoints, plan.waypoints)
+    np.testing.assert_allclose(own.route.waypoints, plan.waypoints, atol=0.02)
+    other = open_flight(file, {"scenario": short_mission.parent / "field.toml", "seed": 4})
+    assert (other.scenario.name, other.seed, other.name) == ("field", 4, "plan")
+    assert other.plan is None
+    assert other.mission == own.mission == mission_of_plan(plan, airframe_of(own))
 
 
 def test_what_is_not_there_names_what_is_expected(tmp_path: Path) -> None:
     with pytest.raises(MissionError, match=r"no such file; a plan\.json, \.waypoints or \.plan file is expected"):
-        open_mission(tmp_path / "none.plan", None, None)
+        open_flight(tmp_path / "none.plan", {})
 
 
 def test_a_mission_that_lies_beside_the_name_is_named(short_mission: Path) -> None:
     (short_mission.parent / "m.waypoints.bak").write_text("", encoding="ascii")
     with pytest.raises(MissionError, match=r"file is expected: did you mean 'm\.waypoints'\?$"):
-        open_mission(short_mission.with_name("n.waypoints"), None, None)
+        open_flight(short_mission.with_name("n.waypoints"), {})
     with pytest.raises(MissionError, match=r"file is expected$"):
-        open_mission(short_mission.parent / "nowhere" / "m.waypoints", None, None)
+        open_flight(short_mission.parent / "nowhere" / "m.waypoints", {})

@@ -1,0 +1,297 @@
+"""The options of a flight: what keywords, the command line and a scenario state in the same words, as one object."""
+
+import functools
+import inspect
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Literal, ParamSpec, TypedDict, TypeVar, cast, get_args, get_type_hints
+
+from flight.autopilots.catalog import program_autopilot
+from flight.simulation.setup import VerticalDatum
+from planfly.arguments import check_arguments, is_wind
+from planfly.file_autopilots import with_file_autopilot
+from world.errors import ArgumentError
+from world.files import did_you_mean, whole_path
+from world.scenario import Scenario, at_time, load_scenario, over_terrain, with_flight, with_wind
+from world.scenario_tables import Guidance, Navigation
+
+# Speed, m/s, and the direction it comes from, degrees.
+Wind = tuple[float, float]
+FencePaths = str | Path | Sequence[str | Path]
+
+# Limits of a simulated flight: longer than planfly's aircraft can stay up; a log of 60 rows a second grows by some
+# 20 MB an hour.
+MAX_HOURS = 6.0
+MAX_MEGABYTES = 256.0
+
+# ----------------------------------------------------------------------
+# The options by group.  `Annotated` states the default of an option; without it the default is None.
+
+
+class FlightOptions(TypedDict, total=False):
+    """How a mission is flown.  An option that is missing or None keeps what the scenario states.
+
+    terrain: an elevation file in place of the scenario's.
+    wind: speed, m/s, and where it comes from, degrees.  turbulence: "none", "light" or "moderate".
+    at: when it is flown, "START" or "START/END" by ISO 8601 with offsets from UTC: zones that are inactive then are
+    left out; None leaves none out.
+    aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
+    guidance: planfly's own law ("path", "l1", "vector-field") in place of ArduPlane's.
+    autopilot_law: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16", "px4-1.17" or "ideal".
+    nav: "perfect", "rtk" or "gnss".
+    """
+
+    terrain: str | Path | None
+    wind: Wind | None
+    turbulence: str | None
+    at: str | None
+    aircraft: str | Path | None
+    airspeed: float | None
+    params: str | Path | None
+    guidance: Guidance | None
+    autopilot_law: str | None
+    nav: Navigation | None
+
+
+class MissionOptions(FlightOptions, total=False):
+    """How a mission file or a plan is flown, and in which world.
+
+    scenario: a name or a TOML file; None for the plan's own scenario, or for one made around the mission.
+    fence: files of fences and zones in addition to the mission's own.
+    seed: of the turbulence; None takes the plan's, the scenario's, or 1.
+    """
+
+    scenario: str | Path | None
+    fence: Annotated[FencePaths, ()]
+    seed: int | None
+
+
+class PlanOptions(FlightOptions, total=False):
+    """How a path is searched for, and for which flight.
+
+    seed: of the search; None takes the scenario's, or 1.
+    algorithm: a name of ``planfly plan --help``; None for the default.
+    budget: evaluations at most.  seconds: time at most; the best path so far is given then.
+    stop: called between generations; once it returns True, the best path so far is given.
+    """
+
+    seed: int | None
+    algorithm: str | None
+    budget: int | None
+    seconds: float | None
+    stop: Callable[[], bool] | None
+
+
+class LogOptions(MissionOptions, total=False):
+    """What another program's log does not say.
+
+    plan: the mission that was to be flown, in place of the log's own.  flight: which of the log's flights, from 1.
+    datum: what the log's heights are above.
+    """
+
+    plan: str | Path | None
+    flight: int | None
+    datum: VerticalDatum | None
+
+
+LOG_OPTIONS = ("plan", "flight", "datum")
+
+
+class SimulationOptions(TypedDict, total=False):
+    """Who flies a simulated flight, what is recorded of it, and when it is stopped.
+
+    autopilot: the program of ArduPlane or PX4, which then flies.
+    log_hz: rows a second in the log.
+    max_hours: simulated hours after which the flight is stopped.  max_log: size of the log at which it is stopped, MB.
+    levels: True flies a mission that passes by planfly's guidance, too, as one that fails: both flights are compared.
+    """
+
+    autopilot: str | Path | None
+    log_hz: Annotated[Literal[10, 20, 30, 60], 60]
+    max_hours: Annotated[float, MAX_HOURS]
+    max_log: Annotated[float, MAX_MEGABYTES]
+    levels: Annotated[bool, False]
+
+
+class CampaignOptions(MissionOptions, total=False):
+    """What a campaign flies, and until when.
+
+    spread: a TOML file of what varies; None takes planfly's default.
+    flights: how many.  prove: a probability to reach or miss.  at_least: one to answer after all flights.
+    confidence: of each bound.
+    """
+
+    spread: str | Path | None
+    flights: int | None
+    prove: float | None
+    at_least: float | None
+    confidence: float | None
+
+
+class WindsOptions(MissionOptions, total=False):
+    """What a search for the largest winds flies, and until when.
+
+    spread: a TOML file of what varies.  flights: at most, of all directions.  confidence: of each interval.
+    workers: processes on this machine; None for one a core.  scheduler: the address of a running dask scheduler.
+    """
+
+    spread: str | Path | None
+    flights: int | None
+    confidence: Annotated[float, 0.95]
+    workers: int | None
+    scheduler: str | None
+
+
+class FlyOptions(MissionOptions, SimulationOptions, total=False):
+    """The options of `planfly.fly`."""
+
+
+class RunOptions(FlightOptions, SimulationOptions, total=False):
+    """The options of `planfly.run`."""
+
+
+# ----------------------------------------------------------------------
+# Functions that take options as keywords.
+
+_Taken = ParamSpec("_Taken")
+_Given = TypeVar("_Given")
+
+
+def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
+    """Show the options of ``**options: Unpack[...]`` in a function's signature, fill in defaults, refuse other names.
+
+    >>> @takes_options
+    ... def fly(mission: str, **options: Unpack[MissionOptions]) -> object:
+    ...     return options["fence"], options["wind"]
+    >>> fly("a.waypoints", wind=(8, 270))
+    ((), (8, 270))
+    >>> fly("a.waypoints", winds=(8, 270))
+    Traceback (most recent call last):
+    TypeError: fly() got an unexpected keyword argument 'winds': did you mean 'wind'?
+    """
+    *named, rest = inspect.signature(function).parameters.values()
+    (options,) = get_args(rest.annotation)
+    defaults, kinds = option_defaults(options), get_type_hints(options)
+    shown = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kinds[name])
+        for name, default in defaults.items()
+    ]
+    signature = inspect.signature(function).replace(parameters=[*named, *shown])
+
+    @functools.wraps(function)
+    def with_defaults(*args: _Taken.args, **given: _Taken.kwargs) -> _Given:
+        for name in given:
+            if name not in signature.parameters:
+                near = did_you_mean(name, signature.parameters)
+                raise TypeError(f"{function.__name__}() got an unexpected keyword argument {name!r}{near}")
+        return function(*args, **{**defaults, **given})  # type: ignore[arg-type]
+
+    with_defaults.__signature__ = signature  # type: ignore[attr-defined]
+    return with_defaults
+
+
+def option_defaults(options: type) -> dict[str, object]:
+    """Return the default of each option of a group.
+
+    >>> option_defaults(SimulationOptions)["log_hz"]
+    60
+    """
+    hints = get_type_hints(options, include_extras=True)
+    return {name: getattr(hint, "__metadata__", (None,))[0] for name, hint in hints.items()}
+
+
+def options_of_log(options: LogOptions) -> dict[str, object]:
+    """Return those of the options that belong to another program's log."""
+    return {name: value for name, value in options.items() if name in LOG_OPTIONS}
+
+
+def mission_options(options: MissionOptions) -> MissionOptions:
+    """Return the options that belong to the mission, without those of a log or a campaign."""
+    return cast(
+        MissionOptions, {name: value for name, value in options.items() if name in MissionOptions.__annotations__}
+    )
+
+
+def named_fences(options: MissionOptions) -> list[str]:
+    """Return the names of the files of fences."""
+    fence = options.get("fence") or ()
+    return [str(one) for one in ([fence] if isinstance(fence, str | Path) else fence)]
+
+
+# ----------------------------------------------------------------------
+# The scenario that options make of another.
+
+
+def named_scenario(scenario: Scenario | str | Path, options: FlightOptions, program: Path | None = None) -> Scenario:
+    """Load an embedded name or a TOML file, or take a scenario as it is, and apply options to it.
+
+    program: the autopilot's program that flies.  Raises ScenarioError, TerrainError or ParameterError.
+    """
+    terrain = options.get("terrain")
+    ground = None if terrain is None else str(terrain)
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(str(scenario), ground)
+    elif ground is not None:
+        scenario = over_terrain(scenario, ground)
+    return apply_options(scenario, options, program)
+
+
+def apply_options(scenario: Scenario, options: FlightOptions, program: Path | None = None) -> Scenario:
+    """Return a scenario in the weather and flown as the options state; its terrain stays.
+
+    program: the autopilot's program that flies.
+    Where nobody names an autopilot, it is the one that the file of parameters was written for.
+    Raises ScenarioError for what a scenario file may not have either, and ParameterError for another autopilot's file.
+
+    >>> changed = apply_options(load_scenario("tight"), {"wind": (8.0, 270.0), "airspeed": 28.0})
+    >>> changed.wind.speed, changed.flight.airspeed_mps
+    (8.0, 28.0)
+    """
+    wind = options.get("wind")
+    speed, from_deg = (None, None) if wind is None else _two_numbers(wind)
+    if from_deg is not None and not is_wind(0.0, from_deg):
+        raise ArgumentError.of_argument("wind", wind, "degrees from north that it blows from, -360..360, are expected")
+    from_course = None if from_deg is None else math.radians(from_deg)
+    flown = with_flight(at_time(scenario, options.get("at")), **flight_entries(options, program))
+    return with_wind(with_file_autopilot(flown), speed, from_course, options.get("turbulence"))
+
+
+def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[str, str | float | None]:
+    """Return the entries of a scenario's [flight] that options state; None for those that are not given.
+
+    Raises ArgumentError for a law that planfly does not know, and for one in addition to a program.
+
+    >>> entries = flight_entries({"autopilot_law": "px4-1.16"})
+    >>> entries["autopilot"], entries["px4_version"]
+    ('px4', '1.16')
+    """
+    aircraft, params, named = options.get("aircraft"), options.get("params"), options.get("autopilot_law")
+    check_arguments(autopilot_law=named)
+    if program is not None and named is not None:
+        allowed = "not with autopilot: a program flies by its own law"
+        raise ArgumentError.of_argument("autopilot_law", named, allowed)
+    law, _, version = (named or "").partition("-")
+    return {
+        # A `Path` is a folder, and is passed on so that it is known for one.
+        "aircraft": str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft,
+        "airspeed_mps": options.get("airspeed"),
+        "autopilot": law or None if program is None else program_autopilot(program).name,
+        "px4_version": version or None,
+        "guidance": options.get("guidance"),
+        "nav": options.get("nav"),
+        # Whatever folder the scenario is in.
+        "params": None if params is None else whole_path(Path(params)),
+    }
+
+
+def _two_numbers(wind: Wind) -> Wind:
+    """Return a wind as two numbers.  Raises ArgumentError for anything else."""
+    try:
+        speed, from_deg = wind
+        if isinstance(wind, str | bytes):
+            raise TypeError
+        return float(speed), float(from_deg)
+    except (TypeError, ValueError):
+        allowed = "a speed, m/s, and the degrees from north that it blows from are expected, as (8, 270)"
+        raise ArgumentError.of_argument("wind", wind, allowed, shown=repr(wind)) from None

@@ -1,0 +1,62 @@
+"""Files of fences and zones that are named in addition to a mission's own fence and a scenario's zones."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from flight.mission.fences import fence_zones, numbered
+from flight.mission.items import Mission, MissionItem
+from flight.mission_files.formats import read_fence
+from planfly.flight_options import FencePaths
+from world.airspace.zone_files import FileZones, is_zone_file, read_zone_file
+from world.frames import GeoOrigin
+from world.scenario import Scenario, with_zones
+
+
+@dataclass(frozen=True, slots=True)
+class NamedFences:
+    """What the files hold.
+
+    items: of fences, which join the mission's own.
+    zones: of files of zones, by the file that each comes from; they join the scenario's.
+    """
+
+    items: tuple[MissionItem, ...] = ()
+    zones: tuple[tuple[str, FileZones], ...] = ()
+
+    def on_mission(self, mission: Mission) -> Mission:
+        """A mission with the fence items beside its own."""
+        if not self.items:
+            return mission
+        warnings = mission.warnings
+        if mission.fences:
+            warnings = (*warnings, f"its own fence of {len(mission.fences)} items counts beside the one named")
+        return replace(mission, fences=numbered([*mission.fences, *self.items]), warnings=warnings)
+
+    def on_scenario(self, scenario: Scenario) -> Scenario:
+        """A scenario with the zones beside its own.  Raises ScenarioError as `with_zones` does."""
+        for source, found in self.zones:
+            scenario = with_zones(scenario, found.zones, source, found.notes)
+        return scenario
+
+
+def read_named_fences(files: FencePaths) -> NamedFences:
+    """Read one or more files of fences and zones, by the suffix of each.
+
+    Raises MissionError or ScenarioError for a file that cannot be read, that holds no fence, or one whose shapes are
+    none.
+
+    >>> read_named_fences([])
+    NamedFences(items=(), zones=())
+    """
+    items: list[MissionItem] = []
+    zones = []
+    for file in [files] if isinstance(files, str | Path) else files:
+        path = Path(file)
+        if is_zone_file(path):
+            zones.append((str(file), read_zone_file(path, str(file))))
+            continue
+        found = read_fence(path)
+        # Shapes are checked while it is known which file they are from.
+        fence_zones(found, GeoOrigin(found[0].lat_deg, found[0].lon_deg), str(file))
+        items += found
+    return NamedFences(tuple(items), tuple(zones))

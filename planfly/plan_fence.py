@@ -1,0 +1,24 @@
+"""A plan's threats, area and zones as the fence of its mission, which the verdict finds kept."""
+
+from flight.mission.fences import fence_zones, with_fences
+from flight.mission.items import Mission, MissionItem
+from flight.simulation.setup import FlightSetup
+from logs.verdict.rules.fence_rule import zone_test
+
+
+def fence_of_plan(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
+    """Add the scenario of a plan to the fence of its mission, and note what a fence cannot hold.
+
+    Shapes that the verdict's rule `fence` would find violated by the planned path are left out, and named in the notes.
+
+    >>> from logs.recording.example_log import example_log
+    >>> mission, notes = fence_of_plan(example_log().setup)
+    >>> [item.command for item in mission.fences]  # the area; the example has no missiles
+    [5001, 5001, 5001, 5001]
+    """
+    is_entered = zone_test(setup)
+
+    def passes(shape: tuple[MissionItem, ...]) -> bool:
+        return any(is_entered(zone) for zone in fence_zones(shape, setup.scenario.origin))
+
+    return with_fences(setup.mission, setup.scenario, passes)
