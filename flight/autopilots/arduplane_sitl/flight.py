@@ -119,12 +119,11 @@ def fly_autopilot(
     progress: Progress | None = None,
     log: Path | None = None,
 ) -> tuple[SimulatedFlight, FlightSetup]:
-    """Fly a setup with ArduPlane SITL, from its boot to its end.
+    """Fly a setup with ArduPlane SITL, from its boot to its end; arguments as of `AutopilotFlight` and `simulate`.
 
-    The arguments are as in `AutopilotFlight` and `simulate`.
-    log: file for the autopilot's own log (.BIN).
+    log: where the autopilot's own log (.BIN) is kept.
 
-    Return the flight, and the setup with the program that flew it.
+    Returns the flight, and the setup with the program that flew it.
     """
     with AutopilotFlight(setup, aircraft, autopilot, own) as flight:
         flight.prepare()
