@@ -132,7 +132,7 @@ class MissionJudged:
     possible: True if the mission can be started at all.
     flyable: False if a finding of its geometry failed.
     texts: texts about it for stations.
-    home: the mission's, or the ground at its start; None if it is not possible.
+    home: the mission's home, or the ground at its start; None if it is not possible.
     items: seq of the item at each waypoint, -1 for no item.
     start: the aircraft where the flight starts; None if it is not possible.
     """
@@ -223,7 +223,7 @@ class FlightFactory(Protocol):
     def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:
         """Return the requested route from a position (3,) on the map.
 
-        Raise PlanflyError if there is none.
+        Raise PlanflyError if there is no such route.
         """
 
     def open_log(self, setup: FlightSetup, mode: int) -> LogSink:
@@ -297,7 +297,7 @@ class _RequestQueue:
         return self._early.popleft() if self._early else self._connection.recv()
 
     def waiting(self) -> object:
-        """Return the next request, or None if there is none."""
+        """Return the next request, or None if no request waits."""
         if not self._early and not self._connection.poll():
             return None
         try:

@@ -87,7 +87,7 @@ def split_frames(data: bytes) -> list[MavlinkFrame]:
 
 
 def _frame_at(data: bytes, at: int) -> MavlinkFrame | None:
-    """Return the frame that starts at an offset, or None if there is none."""
+    """Return the frame that starts at an offset, or None if no whole frame starts there."""
     is_v2 = data[at] == MAGIC_V2
     head = 10 if is_v2 else 6
     if len(data) - at < head + 2:
@@ -469,7 +469,7 @@ class Link:
         self._notices.append(f"{host} sends {message.get_type()} and no HEARTBEAT{full}: it is not answered")
 
     def _notice_clock_ahead(self, host: str) -> None:
-        """Add a notice, once for each address with the key, that its clock or this machine's is wrong."""
+        """Add a notice, once for each address with the key, that one of the two clocks is wrong."""
         if host in self._ahead or len(self._ahead) >= _MAX_NAMED_STRANGERS:
             return
         self._ahead.add(host)

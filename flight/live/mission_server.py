@@ -215,8 +215,8 @@ def flown_from(mission: Mission, first: int) -> Mission:
 # Maximum number of items of an upload: bounds the memory that a station can use (some 2 MB a list).
 MAX_UPLOADED = 5_000
 # Minimum time before a request is repeated, s.  The first repetition comes after 1.5 times the time that the last item
-# took, the next after twice as long each time, up to `SLOWEST_RETRY`.  A slow station counts the repetitions: MAVSDK
-# gives up at the sixth for an item.
+# took, the next after twice as long each time, up to `SLOWEST_RETRY`.  Not sooner, as a slow station may give up:
+# MAVSDK does at the sixth request for an item.
 RETRY = 0.05
 # Maximum time before a request is repeated, s.
 SLOWEST_RETRY = 0.4
@@ -380,7 +380,8 @@ class MissionServer:
         self._drop_other_uploads(station)
         if count == 0:
             return self._clear(station, (kind,), kind, now)
-        # A count always begins a new upload: items of a station that starts over with the same count must not be mixed.
+        # MISSION_COUNT always begins a new upload: a station that starts over with the same count must not have its
+        # items mixed.
         upload = self._uploads[kind] = _Upload(station, count, now, now, now)
         self._finished.pop(kind, None)
         return [self._request(upload, kind, now)]

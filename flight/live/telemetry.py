@@ -240,7 +240,7 @@ _CAPABILITIES = (
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
 )
-# Version for ground stations: ArduPlane's, as the vehicle follows its conventions (modes, home as item 0).
+# ArduPlane version for ground stations: the vehicle follows its conventions (modes, home as item 0).
 _VERSION = (4 << 24) | (5 << 16) | (0 << 8) | 255
 
 # Intervals between two messages of a kind, s, unless a station sets another; HEARTBEAT cannot be changed.

@@ -133,7 +133,7 @@ def fly_go_arounds(
     found = []
     for k in range(len(starts)):
         way, landing = fly(k, landings[0]), landings[0]
-        # The climb leads to none of the sequences, so it is the same for each.
+        # The climb does not depend on the sequence.
         over = way[min(climb_rows(way, top), len(way) - 1)]
         nearest = nearest_landing((float(over[0]), float(over[1]), float(over[2])), landings)
         if nearest is not None and nearest != landing:

@@ -107,7 +107,7 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 
 @lru_cache(maxsize=8)
 def _corners(parameters: ArduPilotParameters, airspeed: float, fly_over: bool) -> tuple[Floats, Floats, Floats, Floats]:
-    """Tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
+    """Return tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
     record, speeds = parameters.record(), SPEED_SHARES * airspeed
     _fill(record, airspeed, TURNS, speeds, fly_over, corners, waypoint_column(3))

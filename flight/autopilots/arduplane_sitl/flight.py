@@ -119,10 +119,9 @@ def fly_autopilot(
 ) -> tuple[SimulatedFlight, FlightSetup]:
     """Fly a setup with ArduPlane SITL, from its boot to its end; arguments as of `AutopilotFlight`.
 
-    The arguments are as in `AutopilotFlight` and `simulate`.
-    log: file for the autopilot's own log (.BIN).
+    log: where the autopilot's own log (.BIN) is kept.
 
-    Return the flight, and the setup with the program that flew it.
+    Returns the flight, and the setup with the program that flew it.
     """
     with AutopilotFlight(setup, aircraft, autopilot, own) as flight:
         flight.prepare()

@@ -46,7 +46,7 @@ _MIN_FLARE_HEIGHT_M = 6.0
 def program_ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
     """Run a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
 
-    The commands in the block are the program's.
+    The program has set the commands in the block.
     """
     path_begins = WORKSPACE_NUMBERS + GROUND_NUMBERS
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]

@@ -94,7 +94,7 @@ class AutopilotParameters:
     """Parameters by name.
 
     given: all parameters that the autopilot gets in addition to its own defaults.
-    changed: the user's among them, if they differ from the aircraft's or the aircraft has none.
+    changed: parameters of the user among them, if the aircraft has another value or no value.
     unused: the user's parameters that belong to other hardware.
     """
 

@@ -342,7 +342,7 @@ def _max_upward_acceleration(
 ) -> float:  # pragma: no cover - compiled
     """Return the maximum upward acceleration that the energy allows, m/s^2.
 
-    The specific excess power now, plus that of the unused throttle, is the climb rate at a steady airspeed.  The
+    The specific excess power now, plus the power of the unused throttle, is the climb rate at a steady airspeed.  The
     aircraft may climb faster while its airspeed is above the slowest one allowed, and must climb more slowly, or sink,
     to return to it from below.  Near the stall the measured airspeed is used, with its gusts: a gust takes it there
     within a second.  In a steep turn that begins at a higher airspeed: the stall speed grows with the root of the load

@@ -162,7 +162,7 @@ def _end_mission(
 ) -> None:  # pragma: no cover - compiled
     """End the flight past the last waypoint b once it is at its altitude, or after a timeout.
 
-    Where the mission ends, PX4 loiters without end (`MissionBase::setEndOfMissionItems`): the flight joins that loiter
+    At the mission's end PX4 loiters without end (`MissionBase::setEndOfMissionItems`): the flight joins that loiter
     and flies it once around.  A circle that begins before the waypoint, and is left at once because the altitude is
     reached, does not end the flight.
     """

@@ -127,7 +127,7 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 
 @lru_cache(maxsize=8)
 def _corners(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
+    """Return tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
     _fill(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, waypoint_column(3))
     share, more = WIND_SPREAD

@@ -80,7 +80,7 @@ class GivenParameters:
     """Parameters by name.
 
     given: all parameters that PX4 gets in addition to its own defaults.
-    changed: the user's among them, if they differ from the aircraft's or the aircraft has none.
+    changed: parameters of the user among them, if the aircraft has another value or no value.
     unused: the user's parameters that belong to other hardware.
     """
 

@@ -192,7 +192,7 @@ class Conversation:
             yield from self._wait(AGAIN)
 
     def _send_items(self, items: list[MissionItem], kind: MissionType) -> Talk:
-        """Send the count and each requested item, until the upload is acknowledged or requests cease."""
+        """Send the number of items and each requested item, until an acknowledgment or a timeout."""
         news, link = self._news, self._link
         news.requested = news.mission_result = None
         link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), kind))

@@ -61,7 +61,7 @@ _SEARCHED_PIECES = 4
 def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
     """Run a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
 
-    The commands in the block are the other program's.  The flight completes where it passes the end of the path, once
+    The other program has set the commands in the block.  The flight completes where it passes the end of the path, once
     the program reports that only this end lies ahead; an RTL completes in its loiter, a loiter without end after
     `UNLIMITED`, and a mission whose last waypoint is circled about completes after one lap.
     """

@@ -57,7 +57,7 @@ _INTEGER_FORMATS = {
 class AutopilotLink(ABC):
     """A connection to the autopilot's program, on this machine.
 
-    port: of this end.  news: state from the messages so far.
+    port: of this end.  news: state from the received messages.
     """
 
     port: int

@@ -27,8 +27,8 @@ Floats = NDArray[np.float64]
 STRAIGHT_ON = 1000.0
 # Height of the start above home, m, if the mission has no home, or a home near the start's altitude.
 _HOME_BELOW_START_M = 100.0
-# Minimum distance of the start's altitude from home's, m: within 10 m of home ArduPlane limits the throttle, as before
-# a take-off.
+# Minimum altitude difference between the start and home, m: within 10 m of home ArduPlane limits the throttle, as
+# before a take-off.
 _MIN_HOME_DISTANCE_M = 15.0
 _KEPT_COMMANDS = (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG, Command.DO_CHANGE_SPEED, Command.DO_SET_HOME)
 
@@ -153,7 +153,7 @@ def _renumber(kept: list[MissionItem]) -> tuple[MissionItem, ...]:
 def _home(setup: FlightSetup) -> Home:
     """Return the mission's home, or the start's position, at an altitude that lets the motor run.
 
-    An RTL measures its altitudes from home: there home is the mission's.
+    An RTL measures its altitudes from home: there the mission's home is used.
     """
     start = setup.route.waypoints[0]
     home = setup.mission.home
