@@ -79,7 +79,7 @@ class ArduPlane(Autopilot):
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
-        """With the parameters that a log stores."""
+        """Return the autopilot with the parameters that a log stores."""
         return cls(
             ArduPilotParameters.defaults()
             if stored.parameters is None
