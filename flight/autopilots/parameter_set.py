@@ -1,7 +1,7 @@
 """The parameters of an autopilot: one set of values, and how files, aircraft, logs and defaults make it.
 
-Of three sources the first that states a parameter applies: the file that a person gives, the aircraft, the autopilot's
-default.  `flight.autopilots.arduplane.parameters` and `flight.autopilots.px4.parameters` define which parameters an
+A parameter is taken from the first source that states it: the user's file, the aircraft, the autopilot's default.
+`flight.autopilots.arduplane.parameters` and `flight.autopilots.px4.parameters` define which parameters an
 autopilot's law reads.
 """
 
@@ -127,7 +127,7 @@ class ParameterSet:
 
     values: every parameter that the law reads, in the order of the table's definitions.
     unused: names in the file that the law does not read.
-    source: the file that a person gave, "" for none.
+    source: the user's file, "" if there is no file.
     """
 
     table: ClassVar[ParameterTable]
@@ -201,7 +201,7 @@ class ParameterSet:
 
     @classmethod
     def _is_stated(cls, definition: Definition, value: float) -> bool:
-        """Return True if a value in a file counts as stated by the file."""
+        """Return True if the file is taken to state a value that it contains."""
         return True
 
     @classmethod

@@ -1,4 +1,4 @@
-"""ArduPlane's law as an autopilot, with the parameters that it flies by."""
+"""ArduPlane's control law as an autopilot, with its parameters."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -43,8 +43,9 @@ from world.kernels import Record
 from world.scenario_tables import FlightTable, Navigation
 from world.wind import Turbulence
 
-# What of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY` belongs to the way that is flown, and not to the aircraft.
-_OF_THE_WAY = (
+# Fields of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY` that belong to the current leg or mission, not to the
+# aircraft.
+_LEG_FIELDS = (
     *("leg", "cross_track_sum", "on_circle", "loitering", "stayed", "circled", "bearing", "at_height", "next_look"),
     *("up_before", "over", "waited", "left_for", "returning", "climbed", "ground_leg"),
 )
@@ -52,7 +53,7 @@ _OF_THE_WAY = (
 
 @dataclass(frozen=True)
 class ArduPlane(Autopilot):
-    """ArduPlane's law: L1 along the legs, TECS for height and airspeed.
+    """ArduPlane's control law: L1 along the legs, TECS for altitude and airspeed.
 
     >>> made = ArduPlane(ArduPilotParameters.defaults())
     >>> made.acceptance_radius, made.turn_distance(math.radians(45.0), 0.0), made.speed_limits[:2]
@@ -86,7 +87,7 @@ class ArduPlane(Autopilot):
         )
 
     def store(self) -> StoredAutopilot:
-        """Its parameters."""
+        """Return its parameters for a log."""
         parameters = self.parameters
         stored = StoredParameters(parameters.values, parameters.unused, parameters.source)
         return StoredAutopilot(parameters=stored, program=self.program)
@@ -95,7 +96,7 @@ class ArduPlane(Autopilot):
     def of_flight_log(
         cls, program: str, parameters: Mapping[str, float], source: str
     ) -> tuple[Self, tuple[str, ...]] | None:
-        """ArduPlane with the log's parameters, for a log that any release of it wrote."""
+        """Return ArduPlane with the log's parameters, for a log of any ArduPlane release."""
         if not program.startswith("ArduP"):
             return None
         made, notes = ArduPilotParameters.of_log(parameters, source)
@@ -103,28 +104,28 @@ class ArduPlane(Autopilot):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """None: what the aircraft does not state has ArduPlane's defaults."""
+        """Return an empty list: what the aircraft does not state has ArduPlane's defaults."""
         ArduPilotParameters.load(aircraft)
         return []
 
     @property
     def tick(self) -> Tick:
-        """One tick of the law."""
+        """Compiled function for one tick of the law."""
         return arduplane_tick
 
     def begin(self, memory: Record, own: Record) -> None:
-        """Hand over the parameters."""
+        """Write the parameters into the memory."""
         own.parameters = self.parameters.record()
 
     def take_over(self, before: Record, own: Record, here: Floats) -> None:
-        """As a change of mode: energies and airspeed are kept, and the leg begins here."""
+        """Begin a new leg here, as after a change of mode: TECS and airspeed filter keep their state."""
         own.memory = before.memory
-        for name in _OF_THE_WAY:
+        for name in _LEG_FIELDS:
             setattr(own.memory, name, 0)
         own.memory.from_east, own.memory.from_north, own.memory.from_up = here
 
     def described(self, aircraft: str) -> str:
-        """The law with the parameters that decide most of a flight."""
+        """Return a description of the law with the parameters that matter most in a flight."""
         made = self.parameters
         whose = f"the parameters of {made.source}" if made.source else "its default parameters"
         return (
@@ -134,7 +135,7 @@ class ArduPlane(Autopilot):
 
     @property
     def version(self) -> str:
-        """The release whose law it is."""
+        """ArduPlane release of the law."""
         return RELEASE
 
     @property
@@ -143,7 +144,7 @@ class ArduPlane(Autopilot):
         return self.parameters.wp_radius
 
     def settings_not_flown(self, *, returns: bool) -> list[str]:
-        """ALT_OFFSET, SOAR_ENABLE, Q_ENABLE, RUDDER_ONLY, a fence of its own, and returns that follow the terrain."""
+        """Return ALT_OFFSET, SOAR_ENABLE, Q_ENABLE, RUDDER_ONLY, an own fence, and RTL over terrain."""
         made = self.parameters
         switched = {"ALT_OFFSET": made.altitude_offset, "SOAR_ENABLE": made.soaring, "Q_ENABLE": made.quadplane}
         switched["RUDDER_ONLY"] = made.rudder_only
@@ -160,25 +161,26 @@ class ArduPlane(Autopilot):
         return self.parameters.terrain_enable == 1.0
 
     def turn_distance(self, turn: float, amsl: float) -> float:
-        """WP_RADIUS for a right angle, in thin air more, and a share of it for a gentler turn."""
+        """Return WP_RADIUS for a right angle, more in thin air, and a fraction of it for a smaller turn."""
         factor = float(true_by_equivalent(amsl))
         return float(turn_distance(0.0, turn, self.parameters.wp_radius, math.inf, factor))
 
     def airspeed_factor(self, amsl: float) -> float:
-        """True by equivalent airspeed."""
+        """Return the ratio of true to equivalent airspeed."""
         return float(true_by_equivalent(amsl))
 
     def landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:
-        """By TECS_LAND_ARSPD, or AIRSPEED_CRUISE and AIRSPEED_MIN, and LAND_WIND_COMP."""
+        """Return the airspeed by TECS_LAND_ARSPD, or AIRSPEED_CRUISE and AIRSPEED_MIN, and LAND_WIND_COMP."""
         return landing_airspeed(self.parameters, tail_wind) * self.airspeed_factor(amsl)
 
     def as_asked(
         self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0
     ) -> Autopilot:
-        """With RTL_ALTITUDE and RTL_AUTOLAND, and the latter 1 where nobody states it: 0 does not arm with a landing.
+        """Return the autopilot with a scenario's RTL_ALTITUDE and RTL_AUTOLAND.
 
-        On a field that is lower than home the flare would rise (`flight.autopilots.arduplane.ground_law`): there
-        TECS_LAND_PMAX holds the nose down where nobody states it.
+        RTL_AUTOLAND is 1 unless a file states it: with 0 ArduPlane does not arm if the mission has a landing.  On a
+        field that is lower than home the flare would climb (`flight.autopilots.arduplane.ground_law`): there
+        TECS_LAND_PMAX holds the nose down unless a file states it.
 
         >>> made = ArduPlane(ArduPilotParameters.defaults()).as_asked(180.0, None, lands=True, lower=50.0)
         >>> made.parameters.rtl_altitude, made.parameters.rtl_autoland, round(made.parameters.landing_pitch_max, 4)
@@ -190,12 +192,12 @@ class ArduPlane(Autopilot):
             values["RTL_AUTOLAND"] = float(rtl_autoland)
         elif lands and self.parameters.rtl_autoland == 0.0 and "RTL_AUTOLAND" not in stated:
             values["RTL_AUTOLAND"] = 1.0
-        if lands and lower > _LOWER and "TECS_LAND_PMAX" not in stated:
-            values["TECS_LAND_PMAX"] = _NOSE_DOWN
+        if lands and lower > _LOW_FIELD_M and "TECS_LAND_PMAX" not in stated:
+            values["TECS_LAND_PMAX"] = _NOSE_DOWN_DEG
         return ArduPlane(self.parameters.changed(**values)) if values else self
 
     def landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
-        """By LAND_FLARE_*, LAND_WIND_COMP, TECS_LAND_SINK and TECS_LAND_ARSPD."""
+        """Return the glide by LAND_FLARE_*, LAND_WIND_COMP, TECS_LAND_SINK and TECS_LAND_ARSPD."""
         airspeed = self.landing_airspeed(0.0, tail_wind, amsl)
         return landing_glide(height, run, airspeed + tail_wind, self.parameters)
 
@@ -206,12 +208,12 @@ class ArduPlane(Autopilot):
         return (least, "TKOFF_THR_MINACC") if least > 0.0 else None
 
     def go_around_height(self, asked: float, takeoff: float) -> float | None:
-        """The landing item's first number, or the take-off's height, or 30 m."""
+        """Return the landing item's first parameter, or the take-off's height, or 30 m."""
         return go_around_height(asked, takeoff)
 
     @property
     def return_rules(self) -> ReturnRules:
-        """By RTL_*, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_*, TECS_SINK_MAX and GLIDE_SLOPE_MIN.
+        """Rules of an RTL from RTL_*, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_* and TECS and slope limits.
 
         >>> made = ArduPlane(ArduPilotParameters.defaults().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16, RTL_AUTOLAND=2))
         >>> made.return_rules.height, made.return_rules.climb_first, made.return_rules.rally_limit
@@ -236,7 +238,7 @@ class ArduPlane(Autopilot):
 
     @property
     def loiter_rules(self) -> LoiterRules:
-        """By WP_LOITER_RAD and the air's density, until it is within `REACHED_HEIGHT` of a height.
+        """Rules of loiters from WP_LOITER_RAD, the air's density, and `REACHED_HEIGHT`.
 
         >>> rules = ArduPlane(ArduPilotParameters.defaults().changed(WP_LOITER_RAD=-80.0)).loiter_rules
         >>> rules.radius, round(rules.growth(1300.0), 3)
@@ -247,13 +249,13 @@ class ArduPlane(Autopilot):
             radius=made.loiter_radius,
             radius_name="WP_LOITER_RAD",
             radius_of=radius_read,
-            growth=_growth,
+            growth=_radius_growth,
             at_middle=True,
             lines_up=True,
             climb=made.tecs_climb_max,
             sink=made.tecs_sink_max or math.inf,
             short=REACHED_HEIGHT,
-            unflown=_limited_circles(made.navl1_lim_bank),
+            unflown=_bank_limit_note(made.navl1_lim_bank),
             before_return=_BEFORE_RETURN,
         )
 
@@ -263,43 +265,43 @@ class ArduPlane(Autopilot):
         return SpeedLimits(self.parameters.airspeed_min, self.parameters.airspeed_max, "AIRSPEED_MIN", "AIRSPEED_MAX")
 
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
-        """The last speed that it took."""
+        """Return the last speed that it accepted, for each leg."""
         return speeds_flown(commanded, cruise, self.parameters)
 
     @property
     def stated_bank(self) -> float | None:
-        """ROLL_LIMIT_DEG of a person's file."""
+        """ROLL_LIMIT_DEG of the user's file, or None if the file does not state it."""
         return self.parameters.roll_limit if "ROLL_LIMIT_DEG" in self.parameters.by_origin("file") else None
 
     @property
     def bank_limit(self) -> float:
-        """ROLL_LIMIT_DEG, whoever states it."""
+        """ROLL_LIMIT_DEG, from any source."""
         return self.parameters.roll_limit
 
     def tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """How far its law strays with these parameters."""
+        """Return the deviations of its law with these parameters."""
         return tracking_error(self.parameters, airspeed, nav, fly_over=fly_over, turbulence=turbulence)
 
     def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
-        """It keeps its airspeed, and cannot sink faster than the aircraft does so."""
+        """Return the altitude gain in updrafts: it keeps its airspeed, and its sink rate is limited."""
         return height_in_updrafts(sink, turbulence)
 
     def from_ground(self, ways: GroundWays, aircraft: Aircraft, contacts: Sequence[Contact]) -> "ArduPlaneFromGround":
-        """The same law with its take-off and its landing."""
+        """Return the same law with its take-off and its landing."""
         return ArduPlaneFromGround(self.parameters, ways=ways, aircraft=aircraft, contacts=tuple(contacts))
 
     def with_parameters(self, **values: float) -> "ArduPlane":
-        """The law, whoever flew before, with other parameters."""
+        """Return ArduPlane's law with other parameters; a recorded program is replaced by the law."""
         return ArduPlane(self.parameters.changed(**values))
 
 
 @dataclass(frozen=True)
 class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
-    """ArduPlane's law from the ground, or to it, or both.
+    """ArduPlane's law with take-off, landing, or both.
 
-    ways: what of it is flown.  contacts: where the aircraft meets the ground.
+    ways: take-off and landing that are flown.  contacts: points where the aircraft touches the ground.
     """
 
     own: ClassVar[np.dtype[np.record] | None] = ARDUPLANE_GROUND
@@ -309,12 +311,12 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
 
     @property
     def tick(self) -> Tick:
-        """One tick of the law."""
+        """Compiled function for one tick of the law."""
         return ground_tick
 
     @property
     def motor_start(self) -> float:
-        """When the motor starts, s after the release; inf for never."""
+        """Time of the motor start, s after the release; inf if it never starts."""
         take_off = self.ways.take_off
         if take_off is None:
             return -math.inf
@@ -322,14 +324,15 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
 
     @property
     def released_throttle(self) -> float:
-        """What the throttle has come to on the rail."""
+        """Throttle at the end of the rail."""
         made = self.parameters
-        # At once, and not 0 times infinity, for one that knows no limit; none yet where the motor starts later.
+        # Without a slew limit the throttle opens at once (not 0 times infinity); it is closed if the motor starts
+        # later.
         since = max(0.0, -self.motor_start)
         return min(made.takeoff_throttle or made.throttle_max, since * takeoff_slew(made) if since else 0.0)
 
     def begin(self, memory: Record, own: Record) -> None:
-        """Hand over the parameters, the contacts and the ways."""
+        """Write the parameters, the contacts, the take-off and the landing into the memory."""
         super().begin(memory, own)
         own.staged = own.parameters
         ground = own.ground
@@ -338,7 +341,7 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         for k, one in enumerate(used):
             ground.contact[k] = one.forward, one.right, one.down
             ground.stands[k] = one.stands
-        ground.turnover = _TURNOVER_SHARE * self.aircraft.stall_speed
+        ground.turnover = _TURNOVER_SPEED_RATIO * self.aircraft.stall_speed
         ground.stage = IN_AIR
         if self.ways.take_off is not None:
             self._begin_take_off(self.ways.take_off, ground)
@@ -352,9 +355,9 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         ground.slew, ground.full = takeoff_slew(made), made.takeoff_throttle or made.throttle_max
         ground.base, ground.top, ground.low = take_off.base, take_off.top, take_off.home[2]
         ground.pitch, ground.leg = take_off.pitch, take_off.waypoint
-        # Since it moved at 5 m/s, at which its course over the ground is known.
+        # Start when it moved at 5 m/s, at which its course over the ground is known.
         pushed = take_off.acceleration
-        ground.fast = max(0.0, take_off.speed - _MOVES) / pushed if pushed else 0.0
+        ground.fast = max(0.0, take_off.speed - _COURSE_SPEED_MPS) / pushed if pushed else 0.0
 
     def _begin_landing(self, approach: Approach, ground: Record) -> None:
         up = float(approach.point[2])
@@ -367,31 +370,35 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         ground.airspeed = landing_airspeed(self.parameters, approach.tail_wind)
 
 
-# A field that is lower than home by more than this (m) has a flare that rises; so high (degrees) the nose may be in it.
-_LOWER, _NOSE_DOWN = 3.0, -1.0
-# Faster than this share of its slowest flight no aircraft touches the ground with its nose, its tail or a wing.
-_TURNOVER_SHARE = 0.75
-# Faster over the ground than this ArduPlane knows its course, m/s.
-_MOVES = 5.0
+# On a field lower than home by more than this, m, the flare climbs ...
+_LOW_FIELD_M = 3.0
+# ... unless the nose is held down to this pitch.
+_NOSE_DOWN_DEG = -1.0
+# No aircraft touches the ground with its nose, its tail or a wing above this ratio to its stall speed.
+_TURNOVER_SPEED_RATIO = 0.75
+# Ground speed above which ArduPlane knows its course, m/s.
+_COURSE_SPEED_MPS = 5.0
 
-# What a return goes on to, by RTL_AUTOLAND; with 3 the landing sequence is for go-arounds alone.
+# Continuation of an RTL, by RTL_AUTOLAND; with 3 the landing sequence is for go-arounds alone.
 _LANDS: dict[int, Literal["", "circle", "straight"]] = {1: "circle", 2: "straight"}
 _RETURN_PATH = "RTL_AUTOLAND 4 goes by the mission's return path or landing sequence: not flown, it stays in its circle"
 
-# `Plane::verify_loiter_heading` lines up with the place of the next item; a return has none, which is 0 N 0 E.
+# `Plane::verify_loiter_heading` lines up with the place of the next item; an RTL item has no place, which is 0 N 0 E.
 _BEFORE_RETURN = "ArduPlane leaves its circle heading for 0° N 0° E, and returns from there: flown heading for home"
 
-# A radius of so many metres or less is none to ArduPlane.  A mission's item holds that of LOITER_TURNS in a byte: whole
-# metres, or from this on whole tens of them; those without end and to a height have sixteen bits
-# (`AP_Mission::mavlink_int_to_mission_cmd`).
-_NO_RADIUS, _BYTE = 1.0, 255.0
+# ArduPlane treats a radius up to this as no radius, m.
+_NO_RADIUS_M = 1.0
+# The radius of LOITER_TURNS is stored in a byte, in whole metres or, from this on, in tens of metres.  Loiters without
+# end and to an altitude have sixteen bits (`AP_Mission::mavlink_int_to_mission_cmd`).
+_MAX_BYTE_RADIUS_M = 255.0
 
 
 def radius_read(loiter: Loiter) -> float:
-    """The radius that ArduPlane reads of a loiter's item, m, 0 for none: that of turns, to a height, and without end.
+    """Return the radius that ArduPlane reads from a loiter's item, m; 0 if it reads no radius.
 
-    For a time, be that none, it flies WP_LOITER_RAD, and takes of the item no more than the side: of the four
-    `Plane::verify_loiter_*` that of a time alone hands no radius of the item to `Plane::update_loiter`.
+    It reads the radius of loiters by turns, to an altitude, and without end.  For a loiter by time, even of zero time,
+    it flies WP_LOITER_RAD, and reads only the side from the item: of the four `Plane::verify_loiter_*` only the
+    function for time passes no radius of the item to `Plane::update_loiter`.
 
     >>> radius_read(Loiter(-250.7, turns=3)), radius_read(Loiter(307.0, turns=3)), radius_read(Loiter(1.0, turns=3))
     (250.0, 300.0, 0.0)
@@ -405,20 +412,24 @@ def radius_read(loiter: Loiter) -> float:
     if not math.isfinite(loiter.radius):
         return abs(loiter.radius)
     stated = float(math.floor(abs(loiter.radius)))
-    if not (loiter.endless or loiter.to_height) and stated > _BYTE:
-        stated = 10.0 * min(_BYTE, math.floor(stated / 10.0))
-    return stated if stated > _NO_RADIUS else 0.0
+    if not (loiter.endless or loiter.to_height) and stated > _MAX_BYTE_RADIUS_M:
+        stated = 10.0 * min(_MAX_BYTE_RADIUS_M, math.floor(stated / 10.0))
+    return stated if stated > _NO_RADIUS_M else 0.0
 
 
-def _growth(up: float) -> float:
-    """By how much a circle is wider at a height (m AMSL): as the square of true by equivalent airspeed."""
+def _radius_growth(up: float) -> float:
+    """Return the factor by which a loiter is wider at an altitude (m AMSL).
+
+    It is the square of the ratio of true to equivalent airspeed.
+    """
     return float(true_by_equivalent(up)) ** 2
 
 
-def _limited_circles(bank: float) -> str:
-    """That a bank limit of circles (deg) is not flown; "" where ArduPlane has none.
+def _bank_limit_note(bank: float) -> str:
+    """Return a note that a bank limit of loiters (deg) is not flown; "" if ArduPlane has no limit.
 
-    With one, `AP_L1_Control::loiter_radius` lets no circle grow with height that the bank can hold as it is.
+    With a limit, `AP_L1_Control::loiter_radius` lets a loiter grow with altitude only if the bank cannot hold its
+    radius.
     """
     if bank <= 0.0:
         return ""

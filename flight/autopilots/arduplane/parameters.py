@@ -1,8 +1,8 @@
-"""ArduPlane's parameters that decide how it flies a mission, in SI units and radians.
+"""ArduPlane's parameters for a mission, in SI units and radians.
 
-Names, units, ranges and defaults are those of ArduPlane's complete parameter list (ardupilot.org, Plane, version 4.6);
-an older name stands beside the present one with what takes its value to the present unit.  Of three sources the first
-that states a parameter counts: the file that a person gives, the file `ardupilot.parm` of the aircraft, ArduPlane.
+Names, units, ranges and defaults are from ArduPlane's complete parameter list (ardupilot.org, Plane, version 4.6); an
+older name stands next to the present name, with the factor to the present unit.  A parameter is taken from the first
+source that states it: the user's file, the file `ardupilot.parm` of the aircraft, ArduPlane's defaults.
 """
 
 import math
@@ -20,12 +20,12 @@ from world.kernels import Record, record_dtype
 Floats = NDArray[np.float64]
 
 
-# Whose law, parameters and defaults these are.
+# ArduPlane release of this law, its parameters and defaults.
 RELEASE = "4.6"
-_DEGREE = math.pi / 180.0
-_PERCENT = 0.01
-_CENTI = 0.01
-_KILOMETRE = 1000.0
+_RAD_PER_DEG = math.pi / 180.0
+_PER_PERCENT = 0.01
+_PER_CENTI = 0.01
+_M_PER_KM = 1000.0
 
 
 # By the field of `ArduPilotParameters`.
@@ -37,21 +37,21 @@ DEFINITIONS = {
     "wp_radius": Definition("WP_RADIUS", 90.0, 0.0, 32767.0),
     "wp_max_radius": Definition("WP_MAX_RADIUS", 0.0, 0.0, 32767.0),
     "wp_loiter_rad": Definition("WP_LOITER_RAD", 60.0, -32767.0, 32767.0),
-    "roll_limit": Definition("ROLL_LIMIT_DEG", 45.0, 5.0, 90.0, _DEGREE, ("LIM_ROLL_CD", _CENTI)),
-    "pitch_limit_max": Definition("PTCH_LIM_MAX_DEG", 20.0, 0.0, 90.0, _DEGREE, ("LIM_PITCH_MAX", _CENTI)),
-    "pitch_limit_min": Definition("PTCH_LIM_MIN_DEG", -25.0, -90.0, 0.0, _DEGREE, ("LIM_PITCH_MIN", _CENTI)),
-    "pitch_trim": Definition("PTCH_TRIM_DEG", 0.0, -45.0, 45.0, _DEGREE, ("TRIM_PITCH_CD", _CENTI)),
+    "roll_limit": Definition("ROLL_LIMIT_DEG", 45.0, 5.0, 90.0, _RAD_PER_DEG, ("LIM_ROLL_CD", _PER_CENTI)),
+    "pitch_limit_max": Definition("PTCH_LIM_MAX_DEG", 20.0, 0.0, 90.0, _RAD_PER_DEG, ("LIM_PITCH_MAX", _PER_CENTI)),
+    "pitch_limit_min": Definition("PTCH_LIM_MIN_DEG", -25.0, -90.0, 0.0, _RAD_PER_DEG, ("LIM_PITCH_MIN", _PER_CENTI)),
+    "pitch_trim": Definition("PTCH_TRIM_DEG", 0.0, -45.0, 45.0, _RAD_PER_DEG, ("TRIM_PITCH_CD", _PER_CENTI)),
     "roll_time": Definition("RLL2SRV_TCONST", 0.5, 0.05, 10.0),
     "pitch_time": Definition("PTCH2SRV_TCONST", 0.5, 0.05, 10.0),
     "rudder_mix": Definition("KFF_RDDRMIX", 0.5, 0.0, 1.0),
-    "airspeed_cruise": Definition("AIRSPEED_CRUISE", 12.0, 1.0, 500.0, 1.0, ("TRIM_ARSPD_CM", _CENTI)),
+    "airspeed_cruise": Definition("AIRSPEED_CRUISE", 12.0, 1.0, 500.0, 1.0, ("TRIM_ARSPD_CM", _PER_CENTI)),
     "airspeed_min": Definition("AIRSPEED_MIN", 9.0, 1.0, 500.0, 1.0, ("ARSPD_FBW_MIN", 1.0)),
     "airspeed_max": Definition("AIRSPEED_MAX", 22.0, 1.0, 500.0, 1.0, ("ARSPD_FBW_MAX", 1.0)),
     "stall_prevention": Definition("STALL_PREVENTION", 1.0, 0.0, 1.0),
-    "throttle_min": Definition("THR_MIN", 0.0, -100.0, 100.0, _PERCENT),
-    "throttle_max": Definition("THR_MAX", 100.0, 1.0, 100.0, _PERCENT),
-    "throttle_cruise": Definition("TRIM_THROTTLE", 45.0, 0.0, 100.0, _PERCENT),
-    "throttle_slew": Definition("THR_SLEWRATE", 100.0, 0.0, 500.0, _PERCENT),
+    "throttle_min": Definition("THR_MIN", 0.0, -100.0, 100.0, _PER_PERCENT),
+    "throttle_max": Definition("THR_MAX", 100.0, 1.0, 100.0, _PER_PERCENT),
+    "throttle_cruise": Definition("TRIM_THROTTLE", 45.0, 0.0, 100.0, _PER_PERCENT),
+    "throttle_slew": Definition("THR_SLEWRATE", 100.0, 0.0, 500.0, _PER_PERCENT),
     "glide_slope_min": Definition("GLIDE_SLOPE_MIN", 15.0, 0.0, 1000.0),
     "glide_slope_threshold": Definition("GLIDE_SLOPE_THR", 5.0, 0.0, 100.0),
     "tecs_climb_max": Definition("TECS_CLMB_MAX", 5.0, 0.1, 100.0),
@@ -65,34 +65,34 @@ DEFINITIONS = {
     "tecs_roll_to_throttle": Definition("TECS_RLL2THR", 10.0, 0.0, 100.0),
     "tecs_speed_weight": Definition("TECS_SPDWEIGHT", 1.0, 0.0, 2.0),
     "tecs_pitch_damping": Definition("TECS_PTCH_DAMP", 0.3, 0.0, 5.0),
-    "tecs_pitch_max": Definition("TECS_PITCH_MAX", 15.0, 0.0, 90.0, _DEGREE),
-    "tecs_pitch_min": Definition("TECS_PITCH_MIN", 0.0, -90.0, 0.0, _DEGREE),
+    "tecs_pitch_max": Definition("TECS_PITCH_MAX", 15.0, 0.0, 90.0, _RAD_PER_DEG),
+    "tecs_pitch_min": Definition("TECS_PITCH_MIN", 0.0, -90.0, 0.0, _RAD_PER_DEG),
     "tecs_height_demand_time": Definition("TECS_HDEM_TCONST", 3.0, 0.0, 20.0),
-    "rtl_altitude": Definition("RTL_ALTITUDE", 100.0, -1.0, 9000.0, 1.0, ("ALT_HOLD_RTL", _CENTI)),
+    "rtl_altitude": Definition("RTL_ALTITUDE", 100.0, -1.0, 9000.0, 1.0, ("ALT_HOLD_RTL", _PER_CENTI)),
     "rtl_radius": Definition("RTL_RADIUS", 0.0, -32767.0, 32767.0),
     "rtl_climb_min": Definition("RTL_CLIMB_MIN", 0.0, 0.0, 9000.0),
     "flight_options": Definition("FLIGHT_OPTIONS", 0.0, 0.0, 2.0**31 - 1.0),
-    "level_roll_limit": Definition("LEVEL_ROLL_LIMIT", 5.0, 0.0, 45.0, _DEGREE),
-    "rally_limit": Definition("RALLY_LIMIT_KM", 5.0, 0.0, 20_000.0, _KILOMETRE),
+    "level_roll_limit": Definition("LEVEL_ROLL_LIMIT", 5.0, 0.0, 45.0, _RAD_PER_DEG),
+    "rally_limit": Definition("RALLY_LIMIT_KM", 5.0, 0.0, 20_000.0, _M_PER_KM),
     "rally_includes_home": Definition("RALLY_INCL_HOME", 0.0, 0.0, 1.0),
     "rtl_autoland": Definition("RTL_AUTOLAND", 0.0, 0.0, 4.0),
     "flare_time": Definition("LAND_FLARE_SEC", 2.0, 0.0, 60.0),
     "flare_height": Definition("LAND_FLARE_ALT", 3.0, 0.0, 1000.0),
-    "flare_weight": Definition("LAND_FLARE_AIM", 50.0, 0.0, 100.0, _PERCENT),
+    "flare_weight": Definition("LAND_FLARE_AIM", 50.0, 0.0, 100.0, _PER_PERCENT),
     "landing_sink": Definition("TECS_LAND_SINK", 0.25, 0.0, 100.0),
     "landing_airspeed": Definition("TECS_LAND_ARSPD", -1.0, -1.0, 500.0),
-    "landing_head_wind": Definition("LAND_WIND_COMP", 50.0, 0.0, 100.0, _PERCENT),
+    "landing_head_wind": Definition("LAND_WIND_COMP", 50.0, 0.0, 100.0, _PER_PERCENT),
     "takeoff_acceleration": Definition("TKOFF_THR_MINACC", 0.0, 0.0, 100.0),
     "takeoff_delay": Definition("TKOFF_THR_DELAY", 2.0, 0.0, 127.0, 0.1),
     "takeoff_ground_speed": Definition("TKOFF_THR_MINSPD", 0.0, 0.0, 100.0),
     "takeoff_rotation": Definition("TKOFF_ROTATE_SPD", 0.0, 0.0, 100.0),
-    "takeoff_ground_pitch": Definition("TKOFF_GND_PITCH", 5.0, -10.0, 20.0, _DEGREE),
+    "takeoff_ground_pitch": Definition("TKOFF_GND_PITCH", 5.0, -10.0, 20.0, _RAD_PER_DEG),
     "takeoff_level_height": Definition("TKOFF_LVL_ALT", 5.0, 0.0, 1000.0),
     "takeoff_leveling": Definition("TKOFF_PLIM_SEC", 2.0, 0.0, 100.0),
-    "takeoff_slew": Definition("TKOFF_THR_SLEW", 0.0, -1.0, 127.0, _PERCENT),
-    "takeoff_throttle": Definition("TKOFF_THR_MAX", 0.0, 0.0, 100.0, _PERCENT),
-    "landing_pitch": Definition("LAND_PITCH_DEG", 0.0, -20.0, 20.0, _DEGREE, ("LAND_PITCH_CD", _CENTI)),
-    "landing_pitch_max": Definition("TECS_LAND_PMAX", 10.0, -5.0, 45.0, _DEGREE),
+    "takeoff_slew": Definition("TKOFF_THR_SLEW", 0.0, -1.0, 127.0, _PER_PERCENT),
+    "takeoff_throttle": Definition("TKOFF_THR_MAX", 0.0, 0.0, 100.0, _PER_PERCENT),
+    "landing_pitch": Definition("LAND_PITCH_DEG", 0.0, -20.0, 20.0, _RAD_PER_DEG, ("LAND_PITCH_CD", _PER_CENTI)),
+    "landing_pitch_max": Definition("TECS_LAND_PMAX", 10.0, -5.0, 45.0, _RAD_PER_DEG),
     "landing_speed_weight": Definition("TECS_LAND_SPDWGT", -1.0, -1.0, 2.0),
     "landing_time": Definition("TECS_LAND_TCONST", 2.0, 0.1, 20.0),
     "landing_sink_change": Definition("TECS_LAND_SRC", 0.0, -2.0, 2.0),
@@ -121,15 +121,17 @@ DEFINITIONS = {
     "quadplane": Definition("Q_ENABLE", 0.0, 0.0, 2.0),
     "rudder_only": Definition("RUDDER_ONLY", 0.0, 0.0, 1.0),
 }
-# Bit of FLIGHT_OPTIONS that has a return climb to its height before it turns.
+# Bit of FLIGHT_OPTIONS: an RTL climbs to its altitude before it turns.
 CLIMB_BEFORE_TURN = 1 << 4
-# Bits of TERRAIN_FOLLOW: every mode, and RTL.
-_FOLLOW_ALWAYS, _FOLLOW_HOME = 1 << 0, 1 << 4
-# Bits of FENCE_TYPE that are limits of its own, and not the mission's fence: altitudes and a circle about home.
-_OWN_FENCES = 0b1011
-# Of a loiter whose radius is stated as 1 m or less, m (ArduPlane's `LOITER_RADIUS_DEFAULT`).
-_USUAL_LOITER_RADIUS = 60.0
-# Read, and no flight of ours shows it: a return is on a slope where this would have it follow the terrain.
+# Bit of TERRAIN_FOLLOW: every mode.
+_FOLLOW_ALWAYS_BIT = 1 << 0
+# Bit of TERRAIN_FOLLOW: RTL.
+_FOLLOW_HOME_BIT = 1 << 4
+# Bits of FENCE_TYPE for ArduPlane's own limits, not the mission's fence: altitudes and a circle about home.
+_OWN_FENCE_BITS = 0b1011
+# Radius of a loiter whose radius is stated as 1 m or less, m (ArduPlane's `LOITER_RADIUS_DEFAULT`).
+_DEFAULT_LOITER_RADIUS_M = 60.0
+# Parameters that are read but not flown: an RTL is flown on a slope where this would make it follow the terrain.
 NOT_FLOWN = ("TERRAIN_FOLLOW",)
 ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS)
 # Parameters that should not fall from one to the next; ArduPlane does not compare them.
@@ -146,7 +148,7 @@ TABLE = ParameterTable(ARDUPILOT, "ArduPlane", DEFINITIONS, pairs=_PAIRS, orders
 
 @dataclass(frozen=True, slots=True)
 class ArduPilotParameters(ParameterSet):
-    r"""The parameters that ArduPlane flies with; the fields are those of `DEFINITIONS`, made of ``values``.
+    r"""Parameters with which ArduPlane flies; the fields of `DEFINITIONS` are computed from ``values``.
 
     >>> default = ArduPilotParameters.defaults()
     >>> default.wp_radius, default.tecs_height_demand_time
@@ -162,49 +164,52 @@ class ArduPilotParameters(ParameterSet):
     ({'ROLL_LIMIT_DEG': 45.0}, ('WP_RADIUS -5 of the log is not allowed: the default is taken',))
 
     navl1_period: s.  navl1_xtrack_i: 1/s.
-    wp_radius: m, turns begin this far before a right angle.  wp_max_radius: m, 0 for none.
-    wp_loiter_rad: m, of a loiter that states none, negative to the left.
+    wp_radius: m, turns begin this far before a right angle.  wp_max_radius: m, 0 for no limit.
+    wp_loiter_rad: m, of a loiter that states no radius, negative to the left.
     roll_limit, pitch_limit_max, pitch_limit_min, pitch_trim: rad.
     roll_time, pitch_time: s, in which an attitude is to follow its demand.
     airspeed_cruise, airspeed_min, airspeed_max: m/s, equivalent airspeeds.
-    stall_prevention: 1 where a bank is narrowed, and the minimum airspeed raised, for the load in it; 0 where not.
+    stall_prevention: 1 if bank is limited, and minimum airspeed raised, for the load factor; 0 if not.
     throttle_min, throttle_max, throttle_cruise: 0..1.  throttle_slew: of the throttle's range, 1/s, 0 for no limit.
     glide_slope_min: m, a leg that climbs or sinks less is flown as a step.
-    glide_slope_threshold: m, so far above a climbing slope it is drawn anew, 0 for never.
+    glide_slope_threshold: m above a climbing slope at which the slope is redrawn, 0 for never.
     tecs_climb_max, tecs_sink_min, tecs_sink_max: m/s.
     tecs_time: s.  tecs_vertical_acceleration: m/s^2.  tecs_speed_frequency: rad/s.
-    tecs_roll_to_throttle: m/s climb that a bank of 45 degrees takes.
+    tecs_roll_to_throttle: m/s of climb that a bank of 45 degrees costs.
     tecs_pitch_max, tecs_pitch_min: rad, 0 for the pitch limits.
-    tecs_height_demand_time: s, of the height demand's lag.
-    rtl_altitude: m over home, negative for the present height.  rtl_radius: m, 0 for that of a loiter.
-    rtl_climb_min: m that a return climbs before it turns.  level_roll_limit: rad, its bank meanwhile.
-    flight_options: bits; bit 4 has a return climb to its height before it turns.
-    rally_limit: m, a nearest rally point further away than this is not flown to; 0 for no limit.
-    rally_includes_home: 1 where a return goes home if that is nearer than any rally point; 0 where not.
-    rtl_autoland: 0 where a return stays in its circle; 1 has it go on from there to the mission's landing sequence, 2
-        straight to it, 3 says that sequence is for go-arounds only, 4 goes by the mission's return path.
-    terrain_enable: 1 if it has heights of the terrain.  terrain_lookahead: m, the farthest that it looks ahead for
-        rising ground on a leg above ground; terrain_spacing: m, between the places there.
+    tecs_height_demand_time: s, lag of the altitude demand.
+    rtl_altitude: m over home, negative for the current altitude.  rtl_radius: m, 0 for wp_loiter_rad.
+    rtl_climb_min: m that an RTL climbs before it turns.  level_roll_limit: rad, its bank limit meanwhile.
+    flight_options: bits; with bit 4 an RTL climbs to its altitude before it turns.
+    rally_limit: m, the nearest rally point is not flown to if it is further away; 0 for no limit.
+    rally_includes_home: 1 if an RTL goes home when home is nearer than any rally point; 0 if not.
+    rtl_autoland: 0 if an RTL stays in its loiter; with 1 it continues to the mission's landing sequence, with 2 it goes
+        straight there; with 3 the sequence is for go-arounds only; with 4 it uses the mission's return path.
+    terrain_enable: 1 if it has terrain data.  terrain_lookahead: m, distance of the lookahead for rising ground on a
+        leg above terrain; terrain_spacing: m, between its samples.
     terrain_follow: bits of the modes that follow the terrain.
     low_voltage, critical_voltage: V.  low_charge, critical_charge: mAh; 0 or less triggers nothing.
-    flare_time: s before the touch-down that the glide aims to flare at.  flare_height: m; half the most that the flare
-        begins at.  flare_weight: share of the flare that is flown with the sink of its end.
+    flare_time: s before touchdown at which the glide aims to flare.  flare_height: m; half the maximum height of the
+        flare.  flare_weight: fraction of the flare that is flown with its final sink rate.
     landing_sink: m/s, at the flare's end.  landing_airspeed: m/s, negative for the mean of cruise and minimum.
-    landing_head_wind: share of the head wind by which that is raised, up to the cruise airspeed.
-    takeoff_acceleration: m/s^2 along the nose that starts the motor; 0 where it needs none.
+    landing_head_wind: fraction of the head wind that is added to that, up to the cruise airspeed.
+    takeoff_acceleration: m/s^2 along the nose that starts the motor; 0 if none is needed.
     takeoff_delay: s after that.
-    takeoff_ground_speed: m/s that it needs by then.  takeoff_rotation: m/s, until then the nose is at
-        takeoff_ground_pitch (rad).  takeoff_level_height: m, to which the bank of a take-off is level_roll_limit; it is
-        free at three times that.  takeoff_leveling: s before its end that a take-off begins to level off.
+    takeoff_ground_speed: m/s that is needed by then.  takeoff_rotation: m/s, up to which the nose is at
+        takeoff_ground_pitch (rad).  takeoff_level_height: m, up to which the bank of a take-off is level_roll_limit; it
+        is unrestricted at three times that.  takeoff_leveling: s before its end at which a take-off begins to level
+        off.
     takeoff_slew: of the throttle's range in a take-off, 1/s; 0 for throttle_slew, negative for no limit.
     takeoff_throttle: 0..1, 0 for throttle_max.
-    landing_pitch: rad, least of the flare.  landing_pitch_max: rad, its largest; 0 for that of flight.
-    landing_speed_weight: of TECS in a landing, negative for one that falls to 0 on its way.  landing_time: s, of TECS.
-    landing_sink_change: m/s of sink a metre beyond the landing point.  flare_holdoff: m, at which the sink is the last.
+    landing_pitch: rad, minimum in the flare.  landing_pitch_max: rad, maximum; 0 for pitch_limit_max.
+    landing_speed_weight: of TECS in a landing, negative for a weight that falls to 0 on the leg.
+    landing_time: s, of TECS.
+    landing_sink_change: m/s of sink rate for each metre beyond the landing point.  flare_holdoff: m, height at which
+        the final sink rate is reached.
     fence_type: bits of the limits that its fence has: 1 and 8 altitudes, 2 a circle about home, 4 the mission's fence.
-    altitude_offset: m, added to the altitudes of mission items.  soaring, quadplane, rudder_only: 1 where it soars, has
-        lift motors, or steers by the rudder alone; no flight shows any of these four.
-    throttle_failsafe to fence_auto_enable: when it leaves its mission by itself, and what it does then; see
+    altitude_offset: m, added to the altitudes of mission items.  soaring, quadplane, rudder_only: 1 if it soars, has
+        lift motors, or steers by the rudder alone; none of these four is flown.
+    throttle_failsafe to fence_auto_enable: causes to leave the mission, and the reactions; see
         `flight.autopilots.arduplane.failsafes`.
     """
 
@@ -308,17 +313,17 @@ class ArduPilotParameters(ParameterSet):
 
     @property
     def climbs_before_turn(self) -> bool:
-        """Whether a return climbs to its height before it turns: bit 4 of FLIGHT_OPTIONS."""
+        """True if an RTL climbs to its altitude before it turns: bit 4 of FLIGHT_OPTIONS."""
         return bool(int(self.flight_options) & CLIMB_BEFORE_TURN)
 
     @property
     def follows_terrain_home(self) -> bool:
-        """Whether a return follows the terrain: bit 0 or 4 of TERRAIN_FOLLOW.
+        """True if an RTL follows the terrain: bit 0 or 4 of TERRAIN_FOLLOW.
 
         >>> [ArduPilotParameters.defaults().changed(TERRAIN_FOLLOW=bits).follows_terrain_home for bits in (0, 1, 8, 16)]
         [False, True, False, True]
         """
-        return bool(int(self.terrain_follow) & (_FOLLOW_ALWAYS | _FOLLOW_HOME))
+        return bool(int(self.terrain_follow) & (_FOLLOW_ALWAYS_BIT | _FOLLOW_HOME_BIT))
 
     @property
     def has_fence_of_its_own(self) -> bool:
@@ -329,13 +334,13 @@ class ArduPilotParameters(ParameterSet):
         [False, True]
         """
         enabled = self.fence_enable > 0.0 or self.fence_auto_enable > 0.0
-        return enabled and self.fence_action > 0.0 and bool(int(self.fence_type) & _OWN_FENCES)
+        return enabled and self.fence_action > 0.0 and bool(int(self.fence_type) & _OWN_FENCE_BITS)
 
     @property
     def return_radius(self) -> float:
-        """Radius of the circle that a return ends in, m at sea level, negative to the left.
+        """Radius of the RTL loiter, m at sea level, negative to the left.
 
-        RTL_RADIUS, or WP_LOITER_RAD where that is 1 m or less, or 60 m where both are; to the side of RTL_RADIUS if
+        RTL_RADIUS, or WP_LOITER_RAD if RTL_RADIUS is 1 m or less, or 60 m if both are; to the side of RTL_RADIUS if
         that is not 0 (`ModeRTL::navigate` in ArduPlane/mode_rtl.cpp, `Plane::update_loiter` in navigation.cpp).
 
         >>> made = ArduPilotParameters.defaults()
@@ -345,16 +350,16 @@ class ArduPilotParameters(ParameterSet):
         (60.0, -60.0)
         """
         size = next((abs(radius) for radius in (self.rtl_radius, self.wp_loiter_rad) if abs(radius) > 1.0), None)
-        return math.copysign(size or _USUAL_LOITER_RADIUS, self.rtl_radius or self.wp_loiter_rad)
+        return math.copysign(size or _DEFAULT_LOITER_RADIUS_M, self.rtl_radius or self.wp_loiter_rad)
 
     @property
     def loiter_radius(self) -> float:
-        """Radius of a loiter that states none, m at sea level, negative to the left: WP_LOITER_RAD, or 60 m."""
+        """Default loiter radius, m at sea level, negative to the left: WP_LOITER_RAD, or 60 m."""
         size = abs(self.wp_loiter_rad)
-        return math.copysign(size if size > 1.0 else _USUAL_LOITER_RADIUS, self.wp_loiter_rad)
+        return math.copysign(size if size > 1.0 else _DEFAULT_LOITER_RADIUS_M, self.wp_loiter_rad)
 
     def record(self) -> Record:
-        """The parameters for compiled code, as a record of `ARDUPILOT_PARAMETERS`."""
+        """Return the parameters for compiled code, as a record of `ARDUPILOT_PARAMETERS`."""
         record: Record = np.zeros(1, ARDUPILOT_PARAMETERS)[0]
         for name in DEFINITIONS:
             setattr(record, name, getattr(self, name))
@@ -362,7 +367,7 @@ class ArduPilotParameters(ParameterSet):
 
 
 # ----------------------------------------------------------------------
-# Parameters that may decide a flight that fails, with the steps and ranges of the parameter reference.
+# Parameters that may cause a flight to fail, with the steps and ranges of the parameter reference.
 
 HEIGHT_CANDIDATES = (
     Candidate("TECS_HDEM_TCONST", 0.2, 1.0, "s"),
@@ -379,14 +384,14 @@ SIDE_CANDIDATES = (
 
 
 # ----------------------------------------------------------------------
-# Which of a mission's airspeeds ArduPlane takes up.
+# Airspeeds of a mission that ArduPlane accepts.
 
 
 def takes_speed(airspeed: float, parameters: ArduPilotParameters) -> bool:
-    """Whether ArduPlane takes a commanded airspeed (m/s, equivalent): from AIRSPEED_MIN to AIRSPEED_MAX.
+    """Return True if ArduPlane accepts a commanded airspeed (m/s, equivalent).
 
-    A command of another speed changes nothing: told to fly at 17 m/s with AIRSPEED_MIN at 18, ArduPlane 4.6 flew on at
-    its 25.
+    It accepts AIRSPEED_MIN to AIRSPEED_MAX.  A command of another speed changes nothing: commanded to fly at 17 m/s
+    with AIRSPEED_MIN at 18, ArduPlane 4.6 flew on at its 25 m/s.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> takes_speed(22.0, ArduPilotParameters.defaults()), takes_speed(22.1, ArduPilotParameters.defaults())
@@ -396,9 +401,9 @@ def takes_speed(airspeed: float, parameters: ArduPilotParameters) -> bool:
 
 
 def speeds_flown(commanded: Floats, cruise: float, parameters: ArduPilotParameters) -> Floats:
-    """Airspeeds (l,) that ArduPlane flies on each leg, of those commanded (l,); m/s, equivalent.
+    """Return the airspeeds (l,) that ArduPlane flies on each leg for commanded ones (l,); m/s, equivalent.
 
-    cruise: its airspeed until it takes up the first.
+    cruise: its airspeed until it accepts the first command.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> speeds_flown(np.array([8.0, 15.0, 30.0, 10.0]), 12.0, ArduPilotParameters.defaults()).tolist()

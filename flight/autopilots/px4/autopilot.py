@@ -1,4 +1,4 @@
-"""PX4's law for fixed wing as an autopilot, with the parameters that it flies by."""
+"""PX4's control law for fixed wing as an autopilot, with its parameters."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -29,20 +29,20 @@ from world.kernels import Record
 from world.scenario_tables import NEWEST_PX4, FlightTable, Navigation, Px4Version
 from world.wind import Turbulence
 
-# By RTL_TYPE: what of it is not flown.
-_OTHER_RETURNS = {
+# By RTL_TYPE: the part of it that is not flown.
+_RTL_TYPES_NOT_FLOWN = {
     2: "RTL_TYPE 2, along the mission to its landing or back: flown as 1, to the nearest rally point or home",
     3: "RTL_TYPE 3, to the nearest of home, rally points and the mission's landing: flown as 0, to no landing",
     4: "RTL_TYPE 4, along the mission to its landing or back: flown as 1, to the nearest rally point or home",
 }
 
-# What of `flight.autopilots.px4.law.PX4_MEMORY` belongs to the way that is flown, and not to the aircraft.
-_OF_THE_WAY = ("leg", "reached_for", "at_rim", "circling", "returning", "climbed", "finished", "waited")
+# Fields of `flight.autopilots.px4.law.PX4_MEMORY` that belong to the current leg or mission, not to the aircraft.
+_LEG_FIELDS = ("leg", "reached_for", "at_rim", "circling", "returning", "climbed", "finished", "waited")
 
 
 @dataclass(frozen=True)
 class Px4(Autopilot):
-    """PX4's law for fixed wing: NPFG along the legs, TECS for height and airspeed.
+    """PX4's control law for fixed wing: NPFG along the legs, TECS for altitude and airspeed.
 
     >>> made = Px4(Px4Parameters.defaults("1.16"))
     >>> made.acceptance_radius, Px4(Px4Parameters.defaults("1.17")).acceptance_radius
@@ -63,25 +63,25 @@ class Px4(Autopilot):
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """Return the autopilot with the parameters of the user's file, of the aircraft, and PX4's defaults."""
+        """Return the autopilot with the parameters of the user's file, of the aircraft, and the defaults."""
         return cls(Px4Parameters.load(aircraft, table.params, table.px4_version or NEWEST_PX4))
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
-        """With the parameters and the version that a log stores."""
+        """Return the autopilot with the parameters and the version that a log stores."""
         version = stored.version or NEWEST_PX4
         if stored.parameters is None:
             return cls(Px4Parameters.defaults())
         return cls(Px4Parameters.restore(stored.parameters, version))
 
     def store(self) -> StoredAutopilot:
-        """Its parameters and its version."""
+        """Return its parameters and its version for a log."""
         made = self.parameters
         stored = StoredParameters(made.values, made.unused, made.source)
         return StoredAutopilot(parameters=stored, version=made.version)
 
     def of_release(self, version: Px4Version) -> Self:
-        """Return the same autopilot with the law of another release of PX4."""
+        """Return the same autopilot with the control law of another PX4 release."""
         return replace(self, parameters=replace(self.parameters, version=version))
 
     @classmethod
@@ -92,23 +92,23 @@ class Px4(Autopilot):
 
     @property
     def tick(self) -> Tick:
-        """One tick of the law."""
+        """Compiled function for one tick of the law."""
         return px4_tick
 
     def begin(self, memory: Record, own: Record) -> None:
-        """Hand over the parameters."""
+        """Write the parameters into the memory."""
         own.parameters = self.parameters.record()
 
     def take_over(self, before: Record, own: Record, here: Floats) -> None:
-        """As a change of mode: energies and airspeed are kept, and the leg begins here."""
+        """Begin a new leg here, as after a change of mode: TECS and airspeed filter keep their state."""
         own.memory = before.memory
-        for name in _OF_THE_WAY:
+        for name in _LEG_FIELDS:
             setattr(own.memory, name, 0)
         own.memory.from_east, own.memory.from_north, own.memory.from_up = here
         own.memory.nearest, own.memory.begun_up = math.inf, here[2]
 
     def described(self, aircraft: str) -> str:
-        """The law with the parameters that decide most of a flight."""
+        """Return a description of the law with the parameters that matter most in a flight."""
         made = self.parameters
         whose = f"the parameters of {made.source}" if made.source else "its default parameters"
         return (
@@ -118,16 +118,16 @@ class Px4(Autopilot):
 
     @property
     def version(self) -> str:
-        """The release whose law it is."""
+        """PX4 release of the law."""
         return self.parameters.version
 
     @property
     def acceptance_radius(self) -> float | None:
-        """NAV_ACC_RAD; up to 1.16 guidance's own switch distance at sea level where that is more."""
+        """NAV_ACC_RAD, or up to 1.16 guidance's own switch distance at sea level if that is more."""
         return self.turn_distance(math.pi, 0.0)
 
     def settings_not_flown(self, *, returns: bool) -> list[str]:
-        """GF_MAX_HOR_DIST and GF_MAX_VER_DIST where GF_ACTION acts, and COM_FLT_TIME_MAX."""
+        """Return GF_MAX_HOR_DIST and GF_MAX_VER_DIST if GF_ACTION acts, and COM_FLT_TIME_MAX."""
         made, names = self.parameters, ["COM_FLT_TIME_MAX"]
         if made["GF_ACTION"] > 0.0:
             names += ["GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]
@@ -135,11 +135,14 @@ class Px4(Autopilot):
 
     @property
     def reads_acceptance(self) -> bool:
-        """The second parameter of a waypoint is for PX4's multicopters alone."""
+        """False: only PX4's multicopters read the second parameter of a waypoint."""
         return False
 
     def turn_distance(self, turn: float, amsl: float) -> float:
-        """How far before a waypoint it turns in still air, whatever the turn: up to 1.16 more in thin air, m."""
+        """Return the distance before a waypoint at which it turns in still air, for any turn, m.
+
+        Up to 1.16 it grows with altitude.
+        """
         made = self.parameters
         if not made.anticipates:
             return made["NAV_ACC_RAD"]
@@ -152,16 +155,17 @@ class Px4(Autopilot):
         return max(made["NAV_ACC_RAD"], round(min(MAX_SWITCH_DISTANCE, early), 6))
 
     def airspeed_factor(self, amsl: float) -> float:
-        """True by equivalent airspeed."""
+        """Return the ratio of true to equivalent airspeed."""
         return float(true_by_equivalent(amsl))
 
     @property
     def return_rules(self) -> ReturnRules:
-        """By RTL_RETURN_ALT, above a rally point as above home, RTL_LOITER_RAD and RTL_TYPE, however far that is.
+        """Rules of an RTL from RTL_RETURN_ALT, RTL_LOITER_RAD and RTL_TYPE, at any distance.
 
-        Facts of PX4's `src/modules/navigator/rtl.cpp`.  RTL_TYPE 0 is the nearest of home and the rally points; 1 (the
-        default of fixed wings) and 5 are the nearest rally point, and home where there is none.  The others, and 1,
-        know a mission's landing too, which is not flown to.
+        RTL_RETURN_ALT applies above a rally point as above home.  Follows PX4's
+        `src/modules/navigator/rtl.cpp`.  RTL_TYPE 0 is the nearest of home and the rally points; 1 (the default of
+        fixed wings) and 5 are the nearest rally point, or home if there is no rally point.  The other types, and 1,
+        also use a mission's landing, which is not flown to.
 
         >>> rules = Px4(Px4Parameters.defaults()).return_rules
         >>> rules.includes_home, rules.rally_height, rules.instead
@@ -178,12 +182,12 @@ class Px4(Autopilot):
             holds_height=True,
             rally_height=made["RTL_RETURN_ALT"],
             landing_counts=kind == 1,
-            instead=_OTHER_RETURNS.get(kind, ""),
+            instead=_RTL_TYPES_NOT_FLOWN.get(kind, ""),
         )
 
     @property
     def loiter_rules(self) -> LoiterRules:
-        """By NAV_LOITER_RAD, and the rates of its reference height, until it is within NAV_FW_ALT_RAD.
+        """Rules of loiters from NAV_LOITER_RAD, the reference climb and sink rates, and NAV_FW_ALT_RAD.
 
         >>> Px4(Px4Parameters.defaults()).loiter_rules.radius
         80.0
@@ -202,7 +206,9 @@ class Px4(Autopilot):
 
     @property
     def mission_checks(self) -> MissionChecks:
-        """By NAV_ACC_RAD, FW_LND_ANG and MIS_TKO_LAND_REQ, which a file of all parameters need not state.
+        """Mission checks from NAV_ACC_RAD, FW_LND_ANG and MIS_TKO_LAND_REQ.
+
+        A file with all parameters is taken to state MIS_TKO_LAND_REQ.
 
         >>> Px4(Px4Parameters.defaults()).mission_checks.requires
         2
@@ -213,45 +219,45 @@ class Px4(Autopilot):
 
     @property
     def speed_limits(self) -> SpeedLimits | None:
-        """FW_AIRSPD_MIN and FW_AIRSPD_MAX: of another speed it flies the nearer of them."""
+        """FW_AIRSPD_MIN and FW_AIRSPD_MAX; a speed outside is replaced by the nearer limit."""
         made = self.parameters
         low, high = made["FW_AIRSPD_MIN"], made["FW_AIRSPD_MAX"]
         return SpeedLimits(low, high, "FW_AIRSPD_MIN", "FW_AIRSPD_MAX", nearest=True)
 
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
-        """The commanded speeds within its limits."""
+        """Return the commanded speeds, clipped to its limits."""
         return np.clip(commanded, self.parameters["FW_AIRSPD_MIN"], self.parameters["FW_AIRSPD_MAX"])
 
     @property
     def stated_bank(self) -> float | None:
-        """FW_R_LIM of a person's file."""
+        """FW_R_LIM of the user's file, or None if the file does not state it."""
         return self.parameters["FW_R_LIM"] if "FW_R_LIM" in self.parameters.by_origin("file") else None
 
     @property
     def bank_limit(self) -> float:
-        """FW_R_LIM, whoever states it."""
+        """FW_R_LIM, from any source."""
         return self.parameters["FW_R_LIM"]
 
     def tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """How far its law strays with these parameters; it flies no waypoint over."""
+        """Return the deviations of its law with these parameters; it flies over no waypoint."""
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
     def off_height_chance(self, climb: float, sink: float, turbulence: Turbulence) -> float:
-        """More than NAV_FW_ALT_RAD, in moderate turbulence."""
+        """Return the probability of an altitude miss above NAV_FW_ALT_RAD, in moderate turbulence."""
         return off_height_chance(self.parameters["NAV_FW_ALT_RAD"], climb, sink, turbulence)
 
     def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
-        """It keeps its airspeed, and cannot sink faster than the aircraft does so."""
+        """Return the altitude gain in updrafts: it keeps its airspeed, and its sink rate is limited."""
         return height_in_updrafts(sink, turbulence)
 
     def as_asked(
         self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0
     ) -> Autopilot:
-        """With RTL_RETURN_ALT."""
+        """Return the autopilot with a scenario's RTL altitude as RTL_RETURN_ALT."""
         return self if rtl_altitude is None else Px4(self.parameters.changed(RTL_RETURN_ALT=rtl_altitude))
 
     def with_parameters(self, **values: float) -> "Px4":
-        """The law with other parameters."""
+        """Return the autopilot with other parameters."""
         return Px4(self.parameters.changed(**values))

@@ -1,10 +1,11 @@
-"""PX4's parameters that decide how a fixed wing flies a mission, in SI units and radians.
+"""PX4's parameters for fixed-wing missions, in SI units and radians.
 
-Names, units, ranges and defaults are those of PX4's parameter reference (docs.px4.io, v1.16 and v1.17), and of the
-`*_params.c` files beside the modules that read them.  PX4 itself enforces no range: what can be flown is taken, and
-said where it lies beyond the documented one (FW_R_LIM is documented from 35 degrees, and 30 is flown).  Of three
-sources the first that states a parameter counts: the file that a person gives, the aircraft, PX4.  What an aircraft is,
-its folder says once, in `ardupilot.parm`: `FROM_ARDUPILOT` lists which of those values are the same quantity in PX4.
+Names, units, ranges and defaults are from PX4's parameter reference (docs.px4.io, v1.16 and v1.17) and the `*_params.c`
+files next to the modules that read them.  PX4 itself enforces no range: a value outside the documented range is
+accepted and reported if it can be flown (FW_R_LIM is documented from 35 degrees, and 30 is flown).  A parameter is
+taken from the first source that states it: the user's file, the aircraft, PX4's defaults.  An aircraft's folder
+describes the aircraft once, in `ardupilot.parm`: `FROM_ARDUPILOT` lists which of those values are the same quantity in
+PX4.
 """
 
 import math
@@ -24,10 +25,10 @@ from world.scenario_tables import NEWEST_PX4, Px4Version
 
 _VERSIONS: tuple[Px4Version, ...] = get_args(Px4Version)
 
-_DEGREE = math.pi / 180.0
+_RAD_PER_DEG = math.pi / 180.0
 
 
-# By the field of `PX4_PARAMETERS`; those that are not flown at the end.
+# By the field of `PX4_PARAMETERS`; parameters that are not flown stand at the end.
 DEFINITIONS = {
     # Lateral guidance.
     "npfg_period": Definition("NPFG_PERIOD", 10.0, 0.5, 1000.0, documented=(1.0, 100.0)),
@@ -38,15 +39,15 @@ DEFINITIONS = {
     "npfg_switch_share": Definition("NPFG_SW_DST_MLT", 0.32, 0.0, 10.0, documented=(0.1, 1.0)),
     "npfg_period_safety": Definition("NPFG_PERIOD_SF", 1.5, 1.0, 10.0),
     "ground_speed_min": Definition("FW_GND_SPD_MIN", 5.0, 0.0, 40.0),
-    "roll_limit": Definition("FW_R_LIM", 50.0, 5.0, 85.0, _DEGREE, documented=(35.0, 75.0)),
-    "roll_slew": Definition("FW_PN_R_SLEW_MAX", 90.0, 0.0, 1000.0, _DEGREE),
+    "roll_limit": Definition("FW_R_LIM", 50.0, 5.0, 85.0, _RAD_PER_DEG, documented=(35.0, 75.0)),
+    "roll_slew": Definition("FW_PN_R_SLEW_MAX", 90.0, 0.0, 1000.0, _RAD_PER_DEG),
     "roll_time": Definition("FW_R_TC", 0.4, 0.02, 10.0, documented=(0.2, 1.0)),
-    "roll_rate_max": Definition("FW_R_RMAX", 70.0, 0.0, 720.0, _DEGREE, documented=(0.0, 180.0)),
-    # When it turns to the next waypoint.
+    "roll_rate_max": Definition("FW_R_RMAX", 70.0, 0.0, 720.0, _RAD_PER_DEG, documented=(0.0, 180.0)),
+    # Changes of waypoint.
     "acceptance": Definition("NAV_ACC_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
     "height_acceptance": Definition("NAV_FW_ALT_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
     "loiter_radius": Definition("NAV_LOITER_RAD", 80.0, -10_000.0, 10_000.0),
-    # Height and speed.
+    # Altitude and speed.
     "climb_reference": Definition("FW_T_CLMB_R_SP", 3.0, 0.1, 1000.0, documented=(0.5, 15.0)),
     "sink_reference": Definition("FW_T_SINK_R_SP", 2.0, 0.1, 1000.0, documented=(0.5, 15.0)),
     "climb_max": Definition("FW_T_CLMB_MAX", 5.0, 0.1, 100.0, documented=(1.0, 15.0)),
@@ -70,9 +71,9 @@ DEFINITIONS = {
     "airspeed_min": Definition("FW_AIRSPD_MIN", 10.0, 0.5, 500.0),
     "airspeed_trim": Definition("FW_AIRSPD_TRIM", 15.0, 0.5, 500.0),
     "airspeed_max": Definition("FW_AIRSPD_MAX", 20.0, 0.5, 500.0),
-    "pitch_limit_min": Definition("FW_P_LIM_MIN", -30.0, -80.0, 0.0, _DEGREE, documented=(-60.0, 0.0)),
-    "pitch_limit_max": Definition("FW_P_LIM_MAX", 30.0, 0.0, 80.0, _DEGREE, documented=(0.0, 60.0)),
-    "pitch_trim": Definition("FW_PSP_OFF", 0.0, -90.0, 90.0, _DEGREE),
+    "pitch_limit_min": Definition("FW_P_LIM_MIN", -30.0, -80.0, 0.0, _RAD_PER_DEG, documented=(-60.0, 0.0)),
+    "pitch_limit_max": Definition("FW_P_LIM_MAX", 30.0, 0.0, 80.0, _RAD_PER_DEG, documented=(0.0, 60.0)),
+    "pitch_trim": Definition("FW_PSP_OFF", 0.0, -90.0, 90.0, _RAD_PER_DEG),
     "pitch_time": Definition("FW_P_TC", 0.4, 0.02, 10.0, documented=(0.2, 1.0)),
     "throttle_trim": Definition("FW_THR_TRIM", 0.6, 0.0, 1.0),
     "throttle_min": Definition("FW_THR_MIN", 0.0, 0.0, 1.0),
@@ -82,9 +83,9 @@ DEFINITIONS = {
     "return_height": Definition("RTL_RETURN_ALT", 100.0, 0.0, 10_000.0),
     "return_radius": Definition("RTL_LOITER_RAD", 80.0, 1.0, 10_000.0),
     "return_type": Definition("RTL_TYPE", 1.0, 0.0, 5.0),
-    # What a mission is taken by.
+    # Checks of a mission.
     "mission_requires": Definition("MIS_TKO_LAND_REQ", 2.0, 0.0, 5.0),
-    "landing_angle": Definition("FW_LND_ANG", 5.0, 1.0, 45.0, _DEGREE),
+    "landing_angle": Definition("FW_LND_ANG", 5.0, 1.0, 45.0, _RAD_PER_DEG),
     # Not flown.
     "uses_airspeed": Definition("FW_USE_AIRSPD", 1.0, 0.0, 1.0),
     "keeps_ground_speed": Definition("NPFG_EN_MIN_GSP", 1.0, 0.0, 1.0),
@@ -106,10 +107,10 @@ DEFINITIONS = {
     "fence_height": Definition("GF_MAX_VER_DIST", 0.0, 0.0, 1e6),
     "longest_flight": Definition("COM_FLT_TIME_MAX", -1.0, -1.0, 1e6),
 }
-# Read, and no flight of ours shows what another value than PX4's own would do.
+# Parameters that are read, but no flight shows the effect of a value other than PX4's default.
 NOT_FLOWN = tuple(definition.name for definition in list(DEFINITIONS.values())[-19:])
-# A station saves every parameter of the vehicle, a thousand and more; a person writes down what is of interest.
-_WHOLE_SET = 300
+# From this number of parameters on, a file is a complete set: a ground station saves a thousand and more.
+_COMPLETE_SET_COUNT = 300
 # Parameters that should not fall from one to the next; PX4 warns of some and flies with them.
 _ORDERS = (
     ("FW_THR_MIN", "FW_THR_TRIM", "FW_THR_MAX"),
@@ -124,14 +125,14 @@ _PAIRS = (("FW_THR_MIN", "FW_THR_MAX"), ("FW_AIRSPD_MIN", "FW_AIRSPD_MAX"))
 
 PX4_PARAMETERS = record_dtype(
     *DEFINITIONS,
-    ("anticipates", np.bool_),  # whether guidance's own switch distance counts for the navigator: up to 1.16
-    # Gains (1/s, 1/s, 1/s^2, 1/s) of the airspeed filter: of its speed and of its rate, by what is amiss in each.
+    ("anticipates", np.bool_),  # True if the navigator uses guidance's own switch distance: up to 1.16
+    # Gains (1/s, 1/s, 1/s^2, 1/s) of the airspeed filter: of the speed and of its rate, by the error of each.
     "speed_by_speed",
     "speed_by_rate",
     "rate_by_speed",
     "rate_by_rate",
 )
-# ArduPlane's parameters of an aircraft that are PX4's by another name, and the factor to PX4's unit.
+# ArduPlane's parameters of an aircraft that PX4 has under another name, with the factor to PX4's unit.
 FROM_ARDUPILOT = {
     "AIRSPEED_CRUISE": ("FW_AIRSPD_TRIM", 1.0),
     "AIRSPEED_MIN": ("FW_AIRSPD_MIN", 1.0),
@@ -152,7 +153,7 @@ TABLE = ParameterTable(PX4, "PX4", DEFINITIONS, pairs=_PAIRS, orders=_ORDERS, lo
 
 @dataclass(frozen=True, slots=True)
 class Px4Parameters(ParameterSet):
-    r"""The parameters that PX4 flies with.
+    r"""Parameters with which PX4 flies.
 
     version: of PX4.
 
@@ -201,19 +202,19 @@ class Px4Parameters(ParameterSet):
 
     @property
     def is_whole_set(self) -> bool:
-        """Whether the file holds all parameters of a vehicle: one that it does not state is the release's own."""
-        return len(self.unused) + len(self.by_origin("file")) >= _WHOLE_SET
+        """True if the file is a complete set: a parameter that it does not state has the release's default."""
+        return len(self.unused) + len(self.by_origin("file")) >= _COMPLETE_SET_COUNT
 
     @property
     def anticipates(self) -> bool:
-        """Whether guidance's own switch distance counts for the navigator.
+        """True if the navigator uses guidance's own switch distance.
 
-        To 1.16 the position controller published it; 1.17 split that one into modules, and none of them does any more.
+        Up to 1.16 the position controller published it; 1.17 split the controller into modules that do not publish it.
         """
         return self.version == "1.16"
 
     def record(self) -> Record:
-        """The parameters for compiled code, as a record of `PX4_PARAMETERS`."""
+        """Return the parameters for compiled code, as a record of `PX4_PARAMETERS`."""
         record: Record = np.zeros(1, PX4_PARAMETERS)[0]
         for (field, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=True):
             setattr(record, field, parameter.value * definition.to_si)
@@ -224,17 +225,18 @@ class Px4Parameters(ParameterSet):
 
 
 def speed_filter_gains(speed: float, rate: float, process: float) -> tuple[float, float, float, float]:
-    """Gains of the airspeed filter: of the speed by an error of speed and of its rate, of the rate by the same.
+    """Return the gains of the airspeed filter: speed by errors of speed and rate, rate by the same.
 
-    speed, rate: standard deviations of the measured airspeed (m/s) and of its measured rate (m/s^2).  process: of the
-    noise that moves the rate, m/s^2.  They are the steady gains of a Kalman-Bucy filter on an integrator chain
-    (Kalman and Bucy 1961, J. Basic Eng. 83, 95-108), which is how PX4's parameters FW_T_SPD_* are described.
+    speed, rate: standard deviations of the measured airspeed (m/s) and of its measured rate (m/s^2).  process: standard
+    deviation of the noise that drives the rate, m/s^2.  They are the steady gains of a Kalman-Bucy filter on an
+    integrator chain (Kalman and Bucy 1961, J. Basic Eng. 83, 95-108), as PX4's parameters FW_T_SPD_* are described.
 
     >>> [round(gain, 2) for gain in speed_filter_gains(0.07, 0.2, 0.2)]
     [1.92, 0.26, 2.12, 0.67]
     """
     chain, precision = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([speed**-2.0, rate**-2.0])
-    # The Riccati equation by the stable eigenvectors of its Hamiltonian (Potter 1966, SIAM J. Appl. Math. 14, 496-501).
+    # Solve the Riccati equation by the stable eigenvectors of its Hamiltonian (Potter 1966, SIAM J. Appl. Math. 14,
+    # 496-501).
     hamiltonian = np.block([[chain.T, -precision], [-np.diag([0.0, process * process]), -chain]])
     roots, vectors = np.linalg.eig(hamiltonian)
     stable = vectors[:, roots.real < 0.0]
@@ -243,7 +245,7 @@ def speed_filter_gains(speed: float, rate: float, process: float) -> tuple[float
 
 
 # ----------------------------------------------------------------------
-# Parameters that may decide a flight that fails, with the steps and ranges of the parameter reference.
+# Parameters that may cause a flight to fail, with the steps and ranges of the parameter reference.
 
 HEIGHT_CANDIDATES = (
     Candidate("FW_T_CLMB_R_SP", 0.5, 6.0, "m/s"),
