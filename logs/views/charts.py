@@ -98,7 +98,7 @@ class Panel:
         return f"{self.title} ({self.unit})" if self.unit else self.title
 
     def has_values(self) -> bool:
-        """Whether any layer has a finite value."""
+        """Return True if any layer has a finite value."""
         return any(np.isfinite(layer.y).any() for layer in self.layers)
 
     def shown_span(self) -> tuple[float, float]:
@@ -200,7 +200,7 @@ def held_band(held: NDArray[np.bool_], along: Floats, span: tuple[float, float])
 
 
 def leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...]:
-    """Where each leg begins along an axis (t,), and its name.  legs: (t,) number of each row's leg."""
+    """Return the start of each leg along an axis (t,), and its name.  legs: (t,) number of each row's leg."""
     starts = [0, *(np.flatnonzero(np.diff(legs)) + 1).tolist()]
     return tuple((float(along[row]), f"leg {legs[row]}") for row in starts)
 

@@ -238,7 +238,7 @@ def _handle(kind: LayerKind, role: str, text: str) -> Any:
 
 
 def _hidden(projection: Projection, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:
-    """Whether the ground stands between each point (n, 3) and the viewer."""
+    """Return whether the ground hides each point (n, 3) from the viewer."""
     hidden = np.zeros(len(points), dtype=bool)
     if terrain is None:
         return hidden

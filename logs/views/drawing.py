@@ -481,7 +481,7 @@ def draw_legend(figure: Figure, handles: list[Any], left: float, top: float, col
 
 
 def _columns(entries: Sequence[LegendEntry]) -> int:
-    """How many columns of a legend fit into a picture: four at most."""
+    """Return the number of columns of a legend that fit into a picture, at most four."""
     for columns in (4, 3, 2):
         rows = -(-len(entries) // columns)
         widest = [max(len(e.text[:36]) for e in entries[k : k + rows]) for k in range(0, len(entries), rows or 1)]

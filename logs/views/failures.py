@@ -1,4 +1,4 @@
-"""Where a verdict's failures lie on a route, how a chart names them, and how far along it a flight has come."""
+"""Places of a verdict's failures on a route, their names in charts, and the progress of a flight along the route."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ from logs.views.charts import Floats, Label
 from world.geometry import leg_runs
 from world.threats import Threats
 
-# More labels than these would cover what they tell of.
+# More labels than these would cover the places that they describe.
 _MAX_LABELS = 16
 
 
@@ -38,7 +38,7 @@ class Failures:
         return bool(self.legs or self.waypoints or self.threats)
 
     def name(self, kind: PlaceKind, number: int) -> str:
-        """What the verdict calls a leg or a waypoint.
+        """Return the name of a leg or a waypoint in the verdict.
 
         >>> Failures({7: ("slope",)}, {}, places={("leg", 7): Place("leg", 7, to_item=9)}).name("leg", 7)
         'leg 7, to item 9'
@@ -66,7 +66,7 @@ def failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
 
 
 def _rules_at(failed: list[Finding], kind: PlaceKind, count: int) -> dict[int, tuple[str, ...]]:
-    """Rules that failed at the first so many places of a kind, by the place's number."""
+    """Return the rules that failed at the first `count` places of a kind, by number of the place."""
     found: dict[int, list[str]] = {}
     for finding in failed:
         place = finding.place
@@ -103,7 +103,7 @@ def route_samples(waypoints: Floats, step: float) -> tuple[Floats, Floats]:
 
 
 def paths_differ(a: Floats, b: Floats, tolerance: float) -> bool:
-    """Whether a corner of one path lies further than `tolerance` (m) from the other; order along it is not looked at.
+    """Return True if a corner of one path is further than `tolerance` (m) from the other, in any order.
 
     a, b: (n, 3) and (m, 3) m.
     """
@@ -124,7 +124,7 @@ def _farthest(points: Floats, path: Floats) -> float:
 
 
 def track_distance(waypoints: Floats, track: Track) -> Floats:
-    """How far along the route each row of a track is, (t,) m, never falling.
+    """Return the distance along the route of each row of a track, (t,) m, never decreasing.
 
     A row is projected onto its active leg and held between that leg's ends; a row without a position keeps the
     distance reached before it.
@@ -141,7 +141,7 @@ def track_distance(waypoints: Floats, track: Track) -> Floats:
 
 
 def fail_labels(failed: Failures, corners: Floats, threats_at: Mapping[int, tuple[float, float]]) -> tuple[Label, ...]:
-    """Name the rules that fail beside the first failing legs, threats and waypoints, as the verdict names those.
+    """Name the failing rules at the first failing legs, threats and waypoints, as in the verdict.
 
     corners: (w, 2) drawn positions of the route's waypoints.  threats_at: of threats by their index; others get none.
     """
@@ -155,7 +155,7 @@ def fail_labels(failed: Failures, corners: Floats, threats_at: Mapping[int, tupl
 
 
 def radius_of(threats: Threats, place: Place) -> float:
-    """Radius (m) of the sphere that a failing place is: a missile's or a radar's."""
+    """Return the radius (m) of the missile or radar sphere of a failing place."""
     radii = threats.kill_radius if place.kind == "missile" else threats.detection_radius
     return float(radii[place.index or 0])
 

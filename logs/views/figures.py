@@ -36,7 +36,7 @@ View = Chart | MapChart | SceneView
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """What figures are drawn of.
+    """Data that figures are drawn of.
 
     setup: with the mission's fence among the zones.
     track: with at least one row; None for a plan that was not flown.
@@ -283,7 +283,7 @@ FIGURES = (
 def subject_of(
     setup: FlightSetup, track: Track | None, verdict: Verdict, returns: DrawnReturns | None = None
 ) -> Subject:
-    """What figures are drawn of; a track without a row is none."""
+    """Return the data for figures; a track without rows is left out."""
     return Subject(with_fence_zones(setup), track if track is not None and len(track) else None, verdict, returns)
 
 

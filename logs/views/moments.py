@@ -54,7 +54,7 @@ def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", rol
 
 
 def leg_names(setup: FlightSetup) -> list[str]:
-    """What each leg is called, with the mission item that it leads to.
+    """Return the name of each leg, with the mission item that it leads to.
 
     >>> from logs.recording.example_log import example_log
     >>> leg_names(example_log().setup)[0]
@@ -68,7 +68,7 @@ def leg_names(setup: FlightSetup) -> list[str]:
 
 
 def waypoint_names(setup: FlightSetup) -> list[str]:
-    """What each waypoint is called, with its mission item and height."""
+    """Return the name of each waypoint, with its mission item and altitude."""
     heights, numbers = setup.shown_waypoints[:, 2].tolist(), setup.route.stops.tolist()
     return [
         f"{place_text(Place('waypoint', k, item=_known(item), number=numbers[k]))}\n{heights[k]:.0f} m AMSL"

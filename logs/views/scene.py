@@ -20,7 +20,7 @@ MISSING = 65535
 
 @dataclass(frozen=True, slots=True)
 class SceneView:
-    """What the 3-D picture and the page's 3-D view show.
+    """Data of the 3-D picture and of the 3-D view of the page.
 
     setup: with the mission's fence among the zones.  track: None for a plan that was not flown.
     """
@@ -63,7 +63,7 @@ def ground_grid(terrain: Terrain | None, bounds: Floats, most: int) -> GroundGri
 
 
 def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) -> float:
-    """How many times heights are stretched, so that they show: 1, 1.5, 2 or 3."""
+    """Return the factor by which heights are stretched to be visible: 1, 1.5, 2 or 3."""
     up = setup.route.waypoints[:, 2]
     low, high = float(up.min()), float(up.max())
     if grid is not None:

@@ -114,7 +114,7 @@ def sphere_cuts(centre: Floats, radius: float, points: Floats) -> tuple[Floats, 
 def outline_anchor(
     kilometres: Floats, lower: Floats, upper: Floats, low: Floats, high: float
 ) -> tuple[float, float, tuple[int, int]] | None:
-    """Where a name touches a sphere's cut inside a picture from low to high (m AMSL): its top, foot or left side.
+    """Find where a name touches the section of a sphere inside a picture from low to high (m AMSL).
 
     kilometres, lower, upper: (s,), NaN where no sphere stands; low: (s,), the ground where that hides it.  Returns km,
     m AMSL and the side of the name; None where nothing of the outline is in the picture.
@@ -156,7 +156,7 @@ class PathPlane:
 
 
 def threat_cuts(threats: Threats, plane: PathPlane, named: frozenset[int]) -> tuple[list[Layer], list[Label]]:
-    """What missile and radar spheres take of the plane, radars first, and their names, once for each unit.
+    """Return the sections of missile and radar spheres, radars first, and their names, once for each unit.
 
     named: threats that have labels of their own.
     """
@@ -252,7 +252,7 @@ def zone_names(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
 
 @dataclass(frozen=True, slots=True)
 class ZoneCut:
-    """What a zone forbids of the vertical plane through a path.
+    """Part of the vertical plane through a path that a zone forbids.
 
     zone: which one.
     bottom, top: (s,) m AMSL at each of the path's samples.
@@ -266,7 +266,7 @@ class ZoneCut:
 
 
 def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
-    """What zones forbid of the plane; nothing of those away from the path."""
+    """Return the sections of zones in the plane, without zones away from the path."""
     low, high, points = plane.low, plane.high, plane.points
     under = np.full(len(points), low)
     if plane.ground is not None:
@@ -285,7 +285,7 @@ def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
 
 
 def zone_bands(zones: tuple[Zone, ...], plane: PathPlane) -> tuple[list[Layer], list[Label]]:
-    """What zones forbid of the plane, and the names of those to keep out of, in the middle of each."""
+    """Return the sections of zones in the plane, and the names of exclusion zones, in the middle of each."""
     layers, labels = [], []
     for cut in zone_cuts(zones, plane):
         keep_out = cut.zone.kind == "exclusion"

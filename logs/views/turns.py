@@ -24,7 +24,7 @@ PLACE_PANELS = (
 
 @dataclass(frozen=True, slots=True)
 class PlaceValue:
-    """What a finding says of one waypoint or leg, in its unit; NaN for what it does not say."""
+    """Values of a finding at one waypoint or leg, in its unit; NaN if not stated."""
 
     number: int
     planned: float
@@ -34,7 +34,7 @@ class PlaceValue:
 
 
 def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
-    """List a rule's findings by the number of their waypoint or leg; those of the whole flight are left out."""
+    """List a rule's findings by number of waypoint or leg, without findings of the whole flight."""
     found = []
     for finding in findings:
         place = finding.place

@@ -127,13 +127,13 @@ class _Probe:
 
 
 def is_flying_wing(aircraft: Aircraft) -> bool:
-    """Whether a model has elevons: mixed from elevator and aileron in the model itself."""
+    """Return True if a model has elevons: mixed from elevator and aileron in the model itself."""
     root = _model(aircraft)
     return root is not None and any(one.get("name") == "elevon/left-rad" for one in root.iter("actuator"))
 
 
 def _reacts(aircraft: Aircraft) -> bool:
-    """Whether a model has the reaction to the propeller's torque; those of flying wings leave it out."""
+    """Return True if a model has the reaction to propeller torque; models of flying wings leave it out."""
     root = _model(aircraft)
     reactions = None if root is None else root.find("external_reactions")
     return reactions is None or reactions.find("moment") is not None

@@ -1,4 +1,4 @@
-"""What an estimate says that cannot be: outputs that seem reversed, values at their bounds, a mass that changes."""
+"""Checks of an estimate for impossible results: reversed outputs, values at their bounds, a changing mass."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import INDEX, PARAMETERS
 from world.errors import LogError
 
-# Parameters whose sign is that of an output, and the control.
+# Parameters whose sign depends on the sense of an output, and the control.
 _POWERS = {"aileron-power": "aileron", "elevator-power": "elevator", "rudder-power": "rudder"}
 # Share of an interval that is the log's from which on a sign counts.
 _KNOWN = 0.3

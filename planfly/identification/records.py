@@ -178,7 +178,7 @@ def recording_setting(log: MotionLog) -> str:
 
 
 def _recording(log: MotionLog) -> str:
-    """What would record it."""
+    """Describe the setting that would record it."""
     if log.program_kind == "px4":
         return f"{recording_setting(log)}, the default set at a high rate, records them (PX4 1.14 or later)"
     mask = log.parameters.get("LOG_BITMASK")
@@ -206,7 +206,7 @@ def _first(log: MotionLog, function: int) -> int:
 
 
 def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
-    """Which output moves what, by SERVOn_*: full travel is the base's largest deflection.
+    """Assign servo outputs to controls by SERVOn_*: full travel is the base's largest deflection.
 
     More microseconds are roll to the right, nose up and yaw to the right in ArduPlane; the model's elevator and rudder
     count the other way.  Elevons are there as `LEFT` and `RIGHT`, trailing edge down, in place of elevator and aileron.
@@ -286,7 +286,7 @@ def _has_current(log: MotionLog) -> bool:
 
 
 def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
-    """Where lifting motors ran or a mode of theirs was set."""
+    """Return the rows at which lifting motors ran or one of their modes was set."""
     rows = np.zeros(len(grid), np.bool_)
     for (start, number), (end, _) in zip(log.modes, (*log.modes[1:], (np.inf, 0)), strict=False):
         if number in _VTOL_MODES:

@@ -1,7 +1,7 @@
-"""A log played to Foxglove over a WebSocket that only this machine reaches.
+"""Play a log to Foxglove over a WebSocket that only this machine can reach.
 
-The server is foxglove-sdk's: it speaks the WebSocket subprotocol `foxglove.sdk.v1` alone, and refuses a viewer that
-asks for its older name `foxglove.websocket.v1`.  It asks nobody where he is from: a gate stands before it.
+The server is foxglove-sdk's server: it speaks only the WebSocket subprotocol `foxglove.sdk.v1`, and refuses a viewer
+that requests the older name `foxglove.websocket.v1`.  It does not check origins: a gate precedes it.
 """
 
 import contextlib
@@ -22,10 +22,12 @@ from world.running_clock import RunningClock
 Stopped = Callable[[], bool]
 OnMessage = Callable[[str], None]
 
-# What the server of foxglove-sdk speaks.
+# Subprotocol of the server of foxglove-sdk.
 SUBPROTOCOL = "foxglove.sdk.v1"
-# Time between looks at the clock and at who is listening, s, and until a new subscription is active, s.
-_POLL, _SUBSCRIBING = 0.005, 0.05
+# Interval between checks of the clock and of the listeners, s.
+_POLL_INTERVAL_S = 0.005
+# Time until a new subscription is active, s.
+_SUBSCRIPTION_DELAY_S = 0.05
 
 
 def play_to_foxglove(
@@ -42,10 +44,10 @@ def play_to_foxglove(
 ) -> None:
     """Play a log's messages from ``start`` to ``end`` (s) to the clients of a Foxglove server.
 
-    allowed: origins of web pages that are let in beside those of `planfly.replays.origin_gate.VIEWERS`.
+    allowed: origins of web pages that are accepted in addition to `planfly.replays.origin_gate.VIEWERS`.
 
-    It waits for the first client that subscribes, ``wait`` s at most; a later one is sent the scenes as they are then.
-    Raises FlightError where nobody comes in time, OSError for a port in use.
+    Wait for the first client that subscribes, ``wait`` s at most; a later client is sent the present scenes.
+    Raises FlightError if no client subscribes in time, OSError for a port in use.
     """
     import foxglove
 
@@ -63,7 +65,7 @@ def play_to_foxglove(
 
 
 def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: OriginGate) -> Any:
-    """The server behind the gate, which lets any page in: its certificate is one that no browser trusts."""
+    """Start the server behind the gate; no browser trusts its certificate, so no page bypasses the gate."""
     certificate = temporary_certificate()
     try:
         server = foxglove.start_server(
@@ -81,7 +83,7 @@ def _wait(broadcast: "_Broadcast", timeout: float | None, stopped: Stopped) -> N
     while not broadcast.listeners and not stopped():
         if timeout is not None and waited() > timeout:
             raise FlightError.of_argument("foxglove", timeout, f"nobody has subscribed within {timeout:g} s", shown="")
-        time.sleep(_POLL)
+        time.sleep(_POLL_INTERVAL_S)
 
 
 def _play(
@@ -94,7 +96,7 @@ def _play(
         first = message.log_time if first is None else first
         while (ahead := (message.log_time - first) / 1e9 / speed - played()) > 0.0 and not stopped():
             broadcast.catch_up()
-            time.sleep(min(ahead, _POLL))
+            time.sleep(min(ahead, _POLL_INTERVAL_S))
         if stopped():
             return
         # An event that was noted afterwards stands later in the file than its time.
@@ -102,14 +104,14 @@ def _play(
             newest = message.log_time
             server.broadcast_time(newest)
         broadcast.show(message)
-    # What is under way, and who came last, is served before the server goes.
-    time.sleep(2.0 * _SUBSCRIBING)
+    # Serve pending messages and the last subscribers before the server ends.
+    time.sleep(2.0 * _SUBSCRIPTION_DELAY_S)
     broadcast.catch_up()
-    time.sleep(_SUBSCRIBING)
+    time.sleep(_SUBSCRIPTION_DELAY_S)
 
 
 class _Broadcast:
-    """The log's topics, the newest message of each scene, and who listens: a listener in Foxglove's sense."""
+    """Topics of the log, the newest message of each scene, and the subscribers: a listener in Foxglove's sense."""
 
     def __init__(self, foxglove: Any, channels: list[LogChannel]) -> None:
         self.context = foxglove.Context()
@@ -124,12 +126,12 @@ class _Broadcast:
             for kind in channels
         }
         self._scenes: dict[str, LogMessage] = {}
-        # Filled by the server's thread: when, and which topic.
+        # Filled by the thread of the server: time and topic.
         self._arrivals: SimpleQueue[tuple[float, str]] = SimpleQueue()
         self._waiting: list[tuple[float, str]] = []
 
     def up_to(self, messages: Iterator[LogMessage], start_ns: int) -> Iterator[LogMessage]:
-        """Take what was before ``start_ns`` as known, and give the rest."""
+        """Record the messages before ``start_ns`` as scenes, and return the rest."""
         for message in messages:
             if message.log_time >= start_ns:
                 return itertools.chain([message], messages)
@@ -137,7 +139,7 @@ class _Broadcast:
         return iter(())
 
     def show(self, message: LogMessage) -> None:
-        """Send a message to those who listen."""
+        """Send a message to the subscribers."""
         self.catch_up()
         self._note(message)
         channel = self._channels.get(message.channel.topic)
@@ -145,25 +147,25 @@ class _Broadcast:
             channel.log(message.data, log_time=message.log_time)
 
     def catch_up(self) -> None:
-        """Send those who have just subscribed the scenes as they are."""
+        """Send the present scenes to new subscribers."""
         while not self._arrivals.empty():
             self._waiting.append(self._arrivals.get())
         now = time.monotonic()
         for came, topic in self._waiting:
             scene = self._scenes.get(topic)
-            if scene is not None and now - came >= _SUBSCRIBING:
+            if scene is not None and now - came >= _SUBSCRIPTION_DELAY_S:
                 self._channels[topic].log(scene.data, log_time=scene.log_time)
-        self._waiting = [item for item in self._waiting if now - item[0] < _SUBSCRIBING]
+        self._waiting = [item for item in self._waiting if now - item[0] < _SUBSCRIPTION_DELAY_S]
 
     def _note(self, message: LogMessage) -> None:
         if message.channel.topic.startswith(("/scene/", "/points/")):
             self._scenes[message.channel.topic] = message
 
     def on_subscribe(self, client: Any, channel: Any) -> None:
-        """Note that somebody has come for a topic."""
+        """Record a new subscriber of a topic."""
         self._arrivals.put((time.monotonic(), channel.topic))
         self.listeners += 1
 
     def on_unsubscribe(self, client: Any, channel: Any) -> None:
-        """Count a listener less."""
+        """Decrease the number of subscribers."""
         self.listeners -= 1

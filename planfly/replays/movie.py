@@ -22,22 +22,22 @@ from world.errors import PlanflyError
 from world.extras import need_extra
 from world.files import temporary_folder, write_whole
 
-# A film lasts this long unless a speed is given, s.
-_LASTS = 20.0
+# Duration of a film without a given speed, s.
+_DEFAULT_DURATION_S = 20.0
 _MAX_FRAMES = 5000
-# The last frame of a GIF stands, ms.
-_REST = 2000
-# The colour number that lets the frame before show.
-_CLEAR = 255
+# Duration of the last frame of a GIF, ms.
+_LAST_FRAME_MS = 2000
+# Color number of transparent pixels, which show the previous frame.
+_TRANSPARENT = 255
 SUFFIXES = (".gif", ".mp4")
 
 
 def write_movie(
     log: FlightLog, target: Path, start: float, end: float, *, speed: float | None, overwrite: bool
 ) -> list[Path]:
-    """Write a .gif or .mp4 file, or a folder for frame-0000.png and on.
+    """Write a .gif or .mp4 file, or a folder of frame-0000.png and so on.
 
-    start, end: of the flight, s.  speed: times real time; None for a film of 20 s.
+    start, end: of the flight, s.  speed: ratio to real time; None for a film of 20 s.
     Raises PlanflyError for a target that exists, too many frames, and an .mp4 without ffmpeg and the extra ``films``.
     """
     kind = target.suffix.lower()
@@ -49,7 +49,7 @@ def write_movie(
     else:
         refuse_folder(target, overwrite)
     program = _ffmpeg(target) if kind == ".mp4" else ""
-    film = MovieFrames(log.setup, log.track, start, end, speed or max(1.0, (end - start) / _LASTS))
+    film = MovieFrames(log.setup, log.track, start, end, speed or max(1.0, (end - start) / _DEFAULT_DURATION_S))
     if len(film) > _MAX_FRAMES:
         allowed = f"{len(film):,} frames: at most {_MAX_FRAMES:,}; raise `speed`"
         raise PlanflyError.of_argument("movie", len(film), allowed, shown="", file=target)
@@ -67,7 +67,7 @@ def _shown(film: MovieFrames) -> Iterator[Image.Image]:
 
 
 def _write_folder(folder: Path, film: MovieFrames) -> list[Path]:
-    """Write the frames, which are ours to replace, one file each."""
+    """Write the frames, one file each, and replace old frames."""
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("frame-[0-9][0-9][0-9][0-9].png"):
         old.unlink()
@@ -80,53 +80,53 @@ def _write_folder(folder: Path, film: MovieFrames) -> list[Path]:
     return files
 
 
-def _colours(frame: Image.Image) -> Image.Image:
-    """An image whose palette holds the colours that pictures draw in, as they are, and the frame's others, blended.
+def _make_palette(frame: Image.Image) -> Image.Image:
+    """Make an image whose palette holds the drawing colors exactly, and a blend of the other colors of the frame.
 
-    Of few colours chosen by area alone, thin lines and small marks would lose theirs to the ground.
+    With few colors chosen by area alone, thin lines and small marks would take the colors of the ground.
     """
     kept = [ImageColor.getrgb(colour)[:3] for colour in drawn_colours()]
-    blended = frame.quantize(_CLEAR - len(kept), dither=Image.Dither.NONE).getpalette() or []
-    palette = [part for colour in kept for part in colour] + blended[: 3 * (_CLEAR - len(kept))]
+    blended = frame.quantize(_TRANSPARENT - len(kept), dither=Image.Dither.NONE).getpalette() or []
+    palette = [part for colour in kept for part in colour] + blended[: 3 * (_TRANSPARENT - len(kept))]
     holder = Image.new("P", (1, 1))
-    # What is left of 256 repeats the first.
+    # The rest of the 256 entries repeats the first.
     holder.putpalette(palette + palette[:3] * (256 - len(palette) // 3))
     return holder
 
 
-def _in_colours(frame: Image.Image, palette: Image.Image) -> Image.Image:
-    """The frame in the palette's colours; none of its pixels has the number that lets the frame before show."""
+def _apply_palette(frame: Image.Image, palette: Image.Image) -> Image.Image:
+    """Return the frame in the colors of the palette, without transparent pixels."""
     image = frame.quantize(palette=palette, dither=Image.Dither.NONE)
     numbers = np.asarray(image)
-    same = Image.fromarray(np.where(numbers == _CLEAR, 0, numbers).astype(np.uint8))
+    same = Image.fromarray(np.where(numbers == _TRANSPARENT, 0, numbers).astype(np.uint8))
     same.putpalette(palette.getpalette() or [])
     return same
 
 
 def _gif(film: MovieFrames) -> bytes:
-    """All frames in the same colours, so that nothing flickers; a frame holds only what has changed."""
+    """Encode all frames in the same colors, against flicker; a frame holds only changed pixels."""
     images = _shown(film)
     start = next(images)
-    palette = _colours(start)
-    first = _in_colours(start, palette)
+    palette = _make_palette(start)
+    first = _apply_palette(start, palette)
     before, rest = np.asarray(first), []
     for image in images:
-        now = np.asarray(_in_colours(image, palette))
-        rest.append(Image.fromarray(np.where(now == before, _CLEAR, now).astype(np.uint8)))
+        now = np.asarray(_apply_palette(image, palette))
+        rest.append(Image.fromarray(np.where(now == before, _TRANSPARENT, now).astype(np.uint8)))
         rest[-1].putpalette(first.getpalette() or [])
-        rest[-1].info["transparency"] = _CLEAR
+        rest[-1].info["transparency"] = _TRANSPARENT
         before = now
     data = io.BytesIO()
-    durations = [round(1000 / RATE)] * len(rest) + [_REST]
+    durations = [round(1000 / RATE)] * len(rest) + [_LAST_FRAME_MS]
     first.save(
         data, "GIF", save_all=True, append_images=rest, duration=durations, loop=0, optimize=False, disposal=1,
-        transparency=_CLEAR,
+        transparency=_TRANSPARENT,
     )  # fmt: skip
     return data.getvalue()
 
 
 def _ffmpeg(target: Path) -> str:
-    """The encoder: ffmpeg on the path, else that of the extra.  Raises MissingExtraError where there is neither."""
+    """Return the encoder: ffmpeg on the path, or from the extra.  Raises MissingExtraError without either."""
     found = shutil.which("ffmpeg")
     if found is not None:
         return found
@@ -137,7 +137,7 @@ def _ffmpeg(target: Path) -> str:
 
 
 def _mp4(film: MovieFrames, program: str) -> bytes:
-    """Frames through ffmpeg, as raw pixels on its input.  Raises OSError with its last words if it fails."""
+    """Encode frames by ffmpeg, as raw pixels on its input.  Raises OSError with its last line if it fails."""
     frames = film.frames()
     first = next(frames)
     height, width = first.shape[:2]
@@ -152,7 +152,7 @@ def _mp4(film: MovieFrames, program: str) -> bytes:
             subprocess.Popen(command, stdin=subprocess.PIPE, stderr=messages) as encoder,
         ):
             entry = encoder.stdin
-            # Where it ends before us, its status gives the reason.
+            # If ffmpeg ends early, its status gives the reason.
             with contextlib.suppress(BrokenPipeError):
                 for number, frame in enumerate(itertools.chain([first], frames), 1):
                     if entry is not None:

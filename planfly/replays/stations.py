@@ -1,4 +1,4 @@
-"""A log played into ground stations, as if it were flown now."""
+"""Play a log to ground stations as a live flight."""
 
 import time
 from collections.abc import Callable
@@ -32,7 +32,7 @@ OnMessage = Callable[[str], None]
 def play_to_stations(
     log: FlightLog, access: Access, *, speed: float, wait: float, stopped: Stopped, on_message: OnMessage
 ) -> None:
-    """Play a log to ground stations, as if it were flown now.  Raises FlightError if none answers in ``wait`` s."""
+    """Play a log to ground stations as a live flight.  Raises FlightError if none answers in ``wait`` s."""
     link = Link(access)
     snapshots = SnapshotMaker(log.setup, LocalMap.around(log.setup))
     track = log.track
@@ -77,7 +77,7 @@ class _Player:
         self._texts = 0
 
     def announce(self, text: str) -> None:
-        """Send a text to the stations, and on_message it here."""
+        """Send a text to the stations and to on_message."""
         self._on_message(text)
         self._texts += 1
         for peer in self._link.peers.values():
@@ -85,19 +85,19 @@ class _Player:
                 self._link.send(piece, peer)
 
     def wait(self, timeout: float, stopped: Stopped) -> None:
-        """Call stations until one answers, or ``timeout`` seconds are over."""
+        """Call stations until one answers, or for ``timeout`` seconds."""
         end = self._link.clock() + timeout
         while not self._link.peers and self._link.clock() < end and not stopped():
             self.step(0.05)
 
     def rest(self, seconds: float, stopped: Stopped) -> None:
-        """Go on sending the last snapshot."""
+        """Continue sending the last snapshot."""
         end = self._link.clock() + seconds
         while self._link.clock() < end and not stopped():
             self.step(0.02)
 
     def step(self, pause: float) -> None:
-        """Read what stations send, send them what is due, and pause, s."""
+        """Read messages of stations, send due messages, and pause, s."""
         now = self._link.clock()
         self._status.boot, self._status.wall = now - self._born, time.time()
         self._link.receive()

@@ -24,7 +24,7 @@ _SAME = 1e-5
 
 @dataclass(frozen=True, slots=True)
 class WouldPass:
-    """What would have passed one failed finding.
+    """Remedies for one failed finding.
 
     bound: how the number that passes bounds what was flown; None where the finding fails by other evidence.
     value: that number, in the finding's unit.
@@ -45,7 +45,7 @@ class WouldPass:
 
 
 def would_pass(finding: Finding, deciding: DecidingParameter | None) -> WouldPass:
-    """What would have passed a failed finding.
+    """Return the remedies for a failed finding.
 
     deciding: the verdict's.
 
@@ -249,7 +249,7 @@ class FailedGroup:
 
 
 def failed_groups(verdict: Verdict) -> list[FailedGroup]:
-    """What fails, by rule, in the order of the verdict's first line."""
+    """List the failed rules, in the order of the first line of the verdict."""
     groups = []
     for rule in verdict.present().failed_rules:
         worst, *others = (_row(finding, verdict.deciding) for finding in rule.failed)
@@ -258,14 +258,14 @@ def failed_groups(verdict: Verdict) -> list[FailedGroup]:
 
 
 def _in_short(row: FindingRow) -> str:
-    """Where a finding fails, and its value."""
+    """Describe the place and value of a failed finding."""
     value = row.planned if row.flown == NOTHING else row.flown
     unit = row.unit if row.unit in ("°", "%") else f" {row.unit}"
     return row.where if value == NOTHING else f"{row.where} ({value}{unit.rstrip()})"
 
 
 def would_pass_text(found: WouldPass, unit: str) -> str:
-    """What would have passed, in words; "" where nothing is known.
+    """Describe the remedies in words; "" if none is known.
 
     unit: of the finding.
 
@@ -392,7 +392,7 @@ def refly_lines(again: Reflight) -> list[str]:
 
 
 def trust_line(again: Reflight) -> str:
-    """How far the model can be trusted on this aircraft, in a line."""
+    """Describe in a line how well the model represents this aircraft."""
     model = again.setup.aircraft
     whose = f"{model}, which stands in for an aircraft that is not named," if again.stands_in else model
     if not again.spreads:
