@@ -68,7 +68,7 @@ _NAMED = 6
 
 
 def _worst_and_others(found: list[_Fault]) -> list[str]:
-    """Faults of one kind as one line: the worst, and where else; none for none."""
+    """Return the faults of one kind as one line: the worst, and the other places; empty without a fault."""
     if not found:
         return []
     (_, where, what), *others = sorted(found, key=lambda one: one[0])

@@ -171,7 +171,7 @@ def terrain_excess(
 ) -> float:  # pragma: no cover - compiled
     """Return the depth below the required clearance along a-b, summed over samples (m x km).
 
-    Up to where it exceeds `enough`.
+    The sum ends where it exceeds `enough`.
     more: additional height required here, m. ends: columns and rows of a and b.
     """
     column, row, last_column, last_row = ends
@@ -277,7 +277,7 @@ def sample_terrain(
 
 @inlined
 def segment_pixels(to_pixel: PolyMapRecord, ax: float, ay: float, bx: float, by: float) -> Pixels:  # pragma: no cover
-    """Columns and rows of both ends of a segment."""
+    """Return columns and rows of both ends of a segment."""
     column_a, row_a = polymap(to_pixel, ax, ay)
     column_b, row_b = polymap(to_pixel, bx, by)
     return column_a, row_a, column_b, row_b

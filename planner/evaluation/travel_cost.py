@@ -101,7 +101,7 @@ def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | Non
 
 
 def _parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
-    """Coefficients of power by the sine of the climb angle, and the bounds of this sine.
+    """Return the coefficients of power by the sine of the climb angle, and the bounds of this sine.
 
     NaN where power is unknown.
     """
@@ -119,7 +119,7 @@ def _parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, 
 class LegTime(NamedTuple):
     """Time of a leg (s) and its derivatives by the leg (s/m); D of `leg_time`.
 
-    And whether the leg can be held.
+    Also returns True if the leg can be held.
     """
 
     seconds: float
@@ -167,7 +167,7 @@ class _At(NamedTuple):
 
 @inner
 def _at_height(travel: TravelCost, table: PerformanceTable, amsl: float) -> _At:  # pragma: no cover - compiled
-    """Airspeed, wind and power at a height, m."""
+    """Return airspeed, wind and power at an altitude, m."""
     airspeed, wind = true_airspeed(table, amsl), wind_speed_at(table, amsl)
     if travel.energy == 0.0:
         return _At(airspeed, wind, 0.0, 0.0, 0.0, -1.0, 1.0)
@@ -249,7 +249,7 @@ def model_leg(
 ) -> float:  # pragma: no cover - compiled
     """Return the cost of the leg a-b, finite for any leg.
 
-    Fills its derivatives by a and b and its curvature.
+    Also fills its derivatives by a and b and its curvature.
     The curvature is that of the length, of the time at each height, and of the power, all convex; what couples height
     and course is left out, so that the matrix has no negative eigenvalue.
     """

@@ -97,7 +97,7 @@ def _column(
 def _passage(
     zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float
 ) -> _Passage:  # pragma: no cover - compiled
-    """Heights that zones close to a horizontal step.
+    """Return heights that zones close to a horizontal step.
 
     Lateral: lateral tracking error added to their margins, m.
     """
@@ -128,7 +128,7 @@ def _passage(
 def _slopes(
     data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, share: float
 ) -> Floats:  # pragma: no cover - compiled
-    """Tangents (sideways, 2) of this share of the steepest climb and dive of each step at a height (m)."""
+    """Return tangents (sideways, 2) of this share of the steepest climb and dive of each step at a height (m)."""
     out, a, b = np.zeros((2 * SIDEWAYS + 1, 2)), np.zeros(3), np.zeros(3)
     a[0], a[1] = frame.east, frame.north
     a[2], b[2] = amsl, amsl

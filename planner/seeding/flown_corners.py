@@ -62,7 +62,7 @@ class FlownCorners(NamedTuple):
 
 @inner
 def no_corners(count: int, margin: float) -> FlownCorners:  # pragma: no cover - compiled
-    """None of so many corners; margin: additional, m."""
+    """Return no corners for a path; margin: additional, m."""
     slope_margin = ARC_MARGIN + ARC_SHARE * margin
     return FlownCorners(
         np.zeros(count), np.full((count, 2), margin), np.zeros(count), np.zeros((count, 2)), slope_margin

@@ -119,7 +119,7 @@ def _lowest_height(
 def _pixel_steps(
     data: ProblemArrays, frame: RotatedFrame, along: float, pitch: float
 ) -> _PixelSteps:  # pragma: no cover - compiled
-    """Steps in the raster of `pitch` m along and across the line, at this distance along."""
+    """Return steps in the raster of `pitch` m along and across the line, at this distance along."""
     east, north = position_of(frame, along, 0.0)
     column, row = polymap(data.to_pixel, east, north)
     east, north = position_of(frame, along + pitch, 0.0)

@@ -140,7 +140,7 @@ def merits(scores: Floats) -> Floats:
 def _triangular_basis(inner: int) -> tuple[Floats, Ints]:
     """Return moves (k, 3 inner): triangles with half-widths of 1, 2, 4, ... waypoints.
 
-    And the axis (k,) of each.
+    Also returns the axis (k,) of each.
     """
     rows: list[Floats] = []
     axes: list[int] = []

@@ -158,7 +158,7 @@ def _descend(
 ) -> int:  # pragma: no cover - compiled
     """Minimise over a path (w, 3), in place, and fill the constraints' values at the end.
 
-    Models evaluated.
+    Returns the number of models evaluated.
     """
     low, high, model, step, trial = descent.low, descent.high, descent.model, descent.step, descent.trial
     merit, made = lagrangian(data, limits, active, here, multipliers, values, penalty, model), 1

@@ -95,8 +95,9 @@ class ActiveConstraints(NamedTuple):
 def active_constraints(
     data: ProblemArrays, path: Floats, samples: int, extra_margin: float, corners_too: bool
 ) -> ActiveConstraints:  # pragma: no cover - compiled
-    """Active constraints near a path (w, 3); extra_margin: additional margin to spheres and ground, m.
+    """Return active constraints near a path (w, 3).
 
+    Extra_margin: additional margin to spheres and ground, m.
     corners_too: whether flown corners are held clear of the ground and below the steepest slopes; legs then keep twice
     the additional margin beside their turns.
     """
@@ -525,7 +526,10 @@ def lagrangian(
     penalty: float,
     model: LagrangianModel,
 ) -> float:  # pragma: no cover - compiled
-    """Augmented length or cost of a path (w, 3), m; fills the constraints' values and the model."""
+    """Return the augmented length or cost of a path (w, 3), m.
+
+    Fills the constraints' values and the model.
+    """
     model.gradient[:], model.band[:] = 0.0, 0.0
     at = active.pairs.shape[0]
     by_length = data.travel.time == 0.0 and data.travel.energy == 0.0
