@@ -72,7 +72,7 @@ class WaypointFrames(NamedTuple):
 def frames_along(route: Floats) -> WaypointFrames:
     """Make frames along a route (n + 1, 2) on the map, one for each of its straight pieces.
 
-    A piece that is too short for a course takes that of the piece before it, or of the first piece with a course.
+    A piece that is too short for a course takes the course of the piece before it, or of the first piece with a course.
     """
     steps = np.diff(route, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
@@ -216,7 +216,7 @@ def _with_ends(space: Space, inner: Floats) -> Floats:
 
 
 def rotated(space: Space, waypoints: int) -> Encoding:
-    """Make the rotated encoding: inner waypoint i lies in the i-th of w - 2 equal intervals along the axis (section III)."""
+    """Make the rotated encoding: inner waypoint i is in the i-th of w - 2 intervals of the axis (section III)."""
     frame = rotated_frame(space.start, space.destination)
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     left, right = _across_spans(frame, space, edges)
@@ -315,7 +315,7 @@ def bearing(space: Space, waypoints: int) -> Encoding:
 
 
 def _steps(name: str, space: Space, waypoints: int, widest: float, *, turning: bool) -> Encoding:
-    """Make steps r, theta, up, theta within +-widest (rad): relative to the previous step if `turning`, else to the line."""
+    """Make steps r, theta, up, theta within +-widest (rad), from the previous step if `turning`, else the line."""
     frame = rotated_frame(space.start, space.destination)
     mean = frame.length / (waypoints - 1)
     low, high = np.array([_SHORTEST * mean, -widest, space.up[0]]), np.array([2.0 * mean, widest, space.up[1]])

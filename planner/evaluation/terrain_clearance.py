@@ -233,7 +233,7 @@ def sample_terrain(
 ) -> None:  # pragma: no cover - compiled
     """Fill `TERRAIN_LEG` records (w - 1,) of a path (w, 3): depths below the required clearance and smallest heights.
 
-    extents: (w,) distance within which a point counts as near a waypoint, m. lags: `HEIGHT_LAG` records (w - 1,).
+    extents: (w,) distance within which a point is near a waypoint, m. lags: `HEIGHT_LAG` records (w - 1,).
     unfinished: (w - 1,) scratch.
 
     Smallest heights are exact up to `NEAR_GROUND`; above that they are lower bounds. Legs take turns, one sample each:

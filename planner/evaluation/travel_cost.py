@@ -87,7 +87,7 @@ def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | Non
     """Return the cost of a path's energy, in m of level flight in still air.
 
     None where the aircraft's power is unknown.
-    Power is that of `Envelope.power`: the parabola through idle at the steepest descent, level flight and full
+    Power is as in `Envelope.power`: the parabola through idle at the steepest descent, level flight and full
     throttle. At heights where there is no level flight it is that of the nearest with one.
     """
     rows = np.array([_parabola(envelope, true_airspeed(table, float(amsl)), float(amsl)) for amsl in table.amsl])
@@ -222,7 +222,7 @@ def leg_cost(
 
 @compiled
 def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> float:  # pragma: no cover - compiled
-    """Return the cost of a path (w, 3) world m: that of its legs; inf where one cannot be held.
+    """Return the cost of a path (w, 3) world m, the sum over its legs; inf if a leg cannot be held.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario

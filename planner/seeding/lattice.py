@@ -54,7 +54,7 @@ class Lattice(NamedTuple):
 
     step: between points, m. behind, right: points behind the start and to its right. along, across: number of points.
     goal: index along of the destination. low: height of the first layer, m. pitch: between layers, m.
-    layers: number of layers. start_layer, goal_layer: those of the ends.
+    layers: number of layers. start_layer, goal_layer: layers of the ends.
     """
 
     step: float
