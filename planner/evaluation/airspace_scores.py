@@ -28,7 +28,7 @@ Ints = NDArray[np.int64]
 
 
 # Margins of one piece of a leg or of a corner, with its number: its margin to zones; its greatest height above ground
-# (m, NaN off the terrain, -inf where no maximum applies); and the buffer required below that maximum (m).
+# (m, NaN off the terrain, -inf if no maximum applies); and the buffer required below that maximum (m).
 AIRSPACE_PIECE = np.dtype(
     [
         ("of_corner", np.bool_),

@@ -168,7 +168,7 @@ def _too_steep(slope: float, climb: float, dive: float, where: str = "") -> str:
 
 
 def _clearance(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest height above the required clearance, m; NaN where the path leaves the terrain."""
+    """Return the smallest height above the required clearance, m; NaN if the path leaves the terrain."""
     smallest = math.inf
     low: dict[str, float] = {}
     for piece in heights_above_ground(data, waypoints):

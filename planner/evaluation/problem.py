@@ -80,15 +80,15 @@ class ProblemArrays(NamedTuple):
     west, east, south, north: edges of the map. floor, ceiling: lowest and highest waypoint.
     start, destination: (3,) fixed ends.
     max_turn: largest course change.
-    legs_hold_turns: whether a leg must be as long as its turns.
-    fly_over: whether a turn begins at its waypoint, not before it.
-    max_climb, max_dive: NaN where the aircraft limits them.
+    legs_hold_turns: True if a leg must be as long as its turns.
+    fly_over: True if a turn begins at its waypoint, not before it.
+    max_climb, max_dive: NaN if the aircraft limits them.
     angle_margin: margin to slope limits.
     clearance: required above ground. buffer: additional height, and start_buffer and destination_buffer at the ends.
     buffer_growth: away from an end that has less than the buffer, m per m.
     kill_margin: required between the path and missile spheres.
     sample_pitch: between samples of the terrain along a leg, in the graded scores.
-    start_course, destination_course: NaN where none is prescribed.
+    start_course, destination_course: NaN if none is prescribed.
     threat_cells: the threats by the points that they may reach.
     missiles: the missiles by position.
     slope_bounds: of the ground.
@@ -177,7 +177,7 @@ class RequiredClearance(NamedTuple):
     clearance: required everywhere. buffer: additional, away from the ends.
     start_east, start_north, destination_east, destination_north: the ends.
     start_buffer, destination_buffer: buffer at the ends.
-    same_everywhere: whether the ends have the full buffer.
+    same_everywhere: True if the ends have the full buffer.
     growth: slope of the required height due to the buffer, m per m.
     steepest_loss: fastest possible loss of height above the required height, m per m.
     sample_pitch: between samples of the terrain.

@@ -86,7 +86,7 @@ def time_cost(table: PerformanceTable) -> TravelCost:
 def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
     """Return the cost of a path's energy, in m of level flight in still air.
 
-    None where the aircraft's power is unknown.
+    None if the aircraft's power is unknown.
     Power is as in `Envelope.power`: the parabola through idle at the steepest descent, level flight and full
     throttle. At heights where there is no level flight it is that of the nearest with one.
     """
@@ -103,7 +103,7 @@ def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | Non
 def _parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
     """Return the coefficients of power by the sine of the climb angle, and the bounds of this sine.
 
-    NaN where power is unknown.
+    NaN if power is unknown.
     """
     climb, descent = envelope.air_angles(airspeed, amsl)
     low, high = -math.sin(descent), math.sin(climb)
@@ -207,7 +207,7 @@ def _timed_cost(
 def leg_cost(
     travel: TravelCost, table: PerformanceTable, a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> float:  # pragma: no cover - compiled
-    """Return the cost of the leg a-b; inf where it cannot be held."""
+    """Return the cost of the leg a-b; inf if it cannot be held."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     total = travel.length * math.sqrt(dx * dx + dy * dy + dz * dz)
     if travel.time == 0.0 and travel.energy == 0.0:

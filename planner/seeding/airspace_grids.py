@@ -49,7 +49,7 @@ class AirspaceGrid(NamedTuple):
     """One resolution: positions across (m from the line) at stages + 1 positions along, and layers of height.
 
     pitch: between layers, m. The first layer is at the lowest allowed height if `follows`, otherwise at `floor` (m).
-    gentle: whether changes of course have a cost and slopes stay below the steepest.
+    gentle: True if changes of course have a cost and slopes stay below the steepest.
     """
 
     stages: int
@@ -150,7 +150,7 @@ def _set_cell_costs(
     high: int,
     price: Floats,
 ) -> None:  # pragma: no cover - compiled
-    """Fill the cost per m of a stage's cells (low..high, layers); inf where a path is not allowed."""
+    """Fill the cost per m of a stage's cells (low..high, layers); inf if a path is not allowed."""
     near, aside2 = np.empty(obstacles.shape[0], dtype=np.int64), np.empty(obstacles.shape[0])
     for y in range(low, high + 1):
         column, count = columns[y], 0
@@ -447,7 +447,7 @@ def airspace_routes(
 
     Routes of gentle grids are easier to fly. The first grid is also searched without that restriction, because narrow
     gaps can require steep or curved routes. pause: as in `cheapest_airspace_route`.
-    finer_only: whether to leave out grids that `MAX_CELLS` makes no finer than one before.
+    finer_only: True to leave out grids that `MAX_CELLS` makes no finer than one before.
     """
     expected, finest = EXPECTED * math.dist(data.start, data.destination), 0
     for number, (stages, each) in enumerate(grids):

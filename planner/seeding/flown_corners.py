@@ -1,4 +1,4 @@
-"""Heights and slopes of flown corners, with derivatives by the waypoints: the constraints of shortening in addition to the legs.
+"""Heights and slopes of flown corners, with derivatives by the waypoints, as constraints of shortening.
 
 Round the end of a ridge a flight cuts its corners over higher ground than there is below the legs.  Without tracking
 error it is on the chords of fly-by arcs; with it, it is within a distance of the legs before and after the waypoint, to

@@ -194,7 +194,7 @@ def set_cell_costs(
     high: int,
     price: Floats,
 ) -> None:  # pragma: no cover - compiled
-    """Fill the cost per m of a stage's cells (layers, low..high); inf where the ground is too near."""
+    """Fill the cost per m of a stage's cells (layers, low..high); inf if the ground is too near."""
     across, layers = grid.across, grid.layers
     step = frame.length / grid.stages
     steps = _pixel_steps(data, frame, stage * step, grid.spread * step if stage < grid.stages else 0.0)

@@ -73,7 +73,7 @@ class ActiveConstraints(NamedTuple):
     samples: number of ground samples on each leg. low: (w - 1,) height required above the clearance, m.
     climb, dive: (w - 1,) tangents. before, after: (w,) length of the legs (m) that a turn takes, divided by the tangent
     of half the turn. roll: (w - 1,) length of a leg taken by the roll between turns to opposite sides, m.
-    turns_in_legs: whether legs must hold their turns, and turn_margin: with how much beside them, m.
+    turns_in_legs: True if legs must hold their turns, and turn_margin: with how much beside them, m.
     flown: the corners that are flown near the ground, or almost as steeply as can be.
     """
 
@@ -98,7 +98,7 @@ def active_constraints(
     """Return active constraints near a path (w, 3).
 
     Extra_margin: additional margin to spheres and ground, m.
-    corners_too: whether flown corners are held clear of the ground and below the steepest slopes; legs then keep twice
+    corners_too: True if flown corners are held clear of the ground and below the steepest slopes; legs then keep twice
     the additional margin beside their turns.
     """
     limits = precompute_limits(data)

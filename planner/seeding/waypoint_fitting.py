@@ -152,7 +152,7 @@ class WaypointFit:
     candidates: along each interval.
     lifts: heights above the route, m.
     rounds: of moves of each waypoint.
-    diagonal: whether moves lead to all 26 neighbours, not just the 6 along the axes.
+    diagonal: True if moves lead to all 26 neighbours, not just the 6 along the axes.
     """
 
     candidates: int
