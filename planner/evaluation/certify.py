@@ -37,7 +37,7 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     """Compute the certificate of a path (w, 3) against the margins of `Problem.certified`.
 
     Clearance is exact for the bilinear terrain, along the legs and along the chords of the fly-by arcs. Distances to
-    missile spheres and zones, and the headroom below the maximum height above ground, are those of the same pieces.
+    missile spheres and zones, and the headroom below the maximum height above ground, are measured on the same pieces.
     """
     data = problem.certified
     # A copy: compiled code has one type for arrays that are locked, as a plan's, and one for others.

@@ -409,7 +409,7 @@ def _max_buffer(certified: ProblemArrays, at_edge: float) -> float:
     """Return the largest margin of a search to an edge of a band of heights above ground, m.
 
     Inf without a maximum height.
-    at_edge: that of the certificate, m.
+    at_edge: margin of the certificate, m.
     """
     space = certified.airspace
     between = space.max_height - certified.clearance - certified.buffer - space.buffer

@@ -250,8 +250,8 @@ def model_leg(
     """Return the cost of the leg a-b, finite for any leg.
 
     Also fills its derivatives by a and b and its curvature.
-    The curvature is that of the length, of the time at each height, and of the power, all convex; what couples height
-    and course is left out, so that the matrix has no negative eigenvalue.
+    The curvature is the sum of the curvatures of the length, of the time at each height, and of the power, all convex;
+    what couples height and course is left out, so that the matrix has no negative eigenvalue.
     """
     slopes, bends = model.slopes, model.bends
     slopes[:], bends[:] = 0.0, 0.0

@@ -392,7 +392,7 @@ def _layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:  # pragma: n
 
 # Factor on the number of stages of a grid without zones: hills and gaps need short steps.
 FINER = 2
-# Bound on the cost of a first route, over that of the first on the grid before it. A finer grid's may cost a little
+# Bound on the cost of a first route, relative to the first route on the previous grid. A finer grid's may cost a little
 # more, for it is freer to turn; the bound spares work and does not change the route.
 FINER_COST = 1.05
 # Minimum number of layers of a band of heights above ground.

@@ -73,7 +73,7 @@ class ActiveConstraints(NamedTuple):
     samples: number of ground samples on each leg. low: (w - 1,) height required above the clearance, m.
     climb, dive: (w - 1,) tangents. before, after: (w,) length of the legs (m) that a turn takes, divided by the tangent
     of half the turn. roll: (w - 1,) length of a leg taken by the roll between turns to opposite sides, m.
-    turns_in_legs: True if legs must hold their turns, and turn_margin: with how much beside them, m.
+    turns_in_legs: True if legs must hold their turns. turn_margin: length of a leg in addition to its turns, m.
     flown: the corners that are flown near the ground, or almost as steeply as can be.
     """
 
