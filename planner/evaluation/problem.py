@@ -257,8 +257,9 @@ ANGLE_MARGIN = math.radians(0.5)
 # Largest course change of a plan if no number limits it, rad.
 AIRCRAFT_TURN = math.radians(150.0)
 # Margins of the search are larger than the certificate's margins by the effect of its terrain samples and chords; the
-# certificate's margins cover the altitude error of a flight (1.3 m worst of 120 flights) and its cross-track error (2
-# m). Height above the required clearance in a search, m.
+# certificate's margins cover the altitude error of a flight (1.3 m worst of 120 flights) and its cross-track error
+# (2 m).
+# Height above the required clearance in a search, m.
 SEARCH_BUFFER = 8.0
 # Height above the required clearance in the certificate, m.
 CERTIFIED_BUFFER = 5.0

@@ -99,7 +99,7 @@ def active_constraints(
 
     Extra_margin: additional margin to spheres and ground, m.
     corners_too: True if flown corners are held clear of the ground and below the steepest slopes; legs then keep twice
-    the additional margin beside their turns.
+    the additional margin in addition to their turns.
     """
     limits = precompute_limits(data)
     count = path.shape[0] - 1
