@@ -36,7 +36,8 @@ HEIGHT_HELD = 1.0
 # m of the fly-by path (the verdict allows 5 m), and the largest mean bank of 2 seconds at most half a degree above the
 # limit, or above the bank of turns far apart (30.7 degrees on a 30 degree arc in calm air) if that is more, but at most
 # `MAX_BANK`.  Guidance may not slow down for arcs here, as that would keep the bank in turns too tight for the
-# airspeed. Length of a leg between independent turns, m.
+# airspeed.
+# Length of a leg between independent turns, m.
 FAR = 4000.0
 # Largest cross-track error on a sufficient leg, m.
 CROSS_HELD = 2.0

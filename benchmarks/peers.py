@@ -64,7 +64,7 @@ def found(task: Task, path: Floats, seconds: float, checks: int, inside: float, 
 def best_path(task: Task, vectors: Floats) -> Floats:
     """Return the first certified safe path of vectors (n, d), in the order of scalar cost.
 
-    Or the first of all.
+    Without one return the first of all.
     """
     order = np.argsort(scalar(*task.scores(vectors)), kind="stable")
     paths = task.encoding.decode(vectors[order])

@@ -134,7 +134,7 @@ def _brute(
     high: Floats,
     limits: _Limits,
 ) -> tuple[Ints, Floats]:
-    """Scores of paths with every unit asked at every point; cols, rows: pixels of their waypoints."""
+    """Score paths with every unit tested at every point; cols, rows: pixels of their waypoints."""
     number, count, _ = paths.shape
     counts, objectives = np.zeros((number, 4), dtype=np.int64), np.zeros((number, 4))
     point = np.empty(3)
@@ -169,7 +169,7 @@ def _brute(
 
 
 def brute_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
-    """Counts (n, 4) and objectives (n, 4) of paths (n, w, 3), compiled, without lists of near threats."""
+    """Return counts (n, 4) and objectives (n, 4) of paths (n, w, 3), compiled, without lists of near threats."""
     cols, rows = pixels_of(data.to_pixel, paths[..., 0], paths[..., 1])
     low = np.array([data.west, data.south, data.floor])
     high = np.array([data.east, data.north, data.ceiling])
@@ -215,7 +215,7 @@ def _count_preferred(scores: Floats, columns: Ints, goals: Floats, ends: Ints) -
 
 
 def _flat(levels: Sequence[Level]) -> tuple[Ints, Floats, Ints]:
-    """Columns and goals of all levels, and where each level ends."""
+    """Return columns and goals of all levels, and the end of each level."""
     columns = np.array([column for level in levels for column in level.columns])
     goals = np.array([goal for level in levels for goal in level.goals])
     return columns, goals, np.cumsum([len(level.columns) for level in levels])

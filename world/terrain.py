@@ -31,7 +31,7 @@ TILE = 16
 class Terrain:
     """Measured or synthetic ground heights above mean sea level.
 
-    heights: (rows, cols) float32 m at pixel centres, NaN where there is no data.
+    heights: (rows, cols) float32 m at pixel centres, NaN if there is no data.
     to_pixel: map (east, north) to fractional (col, row).
     spacing: the finer pixel pitch, m.
     source, sha256: name and hash of the elevation file.

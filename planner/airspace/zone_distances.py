@@ -281,7 +281,7 @@ def _map_distance(
 ) -> float:  # pragma: no cover - compiled
     """Return the smallest horizontal distance of a-b outside an exclusion or inside an inclusion, m.
 
-    Else negative.
+    Otherwise negative.
     Distances above `within` may be inf.
     """
     line = segment_between(a[0], a[1], b[0], b[1])

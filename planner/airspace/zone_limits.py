@@ -268,7 +268,7 @@ def _view_circle(along: float, off: float, radius: float, run: float) -> ShapeVi
 def _edge_distance2(
     along: float, off: float, to_along: float, to_off: float, run: float
 ) -> float:  # pragma: no cover - compiled
-    """Squared distance of the line from an edge that does not cross it: at an end of one of the two."""
+    """Return the squared distance of the line from an edge that does not cross it: at an end of one of them."""
     gap = along - min(run, max(0.0, along))
     nearest = gap * gap + off * off
     gap = to_along - min(run, max(0.0, to_along))

@@ -28,7 +28,7 @@ Ints = NDArray[np.int64]
 
 
 # Margins of one piece of a leg or of a corner, with its number: its margin to zones; its greatest height above ground
-# (m, NaN off the terrain, -inf where no maximum applies); and the buffer required below that maximum (m).
+# (m, NaN off the terrain, -inf if no maximum applies); and the buffer required below that maximum (m).
 AIRSPACE_PIECE = np.dtype(
     [
         ("of_corner", np.bool_),
@@ -47,7 +47,7 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 @compiled
 def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """Return `AIRSPACE_PIECE` records of the legs of a path (w, 3), followed by those of its corners."""
+    """Return `AIRSPACE_PIECE` records of the legs of a path (w, 3) and then of its corners."""
     pieces = tracked_pieces(data, waypoints) if data.tracking.has_error else _exact_pieces(data, waypoints)
     out = np.zeros(pieces.size, dtype=AIRSPACE_PIECE)
     space, lateral = data.airspace, np.zeros(2)

@@ -37,7 +37,7 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     """Compute the certificate of a path (w, 3) against the margins of `Problem.certified`.
 
     Clearance is exact for the bilinear terrain, along the legs and along the chords of the fly-by arcs. Distances to
-    missile spheres and zones, and the headroom below the maximum height above ground, are those of the same pieces.
+    missile spheres and zones, and the headroom below the maximum height above ground, are measured on the same pieces.
     """
     data = problem.certified
     # A copy: compiled code has one type for arrays that are locked, as a plan's, and one for others.
@@ -68,7 +68,7 @@ _NAMED = 6
 
 
 def _worst_and_others(found: list[_Fault]) -> list[str]:
-    """Faults of one kind as one line: the worst, and where else; none for none."""
+    """Return the faults of one kind as one line: the worst, and the other places; empty without a fault."""
     if not found:
         return []
     (_, where, what), *others = sorted(found, key=lambda one: one[0])
@@ -168,7 +168,7 @@ def _too_steep(slope: float, climb: float, dive: float, where: str = "") -> str:
 
 
 def _clearance(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest height above the required clearance, m; NaN where the path leaves the terrain."""
+    """Return the smallest height above the required clearance, m; NaN if the path leaves the terrain."""
     smallest = math.inf
     low: dict[str, float] = {}
     for piece in heights_above_ground(data, waypoints):

@@ -70,9 +70,9 @@ class WaypointFrames(NamedTuple):
 
 
 def frames_along(route: Floats) -> WaypointFrames:
-    """Frames along a route (n + 1, 2) on the map, one for each of its straight pieces.
+    """Make frames along a route (n + 1, 2) on the map, one for each of its straight pieces.
 
-    A piece that is too short for a course takes that of the piece before it, or of the first piece with a course.
+    A piece that is too short for a course takes the course of the piece before it, or of the first piece with a course.
     """
     steps = np.diff(route, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
@@ -216,7 +216,7 @@ def _with_ends(space: Space, inner: Floats) -> Floats:
 
 
 def rotated(space: Space, waypoints: int) -> Encoding:
-    """Rotated frame: inner waypoint i lies in the i-th of w - 2 equal intervals along the axis (section III)."""
+    """Make the rotated encoding: inner waypoint i is in the i-th of w - 2 intervals of the axis (section III)."""
     frame = rotated_frame(space.start, space.destination)
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     left, right = _across_spans(frame, space, edges)
@@ -231,7 +231,7 @@ def rotated(space: Space, waypoints: int) -> Encoding:
 
 
 def route_encoding(space: Space, route: Floats) -> Encoding:
-    """Like `rotated`, with a route (w - 1, 2) on the map as its axis, which may turn back.
+    """Make an encoding like `rotated`, with a route (w - 1, 2) on the map as its axis, which may turn back.
 
     Inner waypoint i lies along the i-th piece of the route, and across within `HALF_WIDTH` lengths of a piece.
     """
@@ -263,7 +263,7 @@ def rotated_vectors(space: Space, encoding: Encoding, paths: Floats) -> Floats:
 def _across_spans(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Floats, Floats]:
     """Return the limits across (k,), (k,) of the map between consecutive edges (k + 1,) along.
 
-    -across and across if the space states a half-width.
+    They are -across and across if the space states a half-width.
     """
     if space.across is not None:
         return np.full(edges.size - 1, -space.across), np.full(edges.size - 1, space.across)
@@ -302,12 +302,12 @@ def polar(space: Space, waypoints: int) -> Encoding:
 
 
 def polar_45(space: Space, waypoints: int) -> Encoding:
-    """Like `polar`, with theta within +-45 degrees, the sharpest turn that the paper allows."""
+    """Make an encoding like `polar`, with theta within +-45 degrees, the sharpest turn that the paper allows."""
     return _steps("polar-45", space, waypoints, math.pi / 4.0, turning=True)
 
 
 def bearing(space: Space, waypoints: int) -> Encoding:
-    """Like `polar`, with theta measured from the direction start-destination, so that errors do not accumulate.
+    """Make an encoding like `polar`, with theta from the direct line, so that errors do not accumulate.
 
     Not in the paper: changing one waypoint shifts the following ones but does not turn them.
     """
@@ -315,7 +315,7 @@ def bearing(space: Space, waypoints: int) -> Encoding:
 
 
 def _steps(name: str, space: Space, waypoints: int, widest: float, *, turning: bool) -> Encoding:
-    """Steps r, theta, up, theta within +-widest (rad): relative to the previous step if `turning`, else to the line."""
+    """Make steps r, theta, up, theta within +-widest (rad), from the previous step if `turning`, else the line."""
     frame = rotated_frame(space.start, space.destination)
     mean = frame.length / (waypoints - 1)
     low, high = np.array([_SHORTEST * mean, -widest, space.up[0]]), np.array([2.0 * mean, widest, space.up[1]])

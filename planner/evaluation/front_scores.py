@@ -36,7 +36,7 @@ class Value(IntEnum):
 def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) -> Floats:
     """Return the values (n, 5) of paths (n, w, 3) by `Value`: m, s, m, s, J.
 
-    Energy NaN where `energy` is None.
+    Energy NaN if `energy` is None.
     energy: the cost of energy, with whatever weight (`make_travel_cost`).
     """
     out = np.zeros((len(paths), len(Value)))

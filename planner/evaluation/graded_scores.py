@@ -123,7 +123,7 @@ def score_legs(
     violations: Record,
     objectives: Record,
 ) -> None:  # pragma: no cover - compiled
-    """First part of a path's evaluation: what needs no ground, missile or zone. Each part only adds to violations.
+    """Evaluate the first part, without ground, missiles and zones. Each part only adds to violations.
 
     objectives: the length ratio is filled; the kill exposure is 0 until `score_missiles`.
     """
@@ -147,7 +147,7 @@ def score_legs(
 def score_ground(
     data: ProblemArrays, limits: PrecomputedLimits, scratch: PathScratch, path: Floats, violations: Record
 ) -> None:  # pragma: no cover - compiled
-    """Second part: the ground below the legs."""
+    """Evaluate the second part: the ground below the legs."""
     legs, terrain_legs = scratch.legs, scratch.terrain_legs
     sample_terrain(
         data.heights,
@@ -174,7 +174,7 @@ def score_missiles(
     violations: Record,
     objectives: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Third part: missiles, and the ground below corners as flown."""
+    """Evaluate the third part: missiles, and the ground below corners as flown."""
     # Arrays are taken out of the data once: passing it on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
     bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
@@ -218,7 +218,7 @@ def score_missiles(
 def score_airspace(
     data: ProblemArrays, scratch: PathScratch, path: Floats, violations: Record
 ) -> None:  # pragma: no cover - compiled
-    """Last part: zones and the maximum height above ground."""
+    """Evaluate the last part: zones and the maximum height above ground."""
     if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
         add_airspace_violations(data, path, scratch.legs, scratch.corners, scratch.flown, scratch.lags, violations)
 

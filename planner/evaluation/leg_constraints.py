@@ -154,7 +154,7 @@ class PrecomputedLimits(NamedTuple):
     wind: downwind unit vector, east and north.
     climb_slope, dive_slope: tangents that no leg may exceed, or, where the aircraft limits slopes, that every leg may
     use.
-    slopes_by_aircraft: whether the aircraft limits slopes.
+    slopes_by_aircraft: True if the aircraft limits slopes.
     straight_distance: from start to destination in three dimensions, m.
     required: clearance above ground.
     """

@@ -183,7 +183,7 @@ def _add_terrain(
         for b in range(size):
             need[b] = clearance_at(required, east[b], north[b])
     for b in range(size):
-        # This form counts NaN as below.
+        # This form treats NaN as below.
         below[b] += 0.0 if up[b] > ground[b] + need[b] else 1.0
     if inner:
         for b in range(size):

@@ -80,15 +80,15 @@ class ProblemArrays(NamedTuple):
     west, east, south, north: edges of the map. floor, ceiling: lowest and highest waypoint.
     start, destination: (3,) fixed ends.
     max_turn: largest course change.
-    legs_hold_turns: whether a leg must be as long as its turns.
-    fly_over: whether a turn begins at its waypoint, not before it.
-    max_climb, max_dive: NaN where the aircraft limits them.
+    legs_hold_turns: True if a leg must be as long as its turns.
+    fly_over: True if a turn begins at its waypoint, not before it.
+    max_climb, max_dive: NaN if the aircraft limits them.
     angle_margin: margin to slope limits.
     clearance: required above ground. buffer: additional height, and start_buffer and destination_buffer at the ends.
     buffer_growth: away from an end that has less than the buffer, m per m.
     kill_margin: required between the path and missile spheres.
     sample_pitch: between samples of the terrain along a leg, in the graded scores.
-    start_course, destination_course: NaN where none is prescribed.
+    start_course, destination_course: NaN if none is prescribed.
     threat_cells: the threats by the points that they may reach.
     missiles: the missiles by position.
     slope_bounds: of the ground.
@@ -177,7 +177,7 @@ class RequiredClearance(NamedTuple):
     clearance: required everywhere. buffer: additional, away from the ends.
     start_east, start_north, destination_east, destination_north: the ends.
     start_buffer, destination_buffer: buffer at the ends.
-    same_everywhere: whether the ends have the full buffer.
+    same_everywhere: True if the ends have the full buffer.
     growth: slope of the required height due to the buffer, m per m.
     steepest_loss: fastest possible loss of height above the required height, m per m.
     sample_pitch: between samples of the terrain.
@@ -257,8 +257,9 @@ ANGLE_MARGIN = math.radians(0.5)
 # Largest course change of a plan if no number limits it, rad.
 AIRCRAFT_TURN = math.radians(150.0)
 # Margins of the search are larger than the certificate's margins by the effect of its terrain samples and chords; the
-# certificate's margins cover the altitude error of a flight (1.3 m worst of 120 flights) and its cross-track error (2
-# m). Height above the required clearance in a search, m.
+# certificate's margins cover the altitude error of a flight (1.3 m worst of 120 flights) and its cross-track error
+# (2 m).
+# Height above the required clearance in a search, m.
 SEARCH_BUFFER = 8.0
 # Height above the required clearance in the certificate, m.
 CERTIFIED_BUFFER = 5.0
@@ -409,7 +410,7 @@ def _max_buffer(certified: ProblemArrays, at_edge: float) -> float:
     """Return the largest margin of a search to an edge of a band of heights above ground, m.
 
     Inf without a maximum height.
-    at_edge: that of the certificate, m.
+    at_edge: margin of the certificate, m.
     """
     space = certified.airspace
     between = space.max_height - certified.clearance - certified.buffer - space.buffer

@@ -171,7 +171,7 @@ def terrain_excess(
 ) -> float:  # pragma: no cover - compiled
     """Return the depth below the required clearance along a-b, summed over samples (m x km).
 
-    Up to where it exceeds `enough`.
+    The sum ends where it exceeds `enough`.
     more: additional height required here, m. ends: columns and rows of a and b.
     """
     column, row, last_column, last_row = ends
@@ -233,7 +233,7 @@ def sample_terrain(
 ) -> None:  # pragma: no cover - compiled
     """Fill `TERRAIN_LEG` records (w - 1,) of a path (w, 3): depths below the required clearance and smallest heights.
 
-    extents: (w,) distance within which a point counts as near a waypoint, m. lags: `HEIGHT_LAG` records (w - 1,).
+    extents: (w,) distance within which a point is near a waypoint, m. lags: `HEIGHT_LAG` records (w - 1,).
     unfinished: (w - 1,) scratch.
 
     Smallest heights are exact up to `NEAR_GROUND`; above that they are lower bounds. Legs take turns, one sample each:
@@ -277,7 +277,7 @@ def sample_terrain(
 
 @inlined
 def segment_pixels(to_pixel: PolyMapRecord, ax: float, ay: float, bx: float, by: float) -> Pixels:  # pragma: no cover
-    """Columns and rows of both ends of a segment."""
+    """Return columns and rows of both ends of a segment."""
     column_a, row_a = polymap(to_pixel, ax, ay)
     column_b, row_b = polymap(to_pixel, bx, by)
     return column_a, row_a, column_b, row_b

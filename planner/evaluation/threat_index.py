@@ -57,7 +57,7 @@ class ThreatCells(NamedTuple):
 
 
 def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> ThreatCells:
-    """Lists of the units (m, 3) whose sphere, seen from above, meets a cell.
+    """Make lists of the units (m, 3) whose sphere, seen from above, meets a cell.
 
     radius: (m,) of the spheres, m; 0 for none. bounds: (2, 2) map.
     """
@@ -297,7 +297,7 @@ def _cell(place: float, count: int) -> int:  # pragma: no cover - compiled
 def _closest2(
     nearest: float, low: float, high: float, along: float, start2: float, length2: float
 ) -> float:  # pragma: no cover - compiled
-    """Squared distance from a point to the part low..high (fractions) of a segment.
+    """Return the squared distance from a point to the part low..high (fractions) of a segment.
 
     nearest: fraction of the infinite line that is closest to the point. along, start2, length2: see `window_exposure`.
     """

@@ -86,8 +86,8 @@ def time_cost(table: PerformanceTable) -> TravelCost:
 def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
     """Return the cost of a path's energy, in m of level flight in still air.
 
-    None where the aircraft's power is unknown.
-    Power is that of `Envelope.power`: the parabola through idle at the steepest descent, level flight and full
+    None if the aircraft's power is unknown.
+    Power is as in `Envelope.power`: the parabola through idle at the steepest descent, level flight and full
     throttle. At heights where there is no level flight it is that of the nearest with one.
     """
     rows = np.array([_parabola(envelope, true_airspeed(table, float(amsl)), float(amsl)) for amsl in table.amsl])
@@ -101,9 +101,9 @@ def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | Non
 
 
 def _parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
-    """Coefficients of power by the sine of the climb angle, and the bounds of this sine.
+    """Return the coefficients of power by the sine of the climb angle, and the bounds of this sine.
 
-    NaN where power is unknown.
+    NaN if power is unknown.
     """
     climb, descent = envelope.air_angles(airspeed, amsl)
     low, high = -math.sin(descent), math.sin(climb)
@@ -119,7 +119,7 @@ def _parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, 
 class LegTime(NamedTuple):
     """Time of a leg (s) and its derivatives by the leg (s/m); D of `leg_time`.
 
-    And whether the leg can be held.
+    Also returns True if the leg can be held.
     """
 
     seconds: float
@@ -167,7 +167,7 @@ class _At(NamedTuple):
 
 @inner
 def _at_height(travel: TravelCost, table: PerformanceTable, amsl: float) -> _At:  # pragma: no cover - compiled
-    """Airspeed, wind and power at a height, m."""
+    """Return airspeed, wind and power at an altitude, m."""
     airspeed, wind = true_airspeed(table, amsl), wind_speed_at(table, amsl)
     if travel.energy == 0.0:
         return _At(airspeed, wind, 0.0, 0.0, 0.0, -1.0, 1.0)
@@ -207,7 +207,7 @@ def _timed_cost(
 def leg_cost(
     travel: TravelCost, table: PerformanceTable, a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> float:  # pragma: no cover - compiled
-    """Return the cost of the leg a-b; inf where it cannot be held."""
+    """Return the cost of the leg a-b; inf if it cannot be held."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     total = travel.length * math.sqrt(dx * dx + dy * dy + dz * dz)
     if travel.time == 0.0 and travel.energy == 0.0:
@@ -222,7 +222,7 @@ def leg_cost(
 
 @compiled
 def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> float:  # pragma: no cover - compiled
-    """Return the cost of a path (w, 3) world m: that of its legs; inf where one cannot be held.
+    """Return the cost of a path (w, 3) world m, the sum over its legs; inf if a leg cannot be held.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -249,9 +249,9 @@ def model_leg(
 ) -> float:  # pragma: no cover - compiled
     """Return the cost of the leg a-b, finite for any leg.
 
-    Fills its derivatives by a and b and its curvature.
-    The curvature is that of the length, of the time at each height, and of the power, all convex; what couples height
-    and course is left out, so that the matrix has no negative eigenvalue.
+    Also fills its derivatives by a and b and its curvature.
+    The curvature is the sum of the curvatures of the length, of the time at each height, and of the power, all convex;
+    what couples height and course is left out, so that the matrix has no negative eigenvalue.
     """
     slopes, bends = model.slopes, model.bends
     slopes[:], bends[:] = 0.0, 0.0

@@ -88,7 +88,7 @@ def _covered(points: Floats, probes: Floats) -> Marks:  # pragma: no cover - com
 def _greedy(covered: Marks, firsts: Ints, count: int) -> Ints:  # pragma: no cover - compiled
     """Return rows (count,) of marks (n, p): `firsts`, then the row that covers most uncovered probes.
 
-    First of equals.
+    Of equal rows the first is taken.
     The gain of a row only decreases as others are chosen, so that its last count is an upper bound, and few rows are
     counted again (Minoux, Optimization Techniques, Lecture Notes in Control and Information Sciences 7, 1978).
     """

@@ -87,7 +87,7 @@ def plan_path(
     >>> plan.safe, plan.waypoints.shape
     (True, (10, 3))
 
-    algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None for the scenario's, or the default.
+    algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None for the algorithm of the scenario, or the default.
     progress: called with generations done, generations in total, and a short text.
     stop: called every few hundredths of a second; a returned text ("interrupted") ends the search with the best path
     found and is recorded in the plan.

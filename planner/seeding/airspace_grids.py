@@ -49,7 +49,7 @@ class AirspaceGrid(NamedTuple):
     """One resolution: positions across (m from the line) at stages + 1 positions along, and layers of height.
 
     pitch: between layers, m. The first layer is at the lowest allowed height if `follows`, otherwise at `floor` (m).
-    gentle: whether changes of course have a cost and slopes stay below the steepest.
+    gentle: True if changes of course have a cost and slopes stay below the steepest.
     """
 
     stages: int
@@ -97,7 +97,7 @@ def _column(
 def _passage(
     zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float
 ) -> _Passage:  # pragma: no cover - compiled
-    """Heights that zones close to a horizontal step.
+    """Return heights that zones close to a horizontal step.
 
     Lateral: lateral tracking error added to their margins, m.
     """
@@ -128,7 +128,7 @@ def _passage(
 def _slopes(
     data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, share: float
 ) -> Floats:  # pragma: no cover - compiled
-    """Tangents (sideways, 2) of this share of the steepest climb and dive of each step at a height (m)."""
+    """Return tangents (sideways, 2) of this share of the steepest climb and dive of each step at a height (m)."""
     out, a, b = np.zeros((2 * SIDEWAYS + 1, 2)), np.zeros(3), np.zeros(3)
     a[0], a[1] = frame.east, frame.north
     a[2], b[2] = amsl, amsl
@@ -150,7 +150,7 @@ def _set_cell_costs(
     high: int,
     price: Floats,
 ) -> None:  # pragma: no cover - compiled
-    """Fill the cost per m of a stage's cells (low..high, layers); inf where a path is not allowed."""
+    """Fill the cost per m of a stage's cells (low..high, layers); inf if a path is not allowed."""
     near, aside2 = np.empty(obstacles.shape[0], dtype=np.int64), np.empty(obstacles.shape[0])
     for y in range(low, high + 1):
         column, count = columns[y], 0
@@ -392,7 +392,7 @@ def _layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:  # pragma: n
 
 # Factor on the number of stages of a grid without zones: hills and gaps need short steps.
 FINER = 2
-# Bound on the cost of a first route, over that of the first on the grid before it. A finer grid's may cost a little
+# Bound on the cost of a first route, relative to the first route on the previous grid. A finer grid's may cost a little
 # more, for it is freer to turn; the bound spares work and does not change the route.
 FINER_COST = 1.05
 # Minimum number of layers of a band of heights above ground.
@@ -447,7 +447,7 @@ def airspace_routes(
 
     Routes of gentle grids are easier to fly. The first grid is also searched without that restriction, because narrow
     gaps can require steep or curved routes. pause: as in `cheapest_airspace_route`.
-    finer_only: whether to leave out grids that `MAX_CELLS` makes no finer than one before.
+    finer_only: True to leave out grids that `MAX_CELLS` makes no finer than one before.
     """
     expected, finest = EXPECTED * math.dist(data.start, data.destination), 0
     for number, (stages, each) in enumerate(grids):

@@ -21,10 +21,10 @@ MAX_SPREAD = 0.3
 
 
 def bridge_modes(inner: int) -> tuple[Floats, Floats]:
-    """Eigenvectors (inner, inner) and deviations (inner,) of the bridge kernel min(s, t) - s t at equidistant points.
+    """Return eigenvectors (inner, inner) and deviations (inner,) of the kernel min(s, t) - s t at equal steps.
 
     In closed form: the inverse of the kernel is the second difference, so the eigenvectors are sines. Deviations are
-    relative to that of the first mode.
+    relative to the deviation of the first mode.
     """
     k = np.arange(1, inner + 1)
     modes = np.sqrt(2.0 / (inner + 1)) * np.sin(np.pi * np.outer(k, k) / (inner + 1))
@@ -45,7 +45,7 @@ def bridge_basis(inner: int) -> Floats:
 def first_samples(
     space: Space, encoding: Encoding, population: int, starts: Floats, rng: np.random.Generator
 ) -> Floats:
-    """First population (n, d): the starts and smooth paths around them.
+    """Return the first population (n, d): the starts and smooth paths around them.
 
     Without starts, around the straight line.
     starts: vectors (s, d) to start from.

@@ -1,4 +1,4 @@
-"""Heights and slopes of flown corners, with derivatives by the waypoints: what shortening keeps beside the legs.
+"""Heights and slopes of flown corners, with derivatives by the waypoints, as constraints of shortening.
 
 Round the end of a ridge a flight cuts its corners over higher ground than there is below the legs.  Without tracking
 error it is on the chords of fly-by arcs; with it, it is within a distance of the legs before and after the waypoint, to
@@ -62,7 +62,7 @@ class FlownCorners(NamedTuple):
 
 @inner
 def no_corners(count: int, margin: float) -> FlownCorners:  # pragma: no cover - compiled
-    """None of so many corners; margin: additional, m."""
+    """Return no corners for a path; margin: additional, m."""
     slope_margin = ARC_MARGIN + ARC_SHARE * margin
     return FlownCorners(
         np.zeros(count), np.full((count, 2), margin), np.zeros(count), np.zeros((count, 2)), slope_margin

@@ -119,7 +119,7 @@ def _lowest_height(
 def _pixel_steps(
     data: ProblemArrays, frame: RotatedFrame, along: float, pitch: float
 ) -> _PixelSteps:  # pragma: no cover - compiled
-    """Steps in the raster of `pitch` m along and across the line, at this distance along."""
+    """Return steps in the raster of `pitch` m along and across the line, at this distance along."""
     east, north = position_of(frame, along, 0.0)
     column, row = polymap(data.to_pixel, east, north)
     east, north = position_of(frame, along + pitch, 0.0)
@@ -194,7 +194,7 @@ def set_cell_costs(
     high: int,
     price: Floats,
 ) -> None:  # pragma: no cover - compiled
-    """Fill the cost per m of a stage's cells (layers, low..high); inf where the ground is too near."""
+    """Fill the cost per m of a stage's cells (layers, low..high); inf if the ground is too near."""
     across, layers = grid.across, grid.layers
     step = frame.length / grid.stages
     steps = _pixel_steps(data, frame, stage * step, grid.spread * step if stage < grid.stages else 0.0)

@@ -54,7 +54,7 @@ class Lattice(NamedTuple):
 
     step: between points, m. behind, right: points behind the start and to its right. along, across: number of points.
     goal: index along of the destination. low: height of the first layer, m. pitch: between layers, m.
-    layers: number of layers. start_layer, goal_layer: those of the ends.
+    layers: number of layers. start_layer, goal_layer: layers of the ends.
     """
 
     step: float
@@ -97,7 +97,7 @@ def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) ->
 
 
 class _StateTable(NamedTuple):
-    """State of the search. Per state: cost (m), parent, and whether it is closed. Per step: whether it is feasible.
+    """State of the search. Per state: cost (m), parent, closed flag. Per step: feasible flag.
 
     parents: one more than the parent's number; 0 for a state that is not reached, whose cost is not set, and `_FIRST`
     for one of the start. rises: (8, 2) maximum climb and descent in layers. steps: by cell, course and rise.

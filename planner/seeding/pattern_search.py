@@ -61,7 +61,7 @@ class _State(NamedTuple):
 
     here: with the lowest merit, which is `best`. feasible: the best feasible one (inf if none), of merit `shortest`.
     before: where the round began. steps: (k,) of the moves. move: the next of the round; alive: whether any has been
-    tried in it. made: evaluations. ended: whether no move is left.
+    tried in it. made: evaluations. ended: True if no move is left.
     """
 
     here: Floats
@@ -140,7 +140,7 @@ def merits(scores: Floats) -> Floats:
 def _triangular_basis(inner: int) -> tuple[Floats, Ints]:
     """Return moves (k, 3 inner): triangles with half-widths of 1, 2, 4, ... waypoints.
 
-    And the axis (k,) of each.
+    Also returns the axis (k,) of each.
     """
     rows: list[Floats] = []
     axes: list[int] = []

@@ -158,7 +158,7 @@ def _descend(
 ) -> int:  # pragma: no cover - compiled
     """Minimise over a path (w, 3), in place, and fill the constraints' values at the end.
 
-    Models evaluated.
+    Returns the number of models evaluated.
     """
     low, high, model, step, trial = descent.low, descent.high, descent.model, descent.step, descent.trial
     merit, made = lagrangian(data, limits, active, here, multipliers, values, penalty, model), 1
@@ -214,7 +214,7 @@ def shorten_path(
 
     A model is one evaluation. extra_margin: additional margin to spheres and ground, m. pause: called after some
     milliseconds of work; an exception raised there stops it. Zones and the maximum height above ground are ignored.
-    corners_too: whether corners as flown are held clear of the ground and below the steepest slopes, which is slower.
+    corners_too: True if corners as flown are held clear of the ground and below the steepest slopes, which is slower.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem

@@ -73,7 +73,7 @@ class ActiveConstraints(NamedTuple):
     samples: number of ground samples on each leg. low: (w - 1,) height required above the clearance, m.
     climb, dive: (w - 1,) tangents. before, after: (w,) length of the legs (m) that a turn takes, divided by the tangent
     of half the turn. roll: (w - 1,) length of a leg taken by the roll between turns to opposite sides, m.
-    turns_in_legs: whether legs must hold their turns, and turn_margin: with how much beside them, m.
+    turns_in_legs: True if legs must hold their turns. turn_margin: length of a leg in addition to its turns, m.
     flown: the corners that are flown near the ground, or almost as steeply as can be.
     """
 
@@ -95,10 +95,11 @@ class ActiveConstraints(NamedTuple):
 def active_constraints(
     data: ProblemArrays, path: Floats, samples: int, extra_margin: float, corners_too: bool
 ) -> ActiveConstraints:  # pragma: no cover - compiled
-    """Active constraints near a path (w, 3); extra_margin: additional margin to spheres and ground, m.
+    """Return active constraints near a path (w, 3).
 
-    corners_too: whether flown corners are held clear of the ground and below the steepest slopes; legs then keep twice
-    the additional margin beside their turns.
+    Extra_margin: additional margin to spheres and ground, m.
+    corners_too: True if flown corners are held clear of the ground and below the steepest slopes; legs then keep twice
+    the additional margin in addition to their turns.
     """
     limits = precompute_limits(data)
     count = path.shape[0] - 1
@@ -525,7 +526,10 @@ def lagrangian(
     penalty: float,
     model: LagrangianModel,
 ) -> float:  # pragma: no cover - compiled
-    """Augmented length or cost of a path (w, 3), m; fills the constraints' values and the model."""
+    """Return the augmented length or cost of a path (w, 3), m.
+
+    Fills the constraints' values and the model.
+    """
     model.gradient[:], model.band[:] = 0.0, 0.0
     at = active.pairs.shape[0]
     by_length = data.travel.time == 0.0 and data.travel.energy == 0.0

@@ -152,7 +152,7 @@ class WaypointFit:
     candidates: along each interval.
     lifts: heights above the route, m.
     rounds: of moves of each waypoint.
-    diagonal: whether moves lead to all 26 neighbours, not just the 6 along the axes.
+    diagonal: True if moves lead to all 26 neighbours, not just the 6 along the axes.
     """
 
     candidates: int
@@ -252,7 +252,7 @@ def _pick(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tu
 
 
 def _restore(frames: WaypointFrames, candidates: Floats) -> Floats:
-    """Return world positions of candidates (w, c, 3), those of the ends in the frame of the waypoint next to each."""
+    """Return world positions of candidates (w, c, 3), of the ends in the frame of the waypoint next to each."""
     rows = np.clip(np.arange(len(candidates)) - 1, 0, len(candidates) - 3)
     east, north, cosine, sine = (values[rows] for values in frames[:4])
     of_rows = WaypointFrames(east, north, cosine, sine, frames.edges)
