@@ -149,7 +149,7 @@ def _climb_problem(plan: Plan, airframe: Airframe) -> str:
 
 
 def _other_plan(plan: Plan, airframe: Airframe, search: Search, shortfalls: list[Shortfall]) -> Plan | None:
-    """Search for a plan that leaves the height that gusts need, or return None if there is none."""
+    """Search for a plan that leaves the height that gusts need, or return or None without one."""
     shares = [_UNUSED_CLIMB_FRACTION]
     if _exceeds_a_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
         shares.append(_UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT)
@@ -306,7 +306,7 @@ def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, 
 
 
 def _into_clearance(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Find the deepest displacement of a path by a downdraft below its clearance; None if there is none."""
+    """Find the deepest displacement of a path by a downdraft below its clearance; or None without one."""
     data = problem.certified
     into = f"into the clearance of {data.clearance:g} m"
     for name, over, k in _heights_at_ends(problem, parts):
@@ -324,7 +324,7 @@ def _into_clearance(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _above_maximum(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Find the highest displacement by an updraft above the maximum height; None if there is none."""
+    """Find the highest displacement by an updraft above the maximum height; or None without one."""
     data, most = problem.certified, problem.certified.airspace.max_height
     if most == math.inf:
         return None
@@ -339,7 +339,7 @@ def _above_maximum(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _into_missile(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Find the deepest displacement by a gust into the sphere of a missile; None if there is none."""
+    """Find the deepest displacement by a gust into the sphere of a missile; or None without one."""
     threats = problem.scenario.threats
     paths = _gust_paths(parts) if (threats.kill_radius > 0.0).any() else []
     deepest = min(paths, key=lambda path: kill_distance(problem.certified, path), default=None)
@@ -358,7 +358,7 @@ def _into_missile(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _into_zone(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Find the deepest displacement into exclusion or out of inclusion zones; None if there is none."""
+    """Find the deepest displacement into exclusion or out of inclusion zones; or None without one."""
     data = problem.certified
     if not is_limited(data.airspace) or not problem.scenario.zones:
         return None

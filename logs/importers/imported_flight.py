@@ -41,9 +41,9 @@ SHORTEST = 20.0
 class FlightPart:
     """One flight with one mission.
 
-    start, end: s, of the flight.
-    mission: number of the mission in the log that it was flown with; -1 for none.
-    stretches: flown along it.
+    start, end: of the flight, s.
+    mission: number of the mission in the log, -1 for none.
+    stretches: parts flown along the mission.
     """
 
     start: float
@@ -53,12 +53,12 @@ class FlightPart:
 
     @property
     def along_mission(self) -> float:
-        """Seconds flown along the mission."""
+        """Time flown along the mission, s."""
         return sum(stretch.end - stretch.start for stretch in self.stretches)
 
 
 def flown_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[float, float]]:
-    """When the aircraft flew, as starts and ends in s: faster over the ground than a person on the field.
+    """Return starts and ends of flights, s: faster over the ground than a person on the field.
 
     >>> time = np.arange(0.0, 200.0)
     >>> north = np.cumsum(np.where((time > 50.0) & (time < 150.0), 20.0, 0.1))
@@ -94,10 +94,10 @@ def flight_parts(
     missions: Sequence[LoggedMission],
     last: float,
 ) -> list[FlightPart]:
-    """Each flight, once for every mission that it was flown with.
+    """Return each flight, once for every mission that it was flown with.
 
-    spans: of `flown_spans`.  last: time of the log's last row, s.  Without modes all of a flight counts as flown along
-    the mission, for nothing says otherwise.
+    spans: from `flown_spans`.  last: time of the last row of the log, s.  Without modes, all of a flight is regarded as
+    flown along the mission.
     """
     parts = []
     for start, end in spans:

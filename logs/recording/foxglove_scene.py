@@ -191,7 +191,7 @@ def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
 
 
 def track_scene(time_ns: int, positions: Floats) -> bytes:
-    """Draw the flown track so far, (n, 3)."""
+    """Draw the track (n, 3) flown up to now."""
     line = _TRACK_LINE + repeated_submessages(_LINE_POINTS, _XYZ, positions)
     entity = _entity(time_ns, "track").SerializeToString(deterministic=True)
     return length_delimited(2, entity + length_delimited(_ENTITY_LINES, line))

@@ -44,7 +44,7 @@ class _Damage(Exception):
 
 @dataclass(slots=True)
 class Container:
-    """What was found in a file up to its end, or up to its first damage.
+    """Content of a file up to its end, or up to its first damage.
 
     attachments: by name.  media: the type and log_time (ns) of each.  problem: empty if the file is whole.
     """

@@ -76,7 +76,7 @@ class ChunkContent:
 
 
 class _ChunkIndex(NamedTuple):
-    """What the chunk index says of a chunk in the file; a frozen dataclass takes six times as long to make."""
+    """Entry of a chunk in the chunk index; a frozen dataclass takes six times as long to make."""
 
     content_start: int
     content_end: int
@@ -276,7 +276,7 @@ SECOND_NS: Final = 1_000_000_000
 # next state row), bytes, channel, log time (ns), and where it starts in its chunk.
 ENTRY: Final = np.dtype([(name, np.int64) for name in ("source", "length", "channel", "log_time", "offset")])
 FROM_ROWS: Final = -1
-# What `last_log_time` gives for times that cannot be recorded.
+# Results of `last_log_time` for times that cannot be recorded.
 OUT_OF_RANGE: Final = -1
 NOT_INCREASING: Final = -2
 # A chunk: its bytes in `Layout.records`, the log times of its first and last message (ns), and the bytes of its message
@@ -337,7 +337,7 @@ def _put_varint(out: Bytes, at: int, value: int) -> int:
 
 @compiled
 def _put_head(out: Bytes, at: int, size: int, channel: int, log_time: int) -> int:
-    """Write a message record's frame and header; ``size`` is the message's."""
+    """Write the frame and header of a message record; ``size`` is the size of the message."""
     out[at] = MESSAGE_OPCODE
     at = _put(out, at + 1, MESSAGE_HEADER + size, 8)
     at = _put(out, at, channel, 2)

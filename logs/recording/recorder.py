@@ -186,7 +186,7 @@ class Recorder:
 
     @property
     def size(self) -> int:
-        """Bytes of the file so far."""
+        """Present size of the file, bytes."""
         return self._file.tell()
 
     def flush(self) -> None:
@@ -267,7 +267,7 @@ class Recorder:
         return self._channels[topic]
 
     def _add_scene(self, topic: str, update: bytes) -> None:
-        """What a viewer shows from the flight's start on, though it is known at its end alone."""
+        """Add a scene that a viewer shows from the start of the flight, although it is known only at the end."""
         self._write([single_record(self._scene_channel(topic), EPOCH_NS, update)])
         self._writer.flush()
 

@@ -1,1 +1,1 @@
-"""What is shown of a flight: charts, pictures and pages from one description each, replays, and files for others."""
+"""Views of a flight: charts, pictures and pages from one description each, replays, and exports."""

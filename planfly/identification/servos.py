@@ -1,4 +1,4 @@
-"""Which servo output moves what, as an aircraft's ``ardupilot.toml`` states it."""
+"""Servo outputs and the controls that they move, from an aircraft's ``ardupilot.toml``."""
 
 import math
 from collections.abc import Mapping

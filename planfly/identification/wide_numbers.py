@@ -1,4 +1,4 @@
-"""Which of an identified aircraft's numbers the logs leave wide, and the flight that would narrow them."""
+"""Quantities of an identified aircraft that its logs leave uncertain, and flights that would narrow them."""
 
 from dataclasses import dataclass
 

@@ -54,7 +54,7 @@ class MovieFrames:
     speed: float
 
     def __len__(self) -> int:
-        """How many frames there are: the first shows the start, the last the end."""
+        """Return the number of frames: the first shows the start, the last the end."""
         return max(1, math.ceil((self.end - self.start) * RATE / self.speed - 1e-9)) + 1
 
     def times(self) -> Floats:

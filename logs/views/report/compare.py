@@ -72,7 +72,7 @@ class Comparison:
         return f"<Comparison {' and '.join(self.names)}: {len(self.differences)} quantities, {len(self.notes)} notes>"
 
     def _repr_html_(self) -> str:
-        """How a notebook shows it."""
+        """Return the HTML for a notebook."""
         return html_table(" and ".join(self.names), difference_rows(self), ("", "", *self.names, "difference"))
 
 
@@ -151,7 +151,7 @@ def _reduced(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]])
 
 
 def _margins(verdict: Verdict) -> dict[tuple[str, str], float]:
-    """How many findings fail, and each rule's margin closest to its limit; NaN for one that fails without a number."""
+    """Return the number of failed findings, and the closest margin of each rule; NaN if not a number."""
     found = {("findings that fail", ""): float(sum(item.ok is False for item in verdict.findings))}
     for name, rule in RULE_WORDS.items():
         closest = closest_to_limit(one for one in verdict.findings if one.rule == name)

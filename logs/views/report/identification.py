@@ -47,7 +47,7 @@ class ReplayedLog:
 
 @dataclass(frozen=True, slots=True)
 class IdentificationFacts:
-    """What the page is made of.
+    """Data of the page.
 
     title: the aircraft's.  logs: name and SHA-256 of each.
     numbers: what it can do: name, unit, lower end, estimate and upper end (95 %).
