@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import overload
+from typing import TypedDict, Unpack, cast, overload
 
 from aircraft.catalog import Aircraft, aircraft_names, find_aircraft, load_aircraft, make_own_folder, model_hash
 from aircraft.envelope import Envelope
@@ -13,6 +13,7 @@ from flight.autopilots.catalog import AUTOPILOTS
 from flight.dynamics.characteristics import Mode, StepResponse, TrimRow, modes_at, step_responses, trim_table
 from flight.dynamics.envelope_tables import load_envelope
 from planfly.first_start import with_warm_up
+from planfly.flight_options import takes_options
 from planfly.stages import stage
 from planfly.targets import filled_pattern, prepare_folder, refuse_folder
 from world.errors import PlanflyError
@@ -64,25 +65,31 @@ def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
     return find_aircraft(str(name.resolve()) if isinstance(name, Path) else name)
 
 
+class DataSheetOptions(TypedDict, total=False):
+    """The numbers of an aircraft's data sheet, and a file of its autopilot's parameters; see `new_aircraft`."""
+
+    mass: float | None
+    span: float | None
+    area: float | None
+    cruise: float | None
+    stall: float | None
+    top: float | None
+    bank: float | None
+    climb: float | None
+    battery: str | None
+    motor: float | None
+    prop: str | None
+    layout: Layout | None
+    fuel: float | None
+    params: str | Path | None
+
+
 @with_warm_up()
+@takes_options
 def new_aircraft(
     folder: str | Path,
     source: str | Path | None = None,
-    *,
-    mass: float | None = None,
-    span: float | None = None,
-    area: float | None = None,
-    cruise: float | None = None,
-    stall: float | None = None,
-    top: float | None = None,
-    bank: float | None = None,
-    climb: float | None = None,
-    battery: str | None = None,
-    motor: float | None = None,
-    prop: str | None = None,
-    layout: Layout | None = None,
-    fuel: float | None = None,
-    params: str | Path | None = None,
+    **given: Unpack[DataSheetOptions],
 ) -> Aircraft:
     """Make the folder of an aircraft of one's own, which must not be there yet.
 
@@ -109,20 +116,20 @@ def new_aircraft(
     >>> made.mass, made.airspeed, round(made.wing_area, 2)
     (2.1, 15.0, 0.32)
     """
-    numbers = {
-        "mass": mass, "span": span, "area": area, "cruise": cruise, "stall": stall, "top": top, "bank": bank,
-        "climb": climb, "motor": motor, "fuel": fuel,
-    }  # fmt: skip
-    texts = {"battery": battery, "prop": prop, "params": params, "layout": layout}
-    given = [name for name, value in (numbers | texts).items() if value is not None]
-    if not given:
+    stated = {name: value for name, value in given.items() if value is not None}
+    if not stated:
         make_own_folder(Path(folder), _opened("aerosonde" if source is None else source))
         return find_aircraft(str(Path(folder).absolute()))
     if source is not None:
-        raise PlanflyError.of_argument("source", source, f"goes without {given[0]}: a copy has that aircraft's numbers")
+        raise PlanflyError.of_argument(
+            "source", source, f"goes without {next(iter(stated))}: a copy has that aircraft's numbers"
+        )
     from planfly.data_sheets import make_data_sheet_folder, parse_sheet
 
-    sheet = parse_sheet(numbers, battery=battery, prop=prop, layout=layout)
+    params = given["params"]
+    texts = ("battery", "prop", "layout", "params")
+    numbers = {name: cast("float | None", value) for name, value in given.items() if name not in texts}
+    sheet = parse_sheet(numbers, battery=given["battery"], prop=given["prop"], layout=given["layout"])
     with stage(f"making {Path(folder).name}", "making"):
         return make_data_sheet_folder(Path(folder), sheet, None if params is None else Path(params))
 

@@ -90,7 +90,7 @@ def test_heights_of_another_datum_are_not_held_against_the_plans(tmp_path: Path,
 
 
 def test_a_datum_that_a_person_states_counts_where_the_log_states_none(tmp_path: Path) -> None:
-    said = replace(AEROSONDE, datum="amsl")
+    said = {**AEROSONDE, "datum": "amsl"}
     assert outcome(judged(tmp_path, replace(example_raw_log(), datum="unstated"), said), "slope") == [True, True]
     assert outcome(judged(tmp_path, replace(example_raw_log(), datum="ellipsoid"), said), "slope") == [None, None]
 
