@@ -10,7 +10,7 @@ from planner.search.search_state import StopCondition
 from world.scenario import Scenario
 
 
-def make_front(
+def make_pareto_plans(
     scenario: Scenario,
     airframe: Airframe,
     seed: int,

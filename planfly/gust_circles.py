@@ -2,7 +2,7 @@
 
 PX4 flies on at a waypoint only within NAV_FW_ALT_RAD of its altitude; otherwise it orbits the waypoint.  Moderate
 turbulence displaces light aircraft further than that now and then, and an orbit leaves the airspace that the plan was
-checked for.  Therefore a plan may have only as many waypoints as give less than `MOST_CIRCLES` expected orbits a
+checked for.  Therefore a plan may have only as many waypoints as give less than `MAX_EXPECTED_ORBITS` expected orbits a
 flight. A plan that needs more is refused with the reason.
 """
 
@@ -21,14 +21,14 @@ from world.scenario import Scenario
 
 # Expected orbits in a flight that are accepted; about every second one leaves the corridor (of 186 flights, with 58
 # waypoints passed too high or too low, 30 failed).
-MOST_CIRCLES = 0.03
+MAX_EXPECTED_ORBITS = 0.03
 # Growth of the excursion at a corner in gusts, m: of 28 m they made 36 at the most in 8 flights.
-GUSTS_ASIDE = 8.0
+GUST_CORNER_MARGIN_M = 8.0
 # Values of the autopilot's altitude parameter that are tried as a remedy, m.
 _TRIED_ALTITUDE_RADII_M = range(5, 105, 5)
 
 
-def settle_in_gusts(
+def limit_waypoint_orbits(
     plan: Plan,
     airframe: Airframe,
     search: Callable[[Scenario], Plan] | None = None,
@@ -47,14 +47,14 @@ def settle_in_gusts(
     >>> scenario = load_scenario("tight")
     >>> airframe = load_airframe(scenario)
     >>> plan = plan_path(scenario, airframe.limits, seed=1)
-    >>> settle_in_gusts(plan, airframe) is plan
+    >>> limit_waypoint_orbits(plan, airframe) is plan
     True
     """
     autopilot, limits = airframe.autopilot, airframe.limits.surely()
     expected = expected_circles(plan, autopilot, limits)
     if not plan.safe or expected == 0.0:
         return plan
-    if expected <= MOST_CIRCLES:
+    if expected <= MAX_EXPECTED_ORBITS:
         # With as many waypoints as plans have without orbits, no corner is too sharp.
         has_all = len(plan.waypoints) >= plan.scenario.planner.waypoints
         return plan if has_all or _is_accepted(plan, airframe) else _refused(plan, _corridor_problem(plan, airframe))
@@ -64,7 +64,7 @@ def settle_in_gusts(
     circles, count = expected_circles(fewer, autopilot, limits), len(fewer.waypoints) - 2
     if search is not None:
         # Assume the orbit probability per waypoint of this path: on another path it may be lower.
-        allowed, scenario = max(1, int(MOST_CIRCLES * count / circles)), plan.scenario
+        allowed, scenario = max(1, int(MAX_EXPECTED_ORBITS * count / circles)), plan.scenario
         table = scenario.planner.model_copy(update={"waypoints": allowed + 2})
         other = replace(search(replace(scenario, planner=table)), scenario=scenario)
         if other.safe and _is_accepted(other, airframe):
@@ -79,7 +79,7 @@ def _refused(plan: Plan, problem: str) -> Plan:
 
 def _is_accepted(plan: Plan, airframe: Airframe) -> bool:
     """Return True if a plan expects few enough orbits and no corner leaves the corridor."""
-    if expected_circles(plan, airframe.autopilot, airframe.limits.surely()) > MOST_CIRCLES:
+    if expected_circles(plan, airframe.autopilot, airframe.limits.surely()) > MAX_EXPECTED_ORBITS:
         return False
     return max(_excursions(plan, airframe), default=0.0) <= _half_width(plan, airframe)
 
@@ -95,7 +95,9 @@ def _excursions(plan: Plan, airframe: Airframe) -> list[float]:
     if (tracking := limits.tracking) is None:
         return []
     turns, speeds = turning_angles(plan.waypoints), corner_speeds(plan.scenario, plan.waypoints, limits.airspeed)
-    return [tracking.corner_excursion(float(one), v) + GUSTS_ASIDE for one, v in zip(turns, speeds, strict=True)]
+    return [
+        tracking.corner_excursion(float(one), v) + GUST_CORNER_MARGIN_M for one, v in zip(turns, speeds, strict=True)
+    ]
 
 
 def _corridor_problem(plan: Plan, airframe: Airframe) -> str:
@@ -116,7 +118,7 @@ def expected_circles(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
     turbulence, expected = plan.scenario.wind.turbulence, 0.0
     for rate, waypoint in zip(limits.climb_rates(plan.waypoints)[:-1, 1].tolist(), plan.waypoints[1:-1], strict=True):
         climb, sink = limits.rates(float(waypoint[2]))
-        expected += autopilot.off_height_chance(climb - max(0.0, rate), sink - max(0.0, -rate), turbulence)
+        expected += autopilot.altitude_miss_probability(climb - max(0.0, rate), sink - max(0.0, -rate), turbulence)
     return expected
 
 
@@ -133,10 +135,10 @@ def waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
     """
     scenario, count = plan.scenario, len(plan.waypoints)
     climb, sink = airframe.limits.surely().rates(float(plan.waypoints[:, 2].max()))
-    chance = airframe.autopilot.off_height_chance(climb, sink, scenario.wind.turbulence)
+    chance = airframe.autopilot.altitude_miss_probability(climb, sink, scenario.wind.turbulence)
     if chance == 0.0:
         return count
-    return max(count, min(scenario.planner.waypoints, 2 + int(MOST_CIRCLES / chance)))
+    return max(count, min(scenario.planner.waypoints, 2 + int(MAX_EXPECTED_ORBITS / chance)))
 
 
 def _orbit_problem(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
@@ -145,11 +147,11 @@ def _orbit_problem(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
     circles = expected_circles(plan, autopilot, limits)
     helps = "Less turbulence"
     for value in _TRIED_ALTITUDE_RADII_M:
-        if expected_circles(plan, autopilot.with_parameters(**{name: float(value)}), limits) <= MOST_CIRCLES:
+        if expected_circles(plan, autopilot.with_parameters(**{name: float(value)}), limits) <= MAX_EXPECTED_ORBITS:
             helps = f"{name} of {value} m"
             break
     return (
         f"in {plan.scenario.wind.turbulence} turbulence {autopilot.title} circles where gusts have it off a waypoint's"
-        f" height, at one of {count} in {min(circles, 1.0):.0%} of flights; up to {MOST_CIRCLES:.0%} are taken for"
+        f" height, at one of {count} in {min(circles, 1.0):.0%} of flights; up to {MAX_EXPECTED_ORBITS:.0%} are taken for"
         f" safe. {helps} would help"
     )

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 from aircraft.path_limits import Limits
 from logs.verdict.conditions import Conditions, conditions_of
-from logs.verdict.measures.circle_reach import beside_end
+from logs.verdict.measures.circle_reach import end_loiter_hazards
 from logs.verdict.measures.route_requirements import route_requirements
 from planfly.airframe import Airframe, laid_from_the_ground
-from planfly.gust_circles import settle_in_gusts
+from planfly.gust_circles import limit_waypoint_orbits
 from planfly.gust_heights import keep_height
 from planfly.open_flight import make_setup, mission_of_plan
 from planner.plan import Plan
@@ -56,7 +56,7 @@ def make_plan(
 
     def settle(plan: Plan, search: Search) -> Plan:
         def few_waypoints(found: Plan, within: Limits) -> Plan:
-            return settle_in_gusts(found, airframe, lambda asked: search(asked, within), within)
+            return limit_waypoint_orbits(found, airframe, lambda asked: search(asked, within), within)
 
         def search_within(kept: Limits) -> Plan:
             return few_waypoints(search(plan.scenario, kept), kept)
@@ -80,7 +80,7 @@ def make_plan(
 
 def finish_plan(plan: Plan, airframe: Airframe, *, onward: bool = False) -> Plan:
     """A path that was found, with all that `make_plan` does after its search; nothing else is searched for."""
-    return _completed(keep_height(settle_in_gusts(plan, airframe), airframe), airframe, onward=onward)
+    return _completed(keep_height(limit_waypoint_orbits(plan, airframe), airframe), airframe, onward=onward)
 
 
 def _completed(plan: Plan, airframe: Airframe, old: Plan | None = None, *, onward: bool) -> Plan:
@@ -92,7 +92,7 @@ def _completed(plan: Plan, airframe: Airframe, old: Plan | None = None, *, onwar
     if onward or not airframe.autopilot.loiter_rules.ends_in_circle:
         return plan
     setup = make_setup(plan.scenario, airframe, mission_of_plan(plan, airframe), plan.seed, plan=plan)
-    beside = beside_end(route_requirements(setup))
+    beside = end_loiter_hazards(route_requirements(setup))
     if beside is None or not beside[1]:
         return plan
     circles = f"{airframe.autopilot.title} circles about the destination, up to {beside[0]:.0f} m from it"

@@ -25,7 +25,7 @@ from planfly.crash_safe_log import CrashSafeLog, FlightLimits
 from planfly.make_plan import Advance, make_plan, planned_for
 from planfly.open_flight import make_setup, mission_of_plan
 from planfly.reference_flights import FlyReference, judge_with_reference_flights
-from planfly.returns_beside import ReturnsBeside, returns_beside
+from planfly.returns_beside import ReturnSummary, return_summary
 from planner.plan import Plan
 from world.errors import FlightError, StartError
 from world.scenario import Scenario
@@ -97,7 +97,7 @@ class JudgedFlight:
     verdict: Verdict
     events: tuple[LogEvent, ...]
     reference: ReferenceFlights | None = None
-    returns: ReturnsBeside | None = None
+    returns: ReturnSummary | None = None
 
 
 def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | None = None) -> PlanThenFly:
@@ -215,7 +215,7 @@ def _record_and_judge(task: _Task, requirements: RouteRequirements, flight: Airb
         judged = _judged(task, requirements, thin_track(track, task.every), recorder.ended)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
-        beside = returns_beside(flight.setup, judged.track) if task.returns else None
+        beside = return_summary(flight.setup, judged.track) if task.returns else None
         drawn = None if beside is None else beside.plainly_drawn()
         recorder.finish(judged.ended, judged.verdict, judged.reference, drawn)
     return replace(judged, returns=beside)

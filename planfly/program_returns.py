@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.swift_return import CIRCLED, HIT, NEVER, OFF_GROUND, RETURN_FLOWN
+from flight.autopilots.arduplane.swift_return import (
+    RETURN_ARRIVED,
+    RETURN_GROUND_IMPACT,
+    RETURN_OFF_TERRAIN,
+    RETURN_RESULT,
+    RETURN_TIMEOUT,
+)
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.catalog import program_autopilot
 from flight.mission.return_path import ReturnTarget
@@ -213,11 +219,13 @@ def _as_flown(world: ReturnWorld, law: ReturnFlown, start: Record, track: Track,
     closest = met_on_way(world, position)
     hits = ended == "ground contact" and len(position) == len(whole)
     arrives = hits or bool(np.hypot(*(position[-1, :2] - np.array(_end_position(target)[:2]))) < _ARRIVAL_DISTANCE_M)
-    record: Record = np.zeros(1, RETURN_FLOWN)[0]
+    record: Record = np.zeros(1, RETURN_RESULT)[0]
     clearance = min(0.0, closest.clearance) if hits else closest.clearance
-    record["ended"] = HIT if hits or clearance <= 0.0 else CIRCLED if arrives else NEVER
+    record["ended"] = (
+        RETURN_GROUND_IMPACT if hits or clearance <= 0.0 else RETURN_ARRIVED if arrives else RETURN_TIMEOUT
+    )
     if math.isnan(clearance):
-        record["ended"] = OFF_GROUND
+        record["ended"] = RETURN_OFF_TERRAIN
     record["clearance"], record["outside"], record["threat"] = clearance, closest.outside, closest.threat
     used = float(track.energy[begin + len(position) - 1] - track.energy[begin])
     left = law.left + law.energy - used

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from logs.verdict.findings import Finding
 from logs.verdict.places import Change
-from logs.verdict.tolerances import ROUNDING
+from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import threat_text
 from planner.evaluation.problem import CERTIFIED_ZONE_MARGIN
@@ -147,7 +147,7 @@ def _height(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tight
 
 def _zones(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
     """Widen the margin around zones if the flight violates one and the plan itself does not."""
-    mine = [item for item in failed if item.rule == "fence" and not (item.planned or 0.0) > ROUNDING]
+    mine = [item for item in failed if item.rule == "fence" and not (item.planned or 0.0) > ROUNDING_M]
     deep = [-item.margin for item in mine if item.margin is not None]
     if not deep:
         return []

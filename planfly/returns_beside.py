@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns, plainly_drawn
+from logs.verdict.returns.drawn_returns import DrawnReturns, draw_returns_without_glides, drawn_returns
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, return_world
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
@@ -24,7 +24,7 @@ _SUMMARY_RETURNS = 50
 
 
 @dataclass(frozen=True, slots=True)
-class ReturnsBeside:
+class ReturnSummary:
     """Returns from a few places of a flight, without simulation in JSBSim, to accompany its verdict.
 
     line: summary of all returns in a line; "" if nothing can be judged.
@@ -42,17 +42,17 @@ class ReturnsBeside:
             return None
         return drawn_returns(self.world, self.starts, self.returns, judge_glides(self.world, self.starts))
 
-    def plainly_drawn(self) -> DrawnReturns | None:
+    def draw_returns_without_glides(self) -> DrawnReturns | None:
         """Return the data of the pictures without glides and least heights, in some hundredths of a second."""
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
-        return plainly_drawn(self.world, self.starts, self.returns)
+        return draw_returns_without_glides(self.world, self.starts, self.returns)
 
 
-def returns_beside(setup: FlightSetup, track: Track | None) -> ReturnsBeside:
+def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
     """Judge returns of a flight or of the planned path; empty without a home or a terrain."""
     if setup.mission.home is None or setup.scenario.terrain is None:
-        return ReturnsBeside()
+        return ReturnSummary()
     try:
         world = return_world(setup)
         seconds = setup.path.length / max(1.0, setup.airspeed)
@@ -62,12 +62,12 @@ def returns_beside(setup: FlightSetup, track: Track | None) -> ReturnsBeside:
         starts = return_starts(setup, track, every)
         found = judge_returns(world, starts, every)
     except PlanflyError as error:
-        return ReturnsBeside(f"not judged: {error}")
+        return ReturnSummary(f"not judged: {error}")
     own = world.stands_in and not world.other_law
     stands_in = f" (by ArduPlane's law in place of {setup.autopilot.title}'s)" if own else ""
-    return ReturnsBeside(headline(found) + stands_in, world, starts, found)
+    return ReturnSummary(headline(found) + stands_in, world, starts, found)
 
 
 def returns_line(setup: FlightSetup, track: Track | None) -> str:
     """Summarise returns of a flight or of the planned path in a line; "" without a home or a terrain."""
-    return returns_beside(setup, track).line
+    return return_summary(setup, track).line

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from flight.live.flight_process import (
-    HELD_ON,
-    LEFT_FOR,
+    DIVERTED_TEXT,
+    STILL_LOITERING_TEXT,
     DivertFlight,
     FlightJudged,
     JudgeMission,
@@ -255,7 +255,7 @@ class ServedLog:
         not judged: `planfly check` does it.  A path abandoned within a second leaves no log.
         """
         track = join_tracks(self._blocks)
-        left = ended.startswith((LEFT_FOR, HELD_ON))
+        left = ended.startswith((DIVERTED_TEXT, STILL_LOITERING_TEXT))
         end = float(track.time[-1]) if len(track) else 0.0
         if left and end < 1.0:
             self._recorder.abandon()

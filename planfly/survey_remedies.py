@@ -27,9 +27,9 @@ RemedyKind = Literal["side", "turn-around", "every", "course", "parameter", "air
 # Turn-arounds that are tried, m.
 TURN_AROUNDS = (25.0, 50.0, 75.0, 100.0, 125.0, 150.0, 175.0, 200.0, 250.0, 300.0, 350.0, 400.0)
 # Interleave strides that are tried: fly every n-th line first.
-EVERY = (2, 3, 4)
+INTERLEAVE_STRIDES = (2, 3, 4)
 # Fractions of the airspeed that are tried.
-SLOWER = (0.95, 0.9, 0.85, 0.8, 0.7)
+AIRSPEED_FACTORS = (0.95, 0.9, 0.85, 0.8, 0.7)
 # Least airspeed that is tried, as a ratio to the minimum airspeed of the aircraft.
 _MIN_AIRSPEED_RATIO = 1.1
 
@@ -233,7 +233,7 @@ class _Trials:
         """
         lead_in = at_most if math.isfinite(at_most) else 0.0
         tried = [self._now, *(one for one in TURN_AROUNDS if self._now + 1.0 < one < at_most)]
-        for every in EVERY:
+        for every in INTERLEAVE_STRIDES:
             if 2 * every > max(len(survey.lines) for survey in self._surveys):
                 break
             found = self._shortest_turn_around(every, tried, lead_in)
@@ -353,7 +353,7 @@ class _Trials:
         if any(item.command == Command.DO_CHANGE_SPEED for item in self._setup.mission.items):
             return
         slowest = _MIN_AIRSPEED_RATIO * self._airframe.aircraft.airspeed_min
-        for speed in (round(2.0 * share * self._airframe.airspeed) / 2.0 for share in SLOWER):
+        for speed in (round(2.0 * share * self._airframe.airspeed) / 2.0 for share in AIRSPEED_FACTORS):
             if speed < slowest:
                 break
             with suppress(PlanflyError):

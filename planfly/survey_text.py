@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from flight.mission.surveys import Survey
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
 from logs.verdict.rules.survey_rule import FRONT, SIDE, lost_text, overlap_text
-from logs.verdict.tolerances import PHOTO_OVERLAP, PHOTO_SHARE
+from logs.verdict.tolerances import PHOTO_COVERAGE_FRACTION, PHOTO_OVERLAP_FRACTION
 from planfly.survey_remedies import NearMiss, SurveyRemedy, nth
 
 
@@ -16,7 +16,7 @@ def usable(measure: LineMeasure | None) -> bool:
     >>> usable(None)
     False
     """
-    return measure is not None and measure.good >= PHOTO_SHARE
+    return measure is not None and measure.good >= PHOTO_COVERAGE_FRACTION
 
 
 def lines_headline(measures: list[LineMeasure | None]) -> str:
@@ -76,7 +76,7 @@ def kept_overlap(measure: OverlapMeasure | None) -> bool:
     if measure is None:
         return True
     pairs = ((measure.front, measure.camera.front), (measure.side, measure.camera.side))
-    return all(share is None or asked is None or share >= asked - PHOTO_OVERLAP for share, asked in pairs)
+    return all(share is None or asked is None or share >= asked - PHOTO_OVERLAP_FRACTION for share, asked in pairs)
 
 
 def needed_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:

@@ -112,12 +112,12 @@ def is_pattern(target: str | Path) -> bool:
     return "{name}" in str(target) or "{seed}" in str(target)
 
 
-def filled_pattern(target: str | Path, name: str, seed: int) -> Path:
+def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
     """Fill in {name} and {seed} of a path; the name is made a safe and distinct folder name.
 
     A name that has to be changed ends with the beginning of its SHA-256.
 
-    >>> str(filled_pattern(RUN_FOLDER, "a/b", 3)), str(filled_pattern(RUN_FOLDER, "a b", 3))
+    >>> str(expand_path_pattern(RUN_FOLDER, "a/b", 3)), str(expand_path_pattern(RUN_FOLDER, "a b", 3))
     ('runs/a-b-c14cdd-seed3', 'runs/a-b-c8687a-seed3')
     """
     safe = "".join(letter if letter.isalnum() or letter in "-_." else "-" for letter in name).lstrip(".") or "run"
@@ -128,7 +128,7 @@ def filled_pattern(target: str | Path, name: str, seed: int) -> Path:
 
 def file_target(target: str | Path, name: str, seed: int, *, overwrite: bool, source: Path | None = None) -> Path:
     """Return the file to write, checked as by `refuse_existing`; the caller makes the folder of a pattern."""
-    path = filled_pattern(target, name, seed)
+    path = expand_path_pattern(target, name, seed)
     if path.parent.exists() or not is_pattern(target):
         refuse_existing(path, overwrite, source)
     return path

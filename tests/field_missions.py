@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
-from logs.verdict.tolerances import RESERVE
+from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
 from world.frames import to_geo
 from world.scenario import Scenario, from_spec
 
@@ -70,7 +70,7 @@ def close_mission(seed: int, energy: Callable[[FieldMission], float], **flight: 
             _set_edge(tables["area"], way, by)
         case "energy":
             needed = energy(_made(f"energy-{seed}", way, tables, "", exceeded=False))
-            tables["flight"]["battery_wh"] = round(needed / (1.0 - RESERVE) * (1.0 + by), 2)
+            tables["flight"]["battery_wh"] = round(needed / (1.0 - ENERGY_RESERVE_FRACTION) * (1.0 + by), 2)
     return _made(f"{close_to}-{seed}", way, tables, close_to, exceeded=exceeded)
 
 

@@ -22,7 +22,7 @@ PATIENCE = 10.0
 LOCK = "saving.lock"
 
 
-class SavingTurns:
+class CacheWriteLock:
     """Lock of a cache folder, held from the end of a compilation until its kernel is saved.
 
     Numba reports when it has compiled a kernel and when it releases the compiler, and saves in between.  It compiles

@@ -17,7 +17,7 @@ from platformdirs import user_cache_dir
 
 from world.compile_events import kernel_is_compiled
 from world.kernel_cache import usable_folder, wanted_folder
-from world.kernel_saves import SavingTurns
+from world.kernel_saves import CacheWriteLock
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 _Array = TypeVar("_Array", bound=NDArray[Any])
@@ -48,7 +48,7 @@ class _Compiling(event.Listener):
 
 cast("Any", event).register("numba:compile", _Compiling())
 if _usable is not None:
-    SavingTurns(_usable).register()
+    CacheWriteLock(_usable).register()
 
 
 def cache_folder() -> Path:

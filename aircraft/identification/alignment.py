@@ -161,10 +161,10 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
     return Signals(**joined, edges=tuple(edges), block=np.concatenate(blocks))
 
 
-def led(values: Floats, lag: float, hertz: float) -> Floats:
+def invert_first_order_lag(values: Floats, lag: float, hertz: float) -> Floats:
     """Return values (n,) before a first-order lag (s): each plus the lag times its rate of change.
 
-    >>> led(np.arange(4.0), 0.5, 10.0)
+    >>> invert_first_order_lag(np.arange(4.0), 0.5, 10.0)
     array([5., 6., 7., 8.])
     """
     return np.asarray(values + lag * hertz * np.gradient(values))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.identification.airspeed import SCALE_SD, with_airspeed_scale
-from aircraft.identification.alignment import Clocks, Signals, align, find_clocks, led
+from aircraft.identification.alignment import Clocks, Signals, align, find_clocks, invert_first_order_lag
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.drag import FORCE_THINNING, AlphaDoubt, fit_drag
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
@@ -212,7 +212,9 @@ def _log_unexplained(fit: Fit, lag: float) -> float:
     Therefore both are taken as they were before the lag.
     """
     hertz = GRID_HZ / MOMENT_THINNING
-    left, all_of_it = (led(values, lag, hertz) for values in (fit.residual, fit.predicted + fit.residual))
+    left, all_of_it = (
+        invert_first_order_lag(values, lag, hertz) for values in (fit.residual, fit.predicted + fit.residual)
+    )
     return float(np.log(left.var() / (all_of_it.var() + 1e-300) + 1e-6))
 
 

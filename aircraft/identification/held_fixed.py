@@ -16,7 +16,7 @@ Changed = tuple[Signals, BaseModel]
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class FixedParameter:
     """One quantity that is held fixed.
 
     name: name for people, with its standard deviation.
@@ -134,20 +134,20 @@ _LEVEL_SD_RAD = float(np.radians(0.2))
 # certain than the Aerosonde's (Beard and McLain, Small Unmanned Aircraft, second edition, table E.2), which gives the
 # smallest standard deviation.
 HELD_FIXED = (
-    Held("lift of the elevator (50 %)", _coefficient("lift_elevator", 0.5)),
-    Held("lift of the pitch rate (50 %)", _coefficient("lift_rate", 0.5)),
-    Held("side force of sideslip (30 %)", _coefficient("side_beta", 0.3)),
-    Held("side force of the rudder (50 %)", _coefficient("side_rudder", 0.5, 0.095)),
-    Held("side force of the ailerons (100 %)", _coefficient("side_aileron", 1.0, 0.075)),
-    Held("roll of the rudder (100 %)", _coefficient("roll_rudder", 1.0, 0.0024)),
-    Held("product of inertia (50 %)", _product_of_inertia(0.5, 0.05)),
-    Held("clock of the accelerometers (15 ms)", _late_force(0.015)),
-    Held("clock of the servos (15 ms)", _late_surfaces(0.015)),
-    Held("airspeed (as the wind triangle has it)", _airspeed),
+    FixedParameter("lift of the elevator (50 %)", _coefficient("lift_elevator", 0.5)),
+    FixedParameter("lift of the pitch rate (50 %)", _coefficient("lift_rate", 0.5)),
+    FixedParameter("side force of sideslip (30 %)", _coefficient("side_beta", 0.3)),
+    FixedParameter("side force of the rudder (50 %)", _coefficient("side_rudder", 0.5, 0.095)),
+    FixedParameter("side force of the ailerons (100 %)", _coefficient("side_aileron", 1.0, 0.075)),
+    FixedParameter("roll of the rudder (100 %)", _coefficient("roll_rudder", 1.0, 0.0024)),
+    FixedParameter("product of inertia (50 %)", _product_of_inertia(0.5, 0.05)),
+    FixedParameter("clock of the accelerometers (15 ms)", _late_force(0.015)),
+    FixedParameter("clock of the servos (15 ms)", _late_surfaces(0.015)),
+    FixedParameter("airspeed (as the wind triangle has it)", _airspeed),
     # An error of the level also shows as a bias of the forward accelerometer, which is removed.
-    Held("level of the autopilot (0.2 deg)", _acceleration(0, _LEVEL_SD_RAD * 9.80665), level=_LEVEL_SD_RAD),
-    Held("mean vertical air (0.04 m/s)", _unchanged, air=0.04),
-    Held("downward accelerometer (0.03 m/s2)", _acceleration(2, 0.03)),
-    Held(NOISE, _noise((1, 2))),
-    Held("scale of the current (2 %)", _current(1.02), of_current=True),
+    FixedParameter("level of the autopilot (0.2 deg)", _acceleration(0, _LEVEL_SD_RAD * 9.80665), level=_LEVEL_SD_RAD),
+    FixedParameter("mean vertical air (0.04 m/s)", _unchanged, air=0.04),
+    FixedParameter("downward accelerometer (0.03 m/s2)", _acceleration(2, 0.03)),
+    FixedParameter(NOISE, _noise((1, 2))),
+    FixedParameter("scale of the current (2 %)", _current(1.02), of_current=True),
 )

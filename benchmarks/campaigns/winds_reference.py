@@ -32,7 +32,7 @@ from scipy.stats import chi2, norm
 from benchmarks.campaigns.sobol_samples import SOBOL_FLIGHTS, fly_sobol
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, open_campaign
 from planfly.campaigns.dispersions import default_dispersions
-from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, find_winds, open_winds_store
+from planfly.campaigns.find_winds import SEARCHED_QUANTITIES, WindsFound, WindsGoal, find_winds, open_winds_store
 from planfly.campaigns.flight_requests import FlightRequest, FlyOne
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.statistics.decision import Estimator, Goal, Tally
@@ -54,7 +54,7 @@ _SEED = 77
 
 def demo(seed: int) -> CampaignBase:
     """The demo's plan of seed 1, with a spread but for the wind's mean; seed: of the draws."""
-    base = open_campaign("jacksboro-air", default_dispersions().without(ASKED), {"seed": 1})
+    base = open_campaign("jacksboro-air", default_dispersions().without(SEARCHED_QUANTITIES), {"seed": 1})
     return replace(base, seed=seed)
 
 

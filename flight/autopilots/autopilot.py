@@ -419,7 +419,7 @@ class Autopilot(ABC):
         """
         return cruise
 
-    def as_asked(
+    def with_scenario_rtl_settings(
         self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0
     ) -> "Autopilot":
         """Return the autopilot with a scenario's RTL settings; unchanged if it has no such parameters.
@@ -503,7 +503,7 @@ class Autopilot(ABC):
         """
         return None
 
-    def off_height_chance(self, climb: float, sink: float, turbulence: Turbulence) -> float:
+    def altitude_miss_probability(self, climb: float, sink: float, turbulence: Turbulence) -> float:
         """Return the probability (0..1) that gusts make it circle at a waypoint; 0 if it flies on.
 
         climb, sink: spare rates of the aircraft against gusts, m/s.

@@ -46,7 +46,7 @@ def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
         raise ScenarioError.at(scenario.name, "flight.autopilot", name, allowed, shown=repr(name))
     made, returns = _LAWS[name].load(scenario.flight, aircraft, scenario.name), scenario.returns
     set_by = (None, None) if returns is None else (returns.rtl_altitude, returns.rtl_autoland)
-    asked = made.as_asked(*set_by, lands=scenario.landing is not None, lower=_lower_field(scenario))
+    asked = made.with_scenario_rtl_settings(*set_by, lands=scenario.landing is not None, lower=_lower_field(scenario))
     _refuse_conflict(scenario, made, asked)
     return asked
 

@@ -17,7 +17,7 @@ from aircraft.path_limits import BLEND_ACCELERATION, Limits
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.itinerary import loiter_of
-from flight.mission.route import SHARPEST_FLY_BY, Route, goes_no_further
+from flight.mission.route import SHARPEST_FLY_BY_RAD, Route, ends_at_plain_waypoint
 from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length, wrap
 from world.kernels import Record, compiled, inner, record_dtype
 from world.terrain import Terrain
@@ -325,7 +325,7 @@ def _arcs_at_waypoints(
             tangents[i] = tangent_length(turn, radius)
         elif math.isfinite(radius):
             radii[i], back[i] = radius, radius * (math.sin(turn) + 2.0 * math.sin(_overshoot_angle(turn)))
-    sharp = np.concatenate([[False], np.abs(turns) > SHARPEST_FLY_BY, [False]])
+    sharp = np.concatenate([[False], np.abs(turns) > SHARPEST_FLY_BY_RAD, [False]])
     short = tangents[:-1] + tangents[1:] > runs
     tangents[sharp & (np.append(short, False) | np.append(False, short))] = 0.0
     # A leg that cannot be flown in this wind has no radius; draw the longest arc that fits.
@@ -416,7 +416,7 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
     _set_loiters(waypoints, items)
     gates = [seq for seq, item in items.items() if item.command == Command.CONDITION_GATE]
     waypoints["gate"] = np.isin(route.items, gates)
-    waypoints["ends"][-1] = mission is not None and goes_no_further(route, mission)
+    waypoints["ends"][-1] = mission is not None and ends_at_plain_waypoint(route, mission)
     if route.straight_to >= 0:
         waypoints["straight"][route.straight_to] = True
     if route.return_to is not None:

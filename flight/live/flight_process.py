@@ -60,9 +60,9 @@ STOPPED = "stopped by the ground station"
 # End of a flight at the shutdown of the vehicle.
 SHUT_DOWN = "stopped: the vehicle was shut down"
 # End of a route that a diversion left; the new mode follows.
-LEFT_FOR = "left, as a ground station asked, for "
+DIVERTED_TEXT = "left, as a ground station asked, for "
 # End of one log of a loiter that continues.
-HELD_ON = "logged until here, and circling on"
+STILL_LOITERING_TEXT = "logged until here, and circling on"
 # Loiters without end are logged in pieces, and end after this number.
 _MAX_LOITER_LOGS = 16
 
@@ -383,7 +383,7 @@ class _LoggedFlight:
                     self._connection.send_bytes(_PACKED_MARK + self._snapshots.snapshot(rows[-1]).pack())
             if ended == "completed" and self._loiter is not None and self._loiter_logs < _MAX_LOITER_LOGS:
                 self._loiter_logs += 1
-                ended = "" if self._begin_route(self._loiter, HELD_ON) else ended
+                ended = "" if self._begin_route(self._loiter, STILL_LOITERING_TEXT) else ended
             request = self._requests.waiting()
             if isinstance(request, EndFlight):
                 ended = ended or (SHUT_DOWN if request.quit else STOPPED)
@@ -414,7 +414,7 @@ class _LoggedFlight:
         self._pending.clear()
 
     def _divert(self, request: DivertFlight) -> None:
-        if not self._begin_route(request, LEFT_FOR + MODE_NAMES[request.mode]):
+        if not self._begin_route(request, DIVERTED_TEXT + MODE_NAMES[request.mode]):
             return
         route = self._flight.setup.route
         self._mode, self._loiter, self._loiter_logs = request.mode, None, 1

@@ -129,11 +129,11 @@ class Route:
         return self.return_from + 1 + int(np.argmin(own)) if not own.all() else len(self.waypoints)
 
 
-def goes_no_further(route: Route, mission: Mission) -> bool:
+def ends_at_plain_waypoint(route: Route, mission: Mission) -> bool:
     """Return True if a route ends at a plain waypoint: not with a loiter, a landing or a return.
 
     >>> route = Route(np.eye(3)[:2], np.ones(1), np.zeros(2), np.zeros(2, dtype=bool), np.array([1, 2]), "")
-    >>> goes_no_further(route, Mission(None, ()))
+    >>> ends_at_plain_waypoint(route, Mission(None, ()))
     False
     """
     last = next((item for item in mission.items if item.seq == route.items[-1]), None)
@@ -196,7 +196,7 @@ class RouteRules(NamedTuple):
 USUAL_ROUTE_RULES = RouteRules()
 # Guidance that follows the path flies over a waypoint with a sharper turn than this, rad: at 150 degrees the fly-by arc
 # begins 3.7 radii before the waypoint and passes 2.9 radii from it, and at 180 degrees it never comes near.
-SHARPEST_FLY_BY = math.radians(150.0)
+SHARPEST_FLY_BY_RAD = math.radians(150.0)
 
 
 def fly_over_waypoints(
@@ -248,7 +248,7 @@ def fly_over_waypoints(
         if acceptance[i] > 0.0:
             out[i] = fly_by_offset(turn, radius) > acceptance[i]
         elif turn_distance is None:
-            out[i] = turn > SHARPEST_FLY_BY
+            out[i] = turn > SHARPEST_FLY_BY_RAD
         else:
             out[i] = fly_by_offset(turn, radius) > turn_distance(turn, float(points[i, 2]))
     return out
@@ -341,7 +341,7 @@ def _lead_point(point: np.ndarray, course: float, leg: float, limits: Limits, si
 # Radius of a loiter that states none, if the aircraft can turn more tightly by the margin below, m: PX4's default.
 DEFAULT_RADIUS = 80.0
 # Ratio of such a loiter's radius to the tightest turn.
-OVER_TIGHTEST = 1.1
+LOITER_RADIUS_MARGIN = 1.1
 # Fraction of the aircraft's slope limits in straight flight at which a spiral climbs and descends.
 SPIRAL_SHARE = 0.6
 
@@ -648,7 +648,7 @@ def _own_radius(limits: Limits | None) -> OwnRadius:
         tightest = max(limits.turn_radius(course, course + math.pi, up, airspeed) for course in (0.0, math.pi))
         if not math.isfinite(tightest):
             return DEFAULT_RADIUS
-        return max(DEFAULT_RADIUS, math.ceil(OVER_TIGHTEST * tightest / 10.0) * 10.0)
+        return max(DEFAULT_RADIUS, math.ceil(LOITER_RADIUS_MARGIN * tightest / 10.0) * 10.0)
 
     return radius
 

@@ -188,28 +188,28 @@ NOT_A_NUMBER = 2
 # The aircraft touched the ground.
 GROUND = 3
 # The bank exceeded `STEEPEST_BANK`.
-BANKED = 4
+END_OVERBANK = 4
 # The airspeed fell below the stall.
 STALLED = 5
-# The end of the route was passed at more than `FAR` from it.
-MISSED = 6
+# The end of the route was passed at more than `MISSED_ROUTE_DISTANCE_M` from it.
+END_MISSED_ROUTE = 6
 # Battery or tank are empty.
-EMPTY = 7
+END_BATTERY_EMPTY = 7
 # The motor never started.
 NO_MOTOR = 8
 # The aircraft touched the ground with something other than belly or wheels.
-TIPPED = 9
+END_TIPPED_OVER = 9
 # Distance from the end of the route beyond which a flight that passes it has missed it, m.
-FAR = 100.0
+MISSED_ROUTE_DISTANCE_M = 100.0
 # Distance from the center at which a return to launch has arrived at its loiter, m. A loiter of 60 m cannot be flown at
 # 26 m/s and 30 degrees of bank: ArduPlane flies up to 260 m from its center.
-NEAR = 300.0
+RTL_ARRIVAL_RADIUS_M = 300.0
 # The same distance as a multiple of the loiter radius; the larger one applies.
-WIDER = 1.3
+RTL_ARRIVAL_LOITER_RADII = 1.3
 # Altitude tolerance of this arrival, m.
-AT_HEIGHT = 20.0
+RTL_ARRIVAL_ALTITUDE_TOLERANCE_M = 20.0
 # Abort the RTL loiter after this multiple of its nominal duration, which is at least one full circle.
-MAX_CIRCLES = 5.0
+LOITER_TIMEOUT_FACTOR = 5.0
 # Lowest ground speed assumed for that circle, m/s.
 _CIRCLING_SPEED_MPS = 10.0
 # A mission that ends in a loiter about its last waypoint ends when the course has turned by this angle, rad: a quarter
@@ -220,12 +220,12 @@ ENDS = {
     COMPLETED: "completed",
     NOT_A_NUMBER: "loss of control: the state is not a number",
     GROUND: "ground contact",
-    BANKED: "loss of control: bank beyond 75 degrees",
+    END_OVERBANK: "loss of control: bank beyond 75 degrees",
     STALLED: "loss of control: airspeed below the stall",
-    MISSED: "missed: passed the end of the route more than 100 m from it",
-    EMPTY: "nothing is left in the battery or the tank",
+    END_MISSED_ROUTE: "missed: passed the end of the route more than 100 m from it",
+    END_BATTERY_EMPTY: "nothing is left in the battery or the tank",
     NO_MOTOR: "not launched: the motor never started",
-    TIPPED: "ground contact: not on its belly or wheels",
+    END_TIPPED_OVER: "ground contact: not on its belly or wheels",
 }
 # Names of the state's fields.
 _STATE_FIELDS = field_names(STATE)
@@ -329,12 +329,12 @@ def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:  #
     off_e, off_n = motion.east - b.centre_east, motion.north - b.centre_north
     factor = true_by_equivalent(motion.up)
     radius = abs(b.circle) * factor * factor
-    there = math.hypot(off_e, off_n) < max(NEAR, WIDER * radius)
+    there = math.hypot(off_e, off_n) < max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
     bearing = math.atan2(off_e, off_n)
     if memory.circled > 0.0:
         memory.turned += wrap(bearing - memory.bearing)
     memory.bearing = bearing
-    if memory.circled > 0.0 or (there and abs(motion.up - b.up) < AT_HEIGHT):
+    if memory.circled > 0.0 or (there and abs(motion.up - b.up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M):
         memory.circled += dt
     around = abs(memory.turned) >= 2.0 * math.pi
     memory.done = (memory.done and around and memory.circled > UNLIMITED) or memory.circled > longest_circling(radius)
@@ -363,7 +363,7 @@ def end_around(motion: Record, memory: Record, dt: float) -> None:  # pragma: no
 @compiled
 def longest_circling(radius: float) -> float:  # pragma: no cover - compiled
     """Return the time after which a return in its loiter of a radius (m) is over in any case, s."""
-    longest: float = MAX_CIRCLES * max(UNLIMITED, 2.0 * math.pi * abs(radius) / _CIRCLING_SPEED_MPS)
+    longest: float = LOITER_TIMEOUT_FACTOR * max(UNLIMITED, 2.0 * math.pi * abs(radius) / _CIRCLING_SPEED_MPS)
     return longest
 
 
@@ -385,13 +385,15 @@ def _status(
     if clearance <= 0.0:
         return GROUND
     if abs(state.roll) > STEEPEST_BANK:
-        return BANKED
+        return END_OVERBANK
     if state.airspeed < slowest:
         return STALLED
     if memory.done:
-        near = memory.returning or (abs(memory.cross_track) <= FAR and abs(memory.height_error) <= FAR)
-        return COMPLETED if near else MISSED
-    return EMPTY if empty else 0
+        near = memory.returning or (
+            abs(memory.cross_track) <= MISSED_ROUTE_DISTANCE_M and abs(memory.height_error) <= MISSED_ROUTE_DISTANCE_M
+        )
+        return COMPLETED if near else END_MISSED_ROUTE
+    return END_BATTERY_EMPTY if empty else 0
 
 
 @inner

@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 # Median ground speed above which the aircraft flies, m/s.
 FLYING = 6.0
 # Longest time for which an aircraft in flight may be slower, against the wind, s.
-SLOWER_FOR = 60.0
+MAX_SLOW_TIME_S = 60.0
 # Window of the median ground speed, s.
 _MEDIAN_WINDOW_S = 5.0
 # A flight within this time of the first or last row of the log is cut off by the log, s.
@@ -73,7 +73,7 @@ def flown_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[float, flo
     fast = _running_median(speed, width) > FLYING
     spans: list[list[float]] = []
     for k in np.flatnonzero(fast).tolist():
-        if spans and time[k] - spans[-1][1] <= SLOWER_FOR:
+        if spans and time[k] - spans[-1][1] <= MAX_SLOW_TIME_S:
             spans[-1][1] = float(time[k + 1])
         else:
             spans.append([float(time[k]), float(time[k + 1])])

@@ -29,17 +29,17 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import DEPTH_PRECISION, path_zones
 from logs.verdict.places import FLIGHT, Change, Quantity, Suggestion
 from logs.verdict.tolerances import (
-    ABOVE_SLOWEST,
-    BUFFER_ANGLE,
-    BUFFER_LENGTH,
-    BUFFER_SPEED,
-    MIN_RISE,
-    ON_THE_SPOT,
-    ROUNDING,
-    SPEED_STEP,
-    TELLING_FLIGHT,
-    TRIES,
-    ZONE_TRIES,
+    MIN_EVIDENCE_FLIGHT_S,
+    MIN_LEG_LENGTH_M,
+    MIN_SUGGESTED_RISE_M,
+    MIN_SUGGESTED_SPEED_RATIO,
+    ROUNDING_M,
+    SUGGESTION_ANGLE_MARGIN_RAD,
+    SUGGESTION_LENGTH_MARGIN_M,
+    SUGGESTION_SPEED_MARGIN_FRACTION,
+    SUGGESTION_SPEED_STEP_MPS,
+    SUGGESTION_TRIAL_COUNT,
+    ZONE_SUGGESTION_TRIAL_COUNT,
 )
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.kernels import Records
@@ -74,7 +74,7 @@ def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, ite
     first, last = int(facts["entry leg"]), int(facts["exit leg"])
     record, terrain = zone_records([requirements.airspace.zones[z]]), requirements.setup.scenario.terrain
     planned, flown = item.planned or 0.0, item.flown or 0.0
-    if aligned is not None and planned <= ROUNDING:
+    if aligned is not None and planned <= ROUNDING_M:
         moves, deeper = flown_moves(aligned, first, last), 0.0
     else:
         moves, deeper = planned_moves(requirements, first, last), max(0.0, flown - planned)
@@ -85,7 +85,10 @@ def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, ite
         for what, axis, sign in ways:
             shift = _least_shift(near, record, terrain, axis, sign, math.inf if best is None else best[0])
             if shift is not None:
-                best = shift, Change(what, item.place, None, float(math.ceil(shift + deeper + BUFFER_LENGTH)), "m")
+                best = (
+                    shift,
+                    Change(what, item.place, None, float(math.ceil(shift + deeper + SUGGESTION_LENGTH_MARGIN_M)), "m"),
+                )
         if best is not None:
             found.append(best)
     return tuple((change,) for _, change in sorted(found, key=lambda one: one[0]))
@@ -101,7 +104,7 @@ def _least_shift(
     missed.
     """
     shift, shifted = 0.0, np.array(moves)
-    for _ in range(ZONE_TRIES):
+    for _ in range(ZONE_SUGGESTION_TRIAL_COUNT):
         visit = path_zones(shifted, record, terrain)[0]
         if visit.unknown:
             return None
@@ -139,7 +142,7 @@ def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, i
         return ()
     if item.check == UNKNOWN_AIRCRAFT:
         what: Quantity = "full throttle" if requirements.slopes[leg] > 0.0 else "no throttle"
-        return ((Change(what, item.place, None, TELLING_FLIGHT, "s"),),)
+        return ((Change(what, item.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),),)
     limit, source = slope_limit(requirements, leg)
     planned = abs(float(requirements.slopes[leg]))
     rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
@@ -147,21 +150,21 @@ def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, i
     if planned <= limit and item.flown is not None:
         # The geometry passes and the flight failed: the slope that was flown is the limit.
         limit = min(limit, abs(math.radians(item.flown)))
-    allowed = limit - BUFFER_ANGLE
+    allowed = limit - SUGGESTION_ANGLE_MARGIN_RAD
     if allowed <= 0.0 or planned <= allowed:
         return _gentler_arc(requirements, leg)
     place, sign = requirements.leg(leg), 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
     gentler, longer = run * math.tan(allowed), rise / math.tan(allowed)
     alternatives: list[_Sized] = []
-    if gentler >= MIN_RISE:
+    if gentler >= MIN_SUGGESTED_RISE_M:
         change = Change("rise", place, sign * rise, sign * math.floor(gentler), "m")
         alternatives.append((1.0 - gentler / rise, (change,)))
-    speed = _slope_speed(requirements, leg, planned + BUFFER_ANGLE) if source == "aircraft" else None
+    speed = _slope_speed(requirements, leg, planned + SUGGESTION_ANGLE_MARGIN_RAD) if source == "aircraft" else None
     if speed is not None:
         now = float(requirements.setup.route.airspeed[leg])
         alternatives.append((abs(speed - now) / now, (Change("airspeed", place, now, speed, "m/s"),)))
     # A leg that goes straight up has no length to compare with.
-    relative = longer / run - 1.0 if run >= ON_THE_SPOT else _MAX_RELATIVE_CHANGE
+    relative = longer / run - 1.0 if run >= MIN_LEG_LENGTH_M else _MAX_RELATIVE_CHANGE
     alternatives.append((relative, (Change("length", place, run, float(math.ceil(longer)), "m"),)))
     return _smallest_first(alternatives)
 
@@ -171,7 +174,7 @@ def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion,
     steep = steep_arc(requirements, leg)
     if steep is None:
         return ()
-    share = math.tan(math.atan(steep.limit) - BUFFER_ANGLE) / abs(steep.tangent)
+    share = math.tan(math.atan(steep.limit) - SUGGESTION_ANGLE_MARGIN_RAD) / abs(steep.tangent)
     changes = []
     for k in (leg, leg + 1):
         rise = share * float(requirements.points[k + 1, 2] - requirements.points[k, 2])
@@ -189,9 +192,9 @@ def ease_turn(requirements: RouteRequirements, _aligned: AlignedTrack | None, it
         return ()
     limit, source = turn_limit(requirements, i)
     planned = abs(float(requirements.turns[i]))
-    if planned <= limit or limit <= BUFFER_ANGLE:
+    if planned <= limit or limit <= SUGGESTION_ANGLE_MARGIN_RAD:
         return ()
-    place, allowed = requirements.waypoint(i), limit - BUFFER_ANGLE
+    place, allowed = requirements.waypoint(i), limit - SUGGESTION_ANGLE_MARGIN_RAD
     alternatives: list[_Sized] = []
     if source == "aircraft" and math.isfinite(requirements.before[i]):
         speed = _turn_speed(requirements, i)
@@ -208,8 +211,10 @@ def ease_turn(requirements: RouteRequirements, _aligned: AlignedTrack | None, it
 
 def _longer_legs(requirements: RouteRequirements, i: int) -> list[_Sized]:
     """Suggest both legs at a waypoint long enough for its turn and its neighbours; empty if they are."""
-    before = requirements.before[i] + requirements.after[i - 1] + requirements.reversal[i - 1] + BUFFER_LENGTH
-    after = requirements.after[i] + requirements.before[i + 1] + requirements.reversal[i] + BUFFER_LENGTH
+    before = (
+        requirements.before[i] + requirements.after[i - 1] + requirements.reversal[i - 1] + SUGGESTION_LENGTH_MARGIN_M
+    )
+    after = requirements.after[i] + requirements.before[i + 1] + requirements.reversal[i] + SUGGESTION_LENGTH_MARGIN_M
     changes = []
     grown = 0.0
     for leg, needed in ((i - 1, before), (i, after)):
@@ -238,7 +243,7 @@ def _gentler_turn(requirements: RouteRequirements, i: int, allowed: float) -> fl
         },
     )
     tables, at = performance_tables(near, requirements.limits), i - first
-    for _ in range(TRIES):
+    for _ in range(SUGGESTION_TRIAL_COUNT):
         degrees = math.floor(10.0 * math.degrees(allowed)) / 10.0
         if degrees <= 0.0:
             return 0.0
@@ -251,7 +256,7 @@ def _gentler_turn(requirements: RouteRequirements, i: int, allowed: float) -> fl
         limit, _ = tighter_turn(requirements, i, float(turning.limit[at]))
         if limit >= math.radians(degrees):
             return degrees
-        allowed = min(allowed, limit) - BUFFER_ANGLE
+        allowed = min(allowed, limit) - SUGGESTION_ANGLE_MARGIN_RAD
     return 0.0
 
 
@@ -267,9 +272,15 @@ def _level_speeds(requirements: RouteRequirements, amsl: float, now: float, fact
     """
     envelope = requirements.setup.envelope
     low, high = envelope.level_speeds(amsl)
-    low, high = max(low * ABOVE_SLOWEST, float(envelope.airspeed[0])), min(high, float(envelope.airspeed[-1]))
+    low, high = (
+        max(low * MIN_SUGGESTED_SPEED_RATIO, float(envelope.airspeed[0])),
+        min(high, float(envelope.airspeed[-1])),
+    )
     low, high = low / factor, high / factor
-    steps = np.arange(math.ceil(low / SPEED_STEP), math.floor(high / SPEED_STEP) + 1) * SPEED_STEP
+    steps = (
+        np.arange(math.ceil(low / SUGGESTION_SPEED_STEP_MPS), math.floor(high / SUGGESTION_SPEED_STEP_MPS) + 1)
+        * SUGGESTION_SPEED_STEP_MPS
+    )
     return sorted((float(v) for v in steps), key=lambda v: (abs(v - now), v))
 
 
@@ -299,7 +310,7 @@ def _turn_speed(requirements: RouteRequirements, i: int) -> float | None:
             table, requirements.courses[i - 1], requirements.courses[i], float(requirements.points[i, 2])
         )
         used = turn_lengths(abs(float(requirements.turns[i])), radius, bool(requirements.setup.route.fly_over[i]))
-        if max(used) + BUFFER_LENGTH <= available:
+        if max(used) + SUGGESTION_LENGTH_MARGIN_M <= available:
             return speed
     return None
 
@@ -320,7 +331,7 @@ def pass_threat(requirements: RouteRequirements, aligned: AlignedTrack | None, i
     nearest = path_spheres(requirements.path.points, requirements.path.times, *spheres).closest[0]
     if aligned is not None and len(aligned.track) > 1:
         nearest = min(nearest, path_spheres(aligned.track.position, aligned.track.time, *spheres).closest[0])
-    away = _whole_metres(threats.kill_radius[m] - nearest + BUFFER_LENGTH)
+    away = _whole_metres(threats.kill_radius[m] - nearest + SUGGESTION_LENGTH_MARGIN_M)
     return ((Change("distance", item.place, None, away, "m"),),)
 
 
@@ -330,11 +341,15 @@ def fly_higher(
     """Suggest flying a leg higher above the ground."""
     if item.limit is None or item.margin is None:
         return ()
-    short = -item.margin + BUFFER_LENGTH
+    short = -item.margin + SUGGESTION_LENGTH_MARGIN_M
     if item.planned is not None:
         # A flight that ended early did not reach the lowest place.
-        short = max(short, item.limit - item.planned + BUFFER_LENGTH)
-    return ((Change("height", item.place, None, _whole_metres(short), "m"),),) if short > BUFFER_LENGTH else ()
+        short = max(short, item.limit - item.planned + SUGGESTION_LENGTH_MARGIN_M)
+    return (
+        ((Change("height", item.place, None, _whole_metres(short), "m"),),)
+        if short > SUGGESTION_LENGTH_MARGIN_M
+        else ()
+    )
 
 
 def fly_lower(_requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
@@ -342,7 +357,7 @@ def fly_lower(_requirements: RouteRequirements, _aligned: AlignedTrack | None, i
     heights = [height for height in (item.planned, item.flown) if height is not None]
     if item.place.kind != "leg" or item.limit is None or not heights or not max(heights) > item.limit:
         return ()
-    high = _whole_metres(max(heights) - item.limit + BUFFER_LENGTH)
+    high = _whole_metres(max(heights) - item.limit + SUGGESTION_LENGTH_MARGIN_M)
     return ((Change("descent", item.place, None, high, "m"),),)
 
 
@@ -352,7 +367,7 @@ def stay_inside(
     """Suggest bringing the path further inside the area."""
     if item.margin is None or not item.margin < 0.0:
         return ()
-    return ((Change("inset", FLIGHT, None, _whole_metres(-item.margin + BUFFER_LENGTH), "m"),),)
+    return ((Change("inset", FLIGHT, None, _whole_metres(-item.margin + SUGGESTION_LENGTH_MARGIN_M), "m"),),)
 
 
 def use_less_energy(
@@ -376,7 +391,12 @@ def fly_faster(requirements: RouteRequirements, _aligned: AlignedTrack | None, i
         return ()
     leg = int(np.argmin(requirements.route.airspeed))
     now = float(requirements.setup.route.airspeed[leg])
-    wanted = math.ceil(10.0 * item.limit * (1.0 + BUFFER_SPEED) / _true_airspeed_ratio(requirements, leg)) / 10.0
+    wanted = (
+        math.ceil(
+            10.0 * item.limit * (1.0 + SUGGESTION_SPEED_MARGIN_FRACTION) / _true_airspeed_ratio(requirements, leg)
+        )
+        / 10.0
+    )
     return ((Change("airspeed", item.place, now, wanted, "m/s"),),) if wanted > now else ()
 
 
@@ -397,6 +417,6 @@ def fly_level_speed(
     low, high = (speed / _true_airspeed_ratio(requirements, leg) for speed in known.level_speeds(up))
     if low <= commanded <= high:
         return ()
-    low = math.ceil(10.0 * low * (1.0 + BUFFER_SPEED)) / 10.0
-    high = math.floor(10.0 * high * (1.0 - BUFFER_SPEED)) / 10.0
+    low = math.ceil(10.0 * low * (1.0 + SUGGESTION_SPEED_MARGIN_FRACTION)) / 10.0
+    high = math.floor(10.0 * high * (1.0 - SUGGESTION_SPEED_MARGIN_FRACTION)) / 10.0
     return ((Change("airspeed", item.place, commanded, low, "m/s", most=high),),)

@@ -3,7 +3,7 @@
 import math
 
 from logs.verdict.places import Change, DecidingParameter, Disagreement, Place, Suggestion
-from logs.verdict.tolerances import ON_THE_SPOT
+from logs.verdict.tolerances import MIN_LEG_LENGTH_M
 from world.threats import threat_label
 
 # Text of a unit after a number.
@@ -126,7 +126,7 @@ def _rise(change: Change) -> str:
 
 def _length(change: Change) -> str:
     current = change.current or 0.0
-    instead = "; it goes nowhere now" if current < ON_THE_SPOT else f" instead of {current:.0f} m"
+    instead = "; it goes nowhere now" if current < MIN_LEG_LENGTH_M else f" instead of {current:.0f} m"
     return f"{place_text_within(change.place)} {change.wanted:.0f} m long{instead}"
 
 

@@ -15,7 +15,7 @@ from flight.dynamics.envelope_tables import load_envelope
 from planfly.first_start import with_warm_up
 from planfly.flight_options import takes_options
 from planfly.stages import stage
-from planfly.targets import filled_pattern, prepare_folder, refuse_folder
+from planfly.targets import expand_path_pattern, prepare_folder, refuse_folder
 from world.errors import PlanflyError
 from world.files import whole_path, write_whole
 from world.scenario_tables import names_folder
@@ -154,7 +154,7 @@ def describe_aircraft(
     identity = model_hash(chosen)
     # Settings that are there and broken are refused here.
     lacking = tuple(missing for kind in AUTOPILOTS for missing in kind.missing_files(chosen))
-    folder = None if out is None else filled_pattern(out, chosen.name, 0)
+    folder = None if out is None else expand_path_pattern(out, chosen.name, 0)
     if folder is not None:
         refuse_folder(folder, overwrite)
     # Everything is worked out before anything is written.

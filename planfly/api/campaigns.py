@@ -10,7 +10,7 @@ from planfly.campaigns.campaign_base import CampaignBase, is_mission_file, open_
 from planfly.campaigns.campaign_result import CampaignResult, campaign_line, make_goal, winds_line
 from planfly.campaigns.dispersions import Dispersions, default_dispersions, read_dispersions
 from planfly.campaigns.find_winds import (
-    ASKED,
+    SEARCHED_QUANTITIES,
     WindsFound,
     WindsGoal,
     asked_flights,
@@ -246,7 +246,7 @@ def winds(
     with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as place:
         folder = place.folder
         goal = WindsGoal(prove, confidence, directions, most, asked_flights(flights, folder, resume=resume))
-        base = _open(target, options, _dispersions(spread).without(ASKED), place)
+        base = _open(target, options, _dispersions(spread).without(SEARCHED_QUANTITIES), place)
         with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
             found = find_winds(base, goal, place_of_work, store, advance)
         if out is not None:

@@ -31,7 +31,7 @@ from planfly.flight_options import FencePaths, MissionOptions
 from planfly.named_fences import read_named_fences
 from planfly.open_flight import open_flight
 from planfly.plan_fence import fence_of_plan
-from planfly.returns_beside import returns_beside
+from planfly.returns_beside import return_summary
 from planfly.stages import stage
 from planfly.targets import refuse_existing
 from planner.plan import Plan, plan_json
@@ -181,7 +181,7 @@ def _asks_kml(targets: tuple[Path, ...]) -> bool:
 def _with_returns(source: _Source, setup: FlightSetup, track: Track | None) -> _Source:
     """With returns from a few places of a flight or a planned path, and glides, where they can be judged."""
     with stage("flying returns for the map"):
-        drawn = returns_beside(setup, track).drawn()
+        drawn = return_summary(setup, track).drawn()
     if drawn is None:
         return source
     return replace(source, returns=return_lines(setup, drawn), footprint=glide_shapes(setup, drawn))

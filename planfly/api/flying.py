@@ -35,7 +35,7 @@ from planfly.kernel_units.unit_kernels import BOTH, FLYING
 from planfly.named_fences import NamedFences, read_named_fences
 from planfly.open_flight import open_flight
 from planfly.pipeline import PlanThenFly, autopilot_log, fly_and_judge
-from planfly.returns_beside import ReturnsBeside, returns_line
+from planfly.returns_beside import ReturnSummary, returns_line
 from planfly.stages import say_replaced, stage
 from planfly.targets import file_target, refuse_existing
 from planner.plan import Plan
@@ -68,7 +68,7 @@ class FlownMission:
     events: tuple[LogEvent, ...] = ()
     log: Path | None = None
     autopilot_log: Path | None = None
-    returns: ReturnsBeside | None = None
+    returns: ReturnSummary | None = None
 
     @property
     def mission(self) -> Mission:

@@ -11,12 +11,12 @@ from typing import Any, Unpack
 from planfly.airframe import choose_seed, load_airframe
 from planfly.api.planning import stop_condition
 from planfly.arguments import RANGES, check_arguments
-from planfly.choice_of_ways import make_front
+from planfly.choice_of_ways import make_pareto_plans
 from planfly.first_start import with_warm_up
 from planfly.flight_options import FlightOptions, named_scenario, takes_options
 from planfly.kernel_units.unit_kernels import CHOOSING
 from planfly.stages import stage
-from planfly.targets import RUN_FOLDER, clean_folder, filled_pattern
+from planfly.targets import RUN_FOLDER, clean_folder, expand_path_pattern
 from planner.plan import plan_json
 from planner.search.plan_front import Front, FrontPlan
 from world.files import write_whole
@@ -71,9 +71,9 @@ def plan_front(
     airframe = load_airframe(world)
     folder = None
     if out is not None:
-        folder = clean_folder(filled_pattern(out, world.name, number), FRONT_FILES, overwrite=overwrite)
+        folder = clean_folder(expand_path_pattern(out, world.name, number), FRONT_FILES, overwrite=overwrite)
     with stage(f"planning a front of {world.name}", "planning a front") as advance:
-        found = make_front(world, airframe, number, count, advance, stop=stop_condition(seconds, stop))
+        found = make_pareto_plans(world, airframe, number, count, advance, stop=stop_condition(seconds, stop))
     if folder is not None:
         _write(found, world, folder)
     return found

@@ -15,7 +15,7 @@ from planfly.api.flying import FlownMission
 from planfly.first_start import with_warm_up
 from planfly.flight_logs import judge_log
 from planfly.open_flight import open_flight
-from planfly.returns_beside import returns_beside
+from planfly.returns_beside import return_summary
 from planfly.stages import stage
 from planfly.targets import COMPARE_FILES, LOG_FIGURES, clean_folder, refuse_existing
 from planner.plan import Plan
@@ -106,7 +106,7 @@ def report(
         files = write_report(
             folder, shown.setup, shown.track, shown.verdict, ended=shown.ended, events=shown.events, svg=svg,
             versions=shown.versions or package_versions(), command=command,
-            returns=returns_beside(shown.setup, shown.track).drawn(),
+            returns=return_summary(shown.setup, shown.track).drawn(),
         )  # fmt: skip
     return WrittenReport(folder / "report.html", tuple(files), shown.verdict)
 

@@ -25,9 +25,9 @@ from planfly.open_flight import make_setup, mission_of_plan
 from planfly.pipeline import autopilot_log, fly_and_judge
 from planfly.reference_flights import FlyReference
 from planfly.refine import refine as refine_rounds
-from planfly.returns_beside import returns_beside
+from planfly.returns_beside import return_summary
 from planfly.stages import say_replaced, stage
-from planfly.targets import RUN_FILES, RUN_FOLDER, filled_pattern, prepare_folder, refuse_folder
+from planfly.targets import RUN_FILES, RUN_FOLDER, expand_path_pattern, prepare_folder, refuse_folder
 from planner.plan import Plan, plan_json
 from world.files import hold, write_whole
 from world.scenario import Scenario
@@ -145,7 +145,7 @@ def run(
     program = named_program(options["autopilot"])
     world = named_scenario(scenario, options, program)
     number, airframe = choose_seed(world, seed), load_airframe(world)
-    folder = filled_pattern(out, world.name, number)
+    folder = expand_path_pattern(out, world.name, number)
     refuse_folder(folder, overwrite or out == RUN_FOLDER)
     name = world.name if isinstance(scenario, Scenario) else str(scenario)
     defaults = {"refine": 0, **option_defaults(RunOptions)}
@@ -228,7 +228,7 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
             reference=task.reference, returns=True, limits=task.limits,
         )  # fmt: skip
     write_whole(folder / "verdict.json", verdict_json(flown.verdict))
-    beside = flown.returns or returns_beside(flown.setup, flown.track)
+    beside = flown.returns or return_summary(flown.setup, flown.track)
     with stage("drawing", "drawing a report"):
         write_report(
             folder, flown.setup, flown.track, flown.verdict, ended=flown.ended, versions=package_versions(),

@@ -28,7 +28,7 @@ _ROUND, _FEWEST_EACH, _MAX_EACH = 48, 3, 6
 # A direction that is not settled is looked at again with so many times as many flights: a posterior takes a while.
 _LOOK_AGAIN = 1.04
 # Of the dispersions, what the wind that is asked about takes the place of.
-ASKED = ("wind_speed", "wind_from")
+SEARCHED_QUANTITIES = ("wind_speed", "wind_from")
 
 Advance = Callable[[float, float, str], None]
 
@@ -85,7 +85,7 @@ class WindsFound:
 def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool) -> WindsStore:
     """The search's table in a folder, new or to go on with.
 
-    base: of dispersions without the quantities of `ASKED`.
+    base: of dispersions without the quantities of `SEARCHED_QUANTITIES`.
     Raises StoreError, also for one that was asked for something else; more flights may be asked for, or fewer, of which
     the others then stay in the table.
     """
@@ -105,7 +105,7 @@ def find_winds(
 
     A round's winds follow from the rounds before it alone, so that the result is the same for any number of workers
     and however often it was stopped.  What was flown before an error or Ctrl-C stays in the table.
-    base: of dispersions without the quantities of `ASKED`.
+    base: of dispersions without the quantities of `SEARCHED_QUANTITIES`.
     """
     search, known = _Search(goal, base), _Known(store)
     pace = _Pace(search, len(known.flown), advance)

@@ -33,7 +33,7 @@ from world.errors import PlanflyError
 # A flight's row as values of the table's columns, and back: all follows from `FlightRow`, `RULE_WORDS` and `NAMES`.
 
 # Columns that a second campaign of the same flights may have otherwise.
-NOT_THE_SAME = tuple(name for name, column in FIELDS.items() if not column.same)
+RUN_DEPENDENT_COLUMNS = tuple(name for name, column in FIELDS.items() if not column.same)
 # Arrays as bytes.
 SHAPES = tuple(name for name, column in FIELDS.items() if column.kind.startswith("BLOB"))
 
@@ -85,7 +85,7 @@ def row_of(index: int, known: Mapping[str, Any]) -> FlightRow:
 def same_flight(one: FlightRow, other: FlightRow) -> bool:
     """Whether two rows tell of the same flight, whoever flew it, in whichever table, and however long that took."""
     mine, theirs = (row_values(replace(row, made_of="")) for row in (one, other))
-    same = all(mine[name] == theirs[name] for name in ROW_COLUMNS if name not in NOT_THE_SAME)
+    same = all(mine[name] == theirs[name] for name in ROW_COLUMNS if name not in RUN_DEPENDENT_COLUMNS)
     return same and one.draw.index == other.draw.index
 
 

@@ -8,7 +8,7 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.targets import RUN_FOLDER, filled_pattern
+from planfly.targets import RUN_FOLDER, expand_path_pattern
 from planfly.terminal.arguments import budget, completed, files, number, threat
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
@@ -88,7 +88,7 @@ def plan(args: argparse.Namespace) -> int:
             planfly.plan if args.old is None else planfly.replan, args, budget=evaluations, seconds=seconds, out=out,
             overwrite=args.overwrite or args.out is None, stop=stop,
         )  # fmt: skip
-    target = filled_pattern(out, made.scenario.name, made.seed)
+    target = expand_path_pattern(out, made.scenario.name, made.seed)
     print_warnings(made.scenario.notes)
     _print_plan(made)
     print(f"plan      {target}")
@@ -116,7 +116,7 @@ def _front(args: argparse.Namespace) -> int:
             overwrite=args.overwrite or args.out is None, stop=stop,
         )  # fmt: skip
     default = made.default.plan
-    folder = filled_pattern(out, default.scenario.name, default.seed)
+    folder = expand_path_pattern(out, default.scenario.name, default.seed)
     print_warnings(default.scenario.notes)
     print("\n".join(front_lines(made, folder)))
     code = FLYABLE if made.plans else NOT_FLYABLE

@@ -21,7 +21,7 @@ from planfly.airframe import Airframe, find_airframe, load_airframe
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from planfly.open_flight import make_setup
 from planfly.pipeline import fly_and_judge
-from planfly.returns_beside import returns_beside, returns_line
+from planfly.returns_beside import return_summary, returns_line
 from planner.evaluation.problem import make_problem
 from planner.search.kernel_calls import FEW, FRONT, PARTS, call_kernels
 from planner.search.search_state import SCORE_COLUMNS, best_first
@@ -114,7 +114,7 @@ def _fly() -> None:
 def _glide() -> None:
     scenario, airframe = _world()
     setup = make_setup(scenario, airframe, parse_mission(MISSION, "field.waypoints"), 1)
-    returns_beside(setup, None).drawn()
+    return_summary(setup, None).drawn()
 
 
 UNITS: dict[str, Callable[[], None]] = {

@@ -15,7 +15,7 @@ from flight.mission.items import LANDINGS, Mission
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
 from logs.verdict.places import Change, Suggestion
-from planfly.studio.desk import Desk, Judged
+from planfly.studio.desk import EditContext, Judged
 from planfly.studio.edits import at_height, at_speed, moved, places
 from planfly.studio.states import violated_legs
 from world.errors import MissionError
@@ -64,7 +64,7 @@ def can_apply(suggestion: Suggestion) -> bool:
     return bool(suggestion) and all(change.what in _PATH_CHANGES for change in suggestion)
 
 
-def apply_suggestion(desk: Desk, judged: Judged, item: Finding, which: int) -> Mission:
+def apply_suggestion(desk: EditContext, judged: Judged, item: Finding, which: int) -> Mission:
     """Apply a suggestion of a finding to the mission until the finding passes.
 
     The suggested step is a minimum: if an item moves by it, the path moves by less.  The rest is done in further steps.
@@ -79,7 +79,9 @@ def apply_suggestion(desk: Desk, judged: Judged, item: Finding, which: int) -> M
     return min(made, key=lambda one: len(one.verdict.failed)).mission
 
 
-def _apply_until_passed(desk: Desk, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None) -> Judged:
+def _apply_until_passed(
+    desk: EditContext, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None
+) -> Judged:
     """Repeat a suggestion until its finding passes, and judge.  most: number of waypoints to move."""
     kinds = [change.what for change in suggestion]
     judged = desk.judge(_apply_once(desk, judged, item, suggestion, most))
@@ -96,7 +98,7 @@ def _apply_until_passed(desk: Desk, judged: Judged, item: Finding, suggestion: S
     return judged
 
 
-def _apply_once(desk: Desk, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None) -> Mission:
+def _apply_once(desk: EditContext, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None) -> Mission:
     """Make each change of a suggestion once.  Raises MissionError if no item moves."""
     sheet = _MovableMission(desk, judged, most)
     for change in suggestion:
@@ -111,7 +113,7 @@ def _apply_once(desk: Desk, judged: Judged, item: Finding, suggestion: Suggestio
 class _MovableMission:
     """Mission whose items are moved one after the other."""
 
-    def __init__(self, desk: Desk, judged: Judged, most: int | None) -> None:
+    def __init__(self, desk: EditContext, judged: Judged, most: int | None) -> None:
         self.desk, self.mission, self.route = desk, judged.mission, judged.setup.route
         self.requirements, self.most, self.changed = judged.requirements, most, False
 

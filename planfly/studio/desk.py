@@ -47,7 +47,7 @@ class Judged:
 
 
 @dataclass(frozen=True, slots=True)
-class Desk:
+class EditContext:
     """Everything that a mission under edit is judged with.
 
     scenario: its world; airframe: the aircraft loaded for it; seed: seed of its flight.
@@ -68,7 +68,9 @@ class Desk:
     parameters: SetParameters = _DEFAULT_PARAMETERS
 
     @classmethod
-    def of(cls, setup: FlightSetup, terrain: str | Path | None = None, fences: NamedFences = _NO_FENCES) -> "Desk":
+    def of(
+        cls, setup: FlightSetup, terrain: str | Path | None = None, fences: NamedFences = _NO_FENCES
+    ) -> "EditContext":
         """Make the desk of an opened mission or plan."""
         return cls(
             setup.scenario,
@@ -80,7 +82,7 @@ class Desk:
             fences=fences,
         )
 
-    def flown_as(self, scenario: Scenario, parameters: SetParameters) -> "Desk":
+    def flown_as(self, scenario: Scenario, parameters: SetParameters) -> "EditContext":
         """Return the context of the same mission in other weather, or with another aircraft or autopilot.
 
         The certificate of a plan applies only to the world in which it was planned.
@@ -89,12 +91,12 @@ class Desk:
         setup = make_setup(scenario, airframe, self.opened.mission, self.seed)
         return replace(self, scenario=scenario, airframe=airframe, opened=setup, parameters=parameters)
 
-    def of_plan(self, plan: Plan, mission: Mission) -> "Desk":
+    def of_plan(self, plan: Plan, mission: Mission) -> "EditContext":
         """Return the context of a new plan; its certificate applies until the mission is changed."""
         setup = make_setup(self.scenario, self.airframe, mission, self.seed, plan=plan)
         return replace(self, opened=setup, planned=True)
 
-    def around(self, mission: Mission) -> "Desk":
+    def around(self, mission: Mission) -> "EditContext":
         """Return the context, in a new scenario if the mission has left the one that was made around it."""
         if not self.scenario.external:
             return self

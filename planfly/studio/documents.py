@@ -24,7 +24,7 @@ from planfly.flight_logs import MCAP_MAGIC, is_log
 from planfly.flight_options import LogOptions, MissionOptions, apply_options, named_scenario
 from planfly.imported_flights import ImportedFlight
 from planfly.open_flight import make_setup, mission_of_plan, open_flight
-from planfly.studio.desk import Desk, Judged
+from planfly.studio.desk import EditContext, Judged
 from planner.evaluation.certify import certify
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
@@ -198,7 +198,7 @@ class Saved:
     losses: tuple[str, ...] = ()
 
 
-def save_document(document: Document, desk: Desk, judged: Judged, kind: str) -> Saved:
+def save_document(document: Document, desk: EditContext, judged: Judged, kind: str) -> Saved:
     """Return the mission under edit in one of `KINDS`.  Raises PlanflyError if the format cannot hold it.
 
     An unchanged mission in its original format is saved as the original bytes.
@@ -225,7 +225,7 @@ def _bytes(text: str | bytes) -> bytes:
     return text.encode() if isinstance(text, str) else text
 
 
-def _format_losses(desk: Desk, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
+def _format_losses(desk: EditContext, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
     """List what the file of a ground station cannot hold of a mission and its world."""
     kept, found = parse_mission(text, name), []
     apart: Mapping[str, tuple[int, str]] = {
@@ -243,7 +243,7 @@ def _format_losses(desk: Desk, mission: Mission, text: str, name: str, kind: str
     return tuple(found)
 
 
-def _lost_settings(before: Scenario, desk: Desk) -> tuple[str, ...]:
+def _lost_settings(before: Scenario, desk: EditContext) -> tuple[str, ...]:
     """List the settings changed here, which no file of a ground station holds."""
     now = desk.scenario
     differs = {
@@ -256,20 +256,20 @@ def _lost_settings(before: Scenario, desk: Desk) -> tuple[str, ...]:
     return (*lost, *_lost_parameters(desk))
 
 
-def _lost_parameters(desk: Desk) -> tuple[str, ...]:
+def _lost_parameters(desk: EditContext) -> tuple[str, ...]:
     """Note the autopilot parameters set here, which only a parameter file holds."""
     count = len(desk.parameters.values)
     return (f"{count} parameter{'s' if count != 1 else ''} set here: .parm holds them",) if count else ()
 
 
-def _saved_parameters(name: str, desk: Desk) -> Saved:
+def _saved_parameters(name: str, desk: EditContext) -> Saved:
     """Return the parameters that were set here as a file.  Raises PlanflyError if none was set."""
     if not desk.parameters.values:
         raise PlanflyError("no parameter was set here: Settings sets them", field="form")
     return Saved(name, desk.parameters.text(f"set in planfly studio for {desk.airframe.autopilot.title}").encode())
 
 
-def _saved_plan(name: str, desk: Desk, judged: Judged) -> Saved:
+def _saved_plan(name: str, desk: EditContext, judged: Judged) -> Saved:
     """Return the mission as a plan of its scenario, with the present certificate of its path."""
     plan = judged.setup.plan
     if plan is not None:
@@ -295,7 +295,7 @@ def _require_plain_waypoints(mission: Mission) -> None:
             raise MissionError(f"{mission.source}: {why}", file=mission.source, field=f"item {item.seq}")
 
 
-def certified_plan(desk: Desk, judged: Judged) -> Plan:
+def certified_plan(desk: EditContext, judged: Judged) -> Plan:
     """Make a plan of the waypoints of the route, scored and certified like plans of the planner.
 
     Raises MissionError for a mission that no plan can hold: without a scenario, or with more than plain waypoints.
@@ -319,7 +319,7 @@ def certified_plan(desk: Desk, judged: Judged) -> Plan:
     return _scored_plan(desk, np.array(route.waypoints)[route.items >= 0])
 
 
-def _scored_plan(desk: Desk, waypoints: Floats) -> Plan:
+def _scored_plan(desk: EditContext, waypoints: Floats) -> Plan:
     problem = make_problem(desk.scenario, desk.airframe.limits.surely())
     certificate = certify(problem, waypoints)
     counts, objectives = paper_scores(problem.certified, waypoints[None])
@@ -328,7 +328,7 @@ def _scored_plan(desk: Desk, waypoints: Floats) -> Plan:
     )
 
 
-def _plan_with_ground_phases(desk: Desk, mission: Mission) -> Plan | None:
+def _plan_with_ground_phases(desk: EditContext, mission: Mission) -> Plan | None:
     """Return an edited plan with its unchanged departure and approach, or None if it has none.
 
     Departure and approach were certified with the turns at their ends, so the adjacent legs in the air must be

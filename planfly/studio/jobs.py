@@ -192,7 +192,7 @@ class Jobs:
         self._others = [*(one for one in self._others if one["kind"] != asked.name), found]
         return found
 
-    def chosen_at_once(self, session: Session) -> bool:
+    def take_initial_plan(self, session: Session) -> bool:
         """Return True once, when the initial path that the studio planned by itself has arrived."""
         come = self._at_once and bool(session.plans[0])
         if come:

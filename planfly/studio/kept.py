@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from flight.mission.items import Home, Mission, MissionItem
-from planfly.studio.desk import Desk
+from planfly.studio.desk import EditContext
 from planfly.studio.documents import planned_mission
 from planfly.studio.settings import SetParameters
 from planfly.studio.sheet import Json
@@ -23,7 +23,7 @@ _SCHEMA = "planfly.studio/1"
 _SAVED_TABLES = ("wind", "flight", "limits", "area")
 
 
-def kept_text(desk: Desk, first: Mission, mission: Mission, plan: Plan | None, name: str) -> str:
+def kept_text(desk: EditContext, first: Mission, mission: Mission, plan: Plan | None, name: str) -> str:
     """Return the text of the autosave file.
 
     first: the mission that was opened.  plan: the plan of the mission, None if the mission was changed since.
@@ -44,7 +44,7 @@ def kept_text(desk: Desk, first: Mission, mission: Mission, plan: Plan | None, n
     return json.dumps(data)
 
 
-def read_kept(file: Path, desk: Desk, first: Mission) -> tuple[Mission, Desk] | None:
+def read_kept(file: Path, desk: EditContext, first: Mission) -> tuple[Mission, EditContext] | None:
     """Return the saved mission and its editing context; None if this document was not changed.
 
     Raises OSError, ValueError, LookupError, TypeError or PlanflyError for a file that cannot be read.
@@ -67,7 +67,7 @@ def kept_beside(file: Path, first: Mission) -> Path:
     return file.with_name(f"{file.stem}-{digest}{file.suffix}")
 
 
-def _with_settings(desk: Desk, data: Json) -> Desk:
+def _with_settings(desk: EditContext, data: Json) -> EditContext:
     """Return the context with the saved settings; the same object if they are equal."""
     before: Scenario = desk.scenario
     spec, found = json.loads(json.dumps(before.to_json())), data.get("settings", {})
@@ -83,7 +83,7 @@ def _with_settings(desk: Desk, data: Json) -> Desk:
     return made if made.planned or not data.get("planned") else replace(made, planned=True)
 
 
-def _with_plan(desk: Desk, mission: Mission, data: Json) -> tuple[Mission, Desk]:
+def _with_plan(desk: EditContext, mission: Mission, data: Json) -> tuple[Mission, EditContext]:
     """Return a mission and its context, with its plan if one was saved."""
     if not data.get("plan"):
         return mission, desk

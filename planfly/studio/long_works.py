@@ -12,7 +12,7 @@ from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.flight_row import fly_one
 from planfly.pipeline import fly_and_judge
 from planfly.returns_beside import return_starts
-from planfly.studio.desk import Desk
+from planfly.studio.desk import EditContext
 from planfly.studio.pilot import Advance
 from world.errors import MissionError
 from world.extras import need_extra
@@ -25,7 +25,7 @@ _MAX_RANGES = 6
 FLIGHTS = 24
 
 
-def returns(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
+def returns(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
     """Fly the mission, and judge a return to launch from every part of it."""
     desk, mission = payload
     setup = desk.setup(mission)
@@ -50,7 +50,7 @@ def returns(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
     }
 
 
-def campaign(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
+def campaign(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
     """Fly the mission `FLIGHTS` times, each in its own wind, aircraft, terrain and start."""
     need_extra("campaigns")
     from planfly.campaigns.statistics.decision import wilson

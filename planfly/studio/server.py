@@ -389,7 +389,7 @@ class Server:
     def _answered(self, pilot: str, answer: Answer) -> None:
         for message in self.jobs.answered(pilot, answer, self.session):
             self._broadcast(message)
-        if self.jobs.chosen_at_once(self.session):
+        if self.jobs.take_initial_plan(self.session):
             chosen = messages.Choose(kind="choose", rev=self.session.rev, which=0)
             self._take_task = asyncio.ensure_future(self._take(chosen))
 

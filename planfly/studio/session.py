@@ -14,7 +14,7 @@ from planfly.flight_options import MissionOptions
 from planfly.named_fences import read_named_fences
 from planfly.studio import edits
 from planfly.studio.applied import apply_suggestion
-from planfly.studio.desk import Desk, Judged
+from planfly.studio.desk import EditContext, Judged
 from planfly.studio.documents import Document, Saved, open_document, planned_mission, save_document
 from planfly.studio.history import History
 from planfly.studio.kept import kept_beside, kept_text, read_kept
@@ -29,7 +29,7 @@ from world.frames import to_geo
 
 Edit = Move | Insert | Delete | Raise | Apply
 # Document, context and history of edits.
-_OpenedState = tuple[Document, Desk, History]
+_OpenedState = tuple[Document, EditContext, History]
 # Greatest number of earlier documents that are kept for undo.
 _MAX_LEFT_DOCUMENTS = 8
 
@@ -52,7 +52,7 @@ class Session:
 
     document: Document
     options: MissionOptions
-    desk: Desk
+    desk: EditContext
     history: History
     judged: Judged
     rev: int = 1
@@ -68,7 +68,7 @@ class Session:
     @classmethod
     def of(cls, document: Document, options: MissionOptions) -> "Session":
         """A session that begins with what was opened."""
-        desk = Desk.of(document.setup, options.get("terrain"), read_named_fences(options.get("fence") or ()))
+        desk = EditContext.of(document.setup, options.get("terrain"), read_named_fences(options.get("fence") or ()))
         judged = desk.judge(document.setup.mission)
         history = History(document.setup.mission)
         named = None if document.path is None else document.path.resolve()
@@ -184,7 +184,7 @@ class Session:
         self._show(mission)
         self._add_to_history(mission, "plan a part")
 
-    def _show(self, mission: Mission, desk: Desk | None = None) -> None:
+    def _show(self, mission: Mission, desk: EditContext | None = None) -> None:
         """Judge a mission and show it; nothing is changed if that fails.
 
         desk: the context to judge it with, None for the present one.  Earlier planned paths are dropped.

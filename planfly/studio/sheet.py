@@ -20,7 +20,7 @@ from logs.views.map import map_extent
 from logs.views.profile import ground_under
 from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_cuts, zone_label
 from planfly.studio.applied import can_apply
-from planfly.studio.desk import Desk, Judged
+from planfly.studio.desk import EditContext, Judged
 from planfly.studio.edits import places
 from planfly.studio.states import PlaceStates, State, place_states
 from planfly.studio.windows import Window
@@ -58,7 +58,7 @@ def rounded(values: Any, digits: int = 1) -> Any:
 # The world.
 
 
-def world_json(desk: Desk, setup: FlightSetup) -> Json:
+def world_json(desk: EditContext, setup: FlightSetup) -> Json:
     """Describe the world of a mission: area, threats, zones, ends, limits."""
     scenario, mission = desk.scenario, setup.mission
     extent = scenario.bounds if scenario.external else map_extent(scenario, desk.points(mission), [])
@@ -114,7 +114,7 @@ def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> lis
 # The mission.
 
 
-def sheet_json(desk: Desk, judged: Judged) -> Json:
+def sheet_json(desk: EditContext, judged: Judged) -> Json:
     """Describe a mission with its whole geometric verdict: items, route, path, states, findings, profile."""
     verdict, setup = judged.verdict, judged.setup
     states = place_states(judged.requirements, verdict.findings)
@@ -153,7 +153,7 @@ def _window(mission: Mission, route: Route, window: Window) -> Json:
     }
 
 
-def items_json(desk: Desk, mission: Mission) -> list[Json]:
+def items_json(desk: EditContext, mission: Mission) -> list[Json]:
     """Describe the items that can be moved: their places, and how the mission states them."""
     points, flown = desk.points(mission), desk.flown(mission)
     found = []

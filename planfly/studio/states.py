@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.rule_words import RULE_WORDS
-from logs.verdict.tolerances import ROUNDING
+from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.wording import UNITS
 from world.threats import Threats
 
@@ -142,7 +142,7 @@ def violated_legs(requirements: RouteRequirements, item: Finding) -> tuple[int, 
     if item.rule == "bounds":
         (west, east), (south, north) = scenario.bounds.tolist()
         low, high = np.array([west, south, scenario.floor]), np.array([east, north, scenario.ceiling])
-        beyond = np.asarray(((path.points < low - ROUNDING) | (path.points > high + ROUNDING)).any(axis=1))
+        beyond = np.asarray(((path.points < low - ROUNDING_M) | (path.points > high + ROUNDING_M)).any(axis=1))
         return tuple(np.unique(path.legs[beyond[:-1] | beyond[1:]]).tolist())
     return ()
 

@@ -16,7 +16,7 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_geometry import place_findings
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from planfly.studio.desk import Desk
+from planfly.studio.desk import EditContext
 from planfly.studio.moved_route import moved_route
 from world.geometry import leg_runs
 
@@ -48,7 +48,7 @@ class Window:
 
 
 def judge_windows(
-    desk: Desk, mission: Mission, index: int, before: FlightSetup | None = None
+    desk: EditContext, mission: Mission, index: int, before: FlightSetup | None = None
 ) -> tuple[Route, tuple[Window, ...]]:
     """Judge windows around an item, or the whole route if that is as quick or necessary.
 
@@ -75,12 +75,12 @@ def judge_windows(
     return route, tuple(windows)
 
 
-def _may_survey(desk: Desk, mission: Mission, route: Route) -> bool:
+def _may_survey(desk: EditContext, mission: Mission, route: Route) -> bool:
     """Return True if there may be surveys, whose lines are found from the whole route."""
     return desk.scenario.limits.surveys == "lines" or bool(camera_spacing(mission, route).any())
 
 
-def _with_extreme_legs(desk: Desk, route: Route, part: Route, *, ahead: bool) -> tuple[Route, int]:
+def _with_extreme_legs(desk: EditContext, route: Route, part: Route, *, ahead: bool) -> tuple[Route, int]:
     """Append the fastest legs of the whole route to a part of it; return how many precede the part, too.
 
     The time of a change of slope is computed for a whole route from its highest airspeeds and its strongest wind: legs
@@ -124,7 +124,7 @@ def _with_extreme_legs(desk: Desk, route: Route, part: Route, *, ahead: bool) ->
     return made, count if ahead else 0
 
 
-def _speed_factor(desk: Desk, amsl: float) -> float:
+def _speed_factor(desk: EditContext, amsl: float) -> float:
     """Return the ratio of true airspeed to commanded airspeed at an altitude."""
     autopilot = desk.airframe.autopilot
     return autopilot.airspeed_factor(amsl) if autopilot.equivalent_airspeeds else 1.0

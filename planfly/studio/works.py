@@ -17,11 +17,11 @@ from flight.mission.items import Mission
 from flight.simulation.track import Track
 from logs.views.failures import track_distance
 from planfly.airframe import Airframe
-from planfly.choice_of_ways import make_front
+from planfly.choice_of_ways import make_pareto_plans
 from planfly.make_plan import make_plan
 from planfly.pipeline import fly_and_judge
 from planfly.studio.changes import flight_figures
-from planfly.studio.desk import Desk
+from planfly.studio.desk import EditContext
 from planfly.studio.pilot import Advance
 from planfly.studio.sheet import findings_json, rounded, states_json, verdict_json
 from planfly.studio.states import place_states
@@ -37,7 +37,7 @@ SECONDS_FOR_SEVERAL = 60.0
 _MAX_DRAWN_ROWS = 1_500
 
 
-def fly(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
+def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
     """Fly a mission with the control law of its autopilot, and judge the flight."""
     desk, mission = payload
     setup = desk.setup(mission)
@@ -100,7 +100,7 @@ def plan(asked: PlanAsked, advance: Advance) -> list[FrontPlan]:
     # Between two items of a mission, the path must join the leg after the second.
     onward = asked.ends is not None
     if asked.ways > 1:
-        front = make_front(scenario, airframe, seed, asked.ways, advance, stop=stop, onward=onward)
+        front = make_pareto_plans(scenario, airframe, seed, asked.ways, advance, stop=stop, onward=onward)
         return list(front.plans) or [front.default]
     made = make_plan(scenario, airframe, seed, asked.algorithm, advance, stop=stop, onward=onward)
     # A single path needs no comparison: quantities that take longer to compute are left out.

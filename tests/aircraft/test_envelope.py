@@ -122,7 +122,7 @@ def test_the_verdict_publishes_what_decides(monkeypatch: pytest.MonkeyPatch) -> 
     known = replace(falling_envelope(), climb=np.full_like(falling_envelope().climb, 0.2), climb_sd=0.05)
     assert known.surely().climb == pytest.approx(0.1)
     monkeypatch.undo()
-    assert tolerances.UNDECIDED == UNDECIDED == 1.645
+    assert tolerances.UNDECIDED_FRACTION == UNDECIDED == 1.645
 
 
 def test_the_fastest_that_is_sure_is_1_645_deviations_less_and_no_slower_than_the_slowest() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from flight.autopilots.px4.autopilot import Px4
 from planfly.airframe import Airframe, load_airframe
-from planfly.gust_circles import MOST_CIRCLES, expected_circles, settle_in_gusts
+from planfly.gust_circles import MAX_EXPECTED_ORBITS, expected_circles, limit_waypoint_orbits
 from planfly.gust_heights import find_shortfalls
 from planfly.make_plan import make_plan
 from planner.plan import Plan
@@ -48,7 +48,7 @@ def test_plans_of_calmer_air_and_of_who_flies_on_are_as_they_were(turbulence: st
     airframe, asked = load_airframe(scenario), list[int]()
     plan = plan_path(scenario, airframe.limits.surely(), seed=SEED)
     assert plan.safe
-    assert settle_in_gusts(plan, airframe, searching(airframe, asked)) is plan
+    assert limit_waypoint_orbits(plan, airframe, searching(airframe, asked)) is plan
     assert not asked
 
 
@@ -63,9 +63,9 @@ def test_a_way_round_has_as_many_waypoints_as_gusts_allow() -> None:
     scenario = scenario_of("moderate")
     airframe, asked = load_airframe(scenario), list[int]()
     search = searching(airframe, asked)
-    plan = settle_in_gusts(search(scenario), airframe, search)
+    plan = limit_waypoint_orbits(search(scenario), airframe, search)
     assert plan.safe
-    assert 0.0 < expected_circles(plan, airframe.autopilot, airframe.limits) <= MOST_CIRCLES
+    assert 0.0 < expected_circles(plan, airframe.autopilot, airframe.limits) <= MAX_EXPECTED_ORBITS
     assert asked[0] == 12
     assert plan.scenario is scenario
 
@@ -83,16 +83,16 @@ def test_circles_are_those_of_all_waypoints_by_what_is_in_hand(airframe_of_x8: A
     true_airspeed = limits.airspeed / math.sqrt((1.0 - 2.25577e-5 * 250.0) ** 4.2559)
     aside, along = 4.0 * math.cos(math.radians(20.0)), 4.0 * math.sin(math.radians(20.0))
     rate = slope * (math.sqrt(true_airspeed**2 - aside**2) + along)
-    climbing = airframe_of_x8.autopilot.off_height_chance(climb - rate, sink, "moderate")
+    climbing = airframe_of_x8.autopilot.altitude_miss_probability(climb - rate, sink, "moderate")
     assert expected_circles(plan, airframe_of_x8.autopilot, limits) == pytest.approx(climbing, rel=1e-3)
     down = plan_of(airframe_of_x8, way * [1.0, 1.0, -1.0] + [0.0, 0.0, 500.0])
-    sinking = airframe_of_x8.autopilot.off_height_chance(climb, sink - rate, "moderate")
+    sinking = airframe_of_x8.autopilot.altitude_miss_probability(climb, sink - rate, "moderate")
     assert expected_circles(down, airframe_of_x8.autopilot, limits) == pytest.approx(sinking, rel=1e-3)
     both = plan_of(airframe_of_x8, np.concatenate([way, [[8000.0, 0.0, 250.0]]]))
-    level = airframe_of_x8.autopilot.off_height_chance(climb, sink, "moderate")
+    level = airframe_of_x8.autopilot.altitude_miss_probability(climb, sink, "moderate")
     assert expected_circles(both, airframe_of_x8.autopilot, limits) == pytest.approx(climbing + level, rel=1e-3)
     # As a share of all, the wind is much more than that.
-    calm = airframe_of_x8.autopilot.off_height_chance(climb - slope * true_airspeed, sink, "moderate")
+    calm = airframe_of_x8.autopilot.altitude_miss_probability(climb - slope * true_airspeed, sink, "moderate")
     assert abs(climbing / calm - 1.0) > 3e-3
 
 
@@ -101,11 +101,11 @@ def test_a_plan_that_is_made_anew_for_updrafts_has_few_waypoints_too() -> None:
     scenario = scenario_of("moderate", limits={"min_clearance_m": 50.0, "max_height_m": 172.0})
     airframe = load_airframe(scenario)
     limits = airframe.limits.surely()
-    first = settle_in_gusts(plan_path(scenario, limits, seed=SEED), airframe, searching(airframe, []))
+    first = limit_waypoint_orbits(plan_path(scenario, limits, seed=SEED), airframe, searching(airframe, []))
     assert first.safe
     assert find_shortfalls(first, airframe)
     plan = make_plan(scenario, airframe, SEED)
-    assert expected_circles(plan, airframe.autopilot, limits) <= MOST_CIRCLES
+    assert expected_circles(plan, airframe.autopilot, limits) <= MAX_EXPECTED_ORBITS
     assert plan.safe or "updrafts may take it" in plan.certificate.problems[0]
 
 
@@ -115,14 +115,14 @@ def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Airframe) -
     found = plan_path(scenario, airframe_of_x8.limits.surely(), seed=SEED)
     tight = Px4(airframe_of_x8.autopilot.with_parameters(NAV_FW_ALT_RAD=5.0).parameters)  # type: ignore[arg-type]
     airframe = replace(airframe_of_x8, autopilot=tight)
-    plan = settle_in_gusts(found, airframe)
+    plan = limit_waypoint_orbits(found, airframe)
     assert not plan.feasible
     (problem,) = plan.certificate.problems
     assert "in moderate turbulence PX4 circles where gusts have it off a waypoint's height" in problem
     value = float(problem.split("NAV_FW_ALT_RAD of ")[1].split(" m ")[0])
     enough, less = (tight.with_parameters(NAV_FW_ALT_RAD=asked) for asked in (value, value - 5.0))
-    assert expected_circles(plan, enough, airframe.limits) <= MOST_CIRCLES
-    assert expected_circles(plan, less, airframe.limits) > MOST_CIRCLES
+    assert expected_circles(plan, enough, airframe.limits) <= MAX_EXPECTED_ORBITS
+    assert expected_circles(plan, less, airframe.limits) > MAX_EXPECTED_ORBITS
 
 
 @pytest.mark.parametrize(("aside", "taken"), [(300.0, True), (2000.0, False)])
@@ -133,10 +133,10 @@ def test_fewer_and_sharper_corners_stay_in_the_corridor(aside: float, taken: boo
     found = plan_path(scenario, airframe_of_x8.limits.surely(), seed=SEED)
     assert found.safe
     corner = replace(found, waypoints=np.array([scenario.start, [4000.0, aside, 150.0], scenario.destination]))
-    assert expected_circles(corner, airframe_of_x8.autopilot, airframe_of_x8.limits) <= MOST_CIRCLES
-    assert settle_in_gusts(found, airframe_of_x8, lambda _: corner).feasible is taken
+    assert expected_circles(corner, airframe_of_x8.autopilot, airframe_of_x8.limits) <= MAX_EXPECTED_ORBITS
+    assert limit_waypoint_orbits(found, airframe_of_x8, lambda _: corner).feasible is taken
     # One that was found with so few waypoints, too.
-    settled = settle_in_gusts(corner, airframe_of_x8)
+    settled = limit_waypoint_orbits(corner, airframe_of_x8)
     assert (settled is corner) is taken
     assert settled.feasible is taken
     wide = [

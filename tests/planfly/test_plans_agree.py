@@ -10,7 +10,7 @@ import pytest
 import planfly
 from planfly import choice_of_ways
 from planfly.airframe import load_airframe
-from planfly.gust_circles import MOST_CIRCLES, expected_circles, waypoints_in_gusts
+from planfly.gust_circles import MAX_EXPECTED_ORBITS, expected_circles, waypoints_in_gusts
 from planfly.make_plan import make_plan
 from planfly.studio import works
 from planner.plan import Plan
@@ -75,7 +75,7 @@ def test_no_plan_has_more_waypoints_than_gusts_allow(way: Callable[[Scenario], P
     airframe, plan = load_airframe(scenario), way(scenario)
     ahead = replace(plan, waypoints=plan.waypoints[plan.flown_legs :])
     assert plan.safe
-    assert 0.0 < expected_circles(ahead, airframe.autopilot, airframe.limits) <= MOST_CIRCLES
+    assert 0.0 < expected_circles(ahead, airframe.autopilot, airframe.limits) <= MAX_EXPECTED_ORBITS
 
 
 def test_all_give_the_same_plan() -> None:
@@ -113,7 +113,7 @@ def test_each_plan_of_a_front_is_safe_in_gusts(searched: int | None, monkeypatch
     assert len(front.plans) >= (3 if searched is None else 1)
     for one in front.plans:
         assert one.plan.safe
-        assert expected_circles(one.plan, airframe.autopilot, airframe.limits) <= MOST_CIRCLES
+        assert expected_circles(one.plan, airframe.autopilot, airframe.limits) <= MAX_EXPECTED_ORBITS
 
 
 def test_other_plans_have_as_many_waypoints_as_level_flight_allows() -> None:
@@ -123,7 +123,7 @@ def test_other_plans_have_as_many_waypoints_as_level_flight_allows() -> None:
     plan = make_plan(scenario, airframe, SEED)
     climb, sink = airframe.limits.rates(150.0)
     wider = replace(airframe, autopilot=airframe.autopilot.with_parameters(NAV_FW_ALT_RAD=12.0))
-    assert wider.autopilot.off_height_chance(climb, sink, "moderate") == pytest.approx(0.0083, abs=0.0001)
+    assert wider.autopilot.altitude_miss_probability(climb, sink, "moderate") == pytest.approx(0.0083, abs=0.0001)
     assert waypoints_in_gusts(plan, wider) == 5
     calm = scenario_of("none")
     assert waypoints_in_gusts(replace(plan, scenario=calm), load_airframe(calm)) == len(plan.waypoints)

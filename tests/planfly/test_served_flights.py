@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from flight.live.arming import ACCEPTED, ArmingState
-from flight.live.flight_process import HELD_ON, DivertFlight, EndFlight, JudgeMission, StartFlight, serve_flights
+from flight.live.flight_process import (
+    STILL_LOITERING_TEXT,
+    DivertFlight,
+    EndFlight,
+    JudgeMission,
+    StartFlight,
+    serve_flights,
+)
 from flight.live.telemetry import AUTO, CRITICAL, INFO, LOITER, WARNING
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem
 from logs.recording.reader import read_log
@@ -175,7 +182,7 @@ def test_a_circle_without_end_is_logged_in_pieces_about_one_place(
     ours.close()
     theirs.close()
     one, two = (read_log(options.logs / f"flight-00{number}.mcap") for number in (2, 3))
-    assert one.ended == HELD_ON
+    assert one.ended == STILL_LOITERING_TEXT
     assert one.track.time[-1] == pytest.approx(30.0, abs=6.0), "from where the circle is joined on"
     middles = [(log.setup.mission.items[-1].lat_deg, log.setup.mission.items[-1].lon_deg) for log in (one, two)]
     assert middles[0] == middles[1]

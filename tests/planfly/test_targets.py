@@ -7,8 +7,8 @@ import pytest
 from planfly.targets import (
     RUN_FILES,
     RUN_FOLDER,
+    expand_path_pattern,
     file_target,
-    filled_pattern,
     prepare_folder,
     refuse_existing,
     refuse_folder,
@@ -93,12 +93,12 @@ def test_another_command_leaves_a_runs_rounds_alone(tmp_path: Path) -> None:
     ],
 )
 def test_a_default_folder_stays_below_runs(name: str, folder: str) -> None:
-    assert filled_pattern(RUN_FOLDER, name, 3) == Path(folder)
+    assert expand_path_pattern(RUN_FOLDER, name, 3) == Path(folder)
 
 
 def test_no_two_names_share_a_folder() -> None:
     names = ["a/b", "a\\b", "a b", "a:b", "a-b", "a.b", ".a-b", ".", "..", "...", "run", "-", "/", "a", ".a", "\udcff"]
-    folders = {filled_pattern("{name}", name, 0) for name in names}
+    folders = {expand_path_pattern("{name}", name, 0) for name in names}
     assert len(folders) == len(names)
     assert all(len(folder.parts) == 1 and ".." not in folder.parts for folder in folders)
 

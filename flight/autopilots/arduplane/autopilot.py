@@ -14,7 +14,7 @@ from flight.autopilots.arduplane.ground_law import ARDUPLANE_GROUND, CONTACTS, I
 from flight.autopilots.arduplane.landing import go_around_height, landing_airspeed, landing_glide
 from flight.autopilots.arduplane.launch import motor_start, takeoff_slew
 from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_tick
-from flight.autopilots.arduplane.navigator import MAX_ACCEPTANCE, REACHED_HEIGHT, turn_distance
+from flight.autopilots.arduplane.navigator import LOITER_ALTITUDE_TOLERANCE_M, MAX_ACCEPTANCE_M, turn_distance
 from flight.autopilots.arduplane.parameters import (
     HEIGHT_CANDIDATES,
     RELEASE,
@@ -65,7 +65,7 @@ class ArduPlane(Autopilot):
     own: ClassVar[np.dtype[np.record] | None] = ARDUPLANE
     cruise_parameter: ClassVar = "AIRSPEED_CRUISE"
     equivalent_airspeeds: ClassVar = True
-    acceptance_limit: ClassVar = MAX_ACCEPTANCE
+    acceptance_limit: ClassVar = MAX_ACCEPTANCE_M
     refuses_as_arduplane: ClassVar = True
     flies_ground: ClassVar[bool] = True
     height_candidates: ClassVar = HEIGHT_CANDIDATES
@@ -173,7 +173,7 @@ class ArduPlane(Autopilot):
         """Return the airspeed by TECS_LAND_ARSPD, or AIRSPEED_CRUISE and AIRSPEED_MIN, and LAND_WIND_COMP."""
         return landing_airspeed(self.parameters, tail_wind) * self.airspeed_factor(amsl)
 
-    def as_asked(
+    def with_scenario_rtl_settings(
         self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0
     ) -> Autopilot:
         """Return the autopilot with a scenario's RTL_ALTITUDE and RTL_AUTOLAND.
@@ -182,7 +182,7 @@ class ArduPlane(Autopilot):
         field that is lower than home the flare would climb (`flight.autopilots.arduplane.ground_law`): there
         TECS_LAND_PMAX holds the nose down unless a file states it.
 
-        >>> made = ArduPlane(ArduPilotParameters.defaults()).as_asked(180.0, None, lands=True, lower=50.0)
+        >>> made = ArduPlane(ArduPilotParameters.defaults()).with_scenario_rtl_settings(180.0, None, lands=True, lower=50.0)
         >>> made.parameters.rtl_altitude, made.parameters.rtl_autoland, round(made.parameters.landing_pitch_max, 4)
         (180.0, 1.0, -0.0175)
         """
@@ -238,7 +238,7 @@ class ArduPlane(Autopilot):
 
     @property
     def loiter_rules(self) -> LoiterRules:
-        """Rules of loiters from WP_LOITER_RAD, the air's density, and `REACHED_HEIGHT`.
+        """Rules of loiters from WP_LOITER_RAD, the air's density, and `LOITER_ALTITUDE_TOLERANCE_M`.
 
         >>> rules = ArduPlane(ArduPilotParameters.defaults().changed(WP_LOITER_RAD=-80.0)).loiter_rules
         >>> rules.radius, round(rules.growth(1300.0), 3)
@@ -254,7 +254,7 @@ class ArduPlane(Autopilot):
             lines_up=True,
             climb=made.tecs_climb_max,
             sink=made.tecs_sink_max or math.inf,
-            short=REACHED_HEIGHT,
+            short=LOITER_ALTITUDE_TOLERANCE_M,
             unflown=_bank_limit_note(made.navl1_lim_bank),
             before_return=_BEFORE_RETURN,
         )

@@ -11,7 +11,7 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters
 # Reaction of ArduPlane.  "return": RTL; "land": the mission's landing sequence; "autoland": mode AUTOLAND, or else RTL;
 # "on": it continues the mission; "landed": it is on the ground; "never": nothing can trigger the cause; the others do
 # not lead home.
-Does = Literal[
+FailsafeAction = Literal[
     "return",
     "land",
     "autoland",
@@ -35,7 +35,7 @@ class Cause(NamedTuple):
     """
 
     name: str
-    does: Does
+    does: FailsafeAction
     parameter: str = ""
     value: int = 0
 
@@ -45,11 +45,11 @@ class Cause(NamedTuple):
         return self.does == "return"
 
 
-_LONG_FAILSAFE: dict[int, Does] = {0: "on", 1: "return", 2: "glide", 3: "parachute", 4: "on", 5: "autoland"}
+_LONG_FAILSAFE: dict[int, FailsafeAction] = {0: "on", 1: "return", 2: "glide", 3: "parachute", 4: "on", 5: "autoland"}
 # FBWA without a pilot: wings level, nose level, throttle at its minimum.
-_SHORT_FAILSAFE: dict[int, Does] = {0: "on", 1: "circle", 2: "glide", 3: "on", 4: "level"}
+_SHORT_FAILSAFE: dict[int, FailsafeAction] = {0: "on", 1: "circle", 2: "glide", 3: "on", 4: "level"}
 # Without a quadplane's rotors a landing on them (4, 6) is the same as 2.
-_BATTERY_FAILSAFE: dict[int, Does] = {
+_BATTERY_FAILSAFE: dict[int, FailsafeAction] = {
     0: "on",
     1: "return",
     2: "land",
@@ -59,7 +59,7 @@ _BATTERY_FAILSAFE: dict[int, Does] = {
     6: "land",
     7: "autoland",
 }
-_FENCE_REACTION: dict[int, Does] = {0: "on", 1: "return", 6: "guided", 7: "guided", 8: "autoland"}
+_FENCE_REACTION: dict[int, FailsafeAction] = {0: "on", 1: "return", 6: "guided", 7: "guided", 8: "autoland"}
 
 
 def failsafe_causes(

@@ -36,16 +36,16 @@ from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l1_integrate, l1_length
 from flight.guidance.path import find_on_path
 from flight.simulation.tick import (
-    BANKED,
     COMPLETED,
-    EMPTY,
+    END_BATTERY_EMPTY,
+    END_OVERBANK,
+    END_TIPPED_OVER,
     GROUND,
     NO_MOTOR,
     NOT_A_NUMBER,
     PATH_ROW,
     STALLED,
     STEEPEST_BANK,
-    TIPPED,
     WORKSPACE,
     WORKSPACE_NUMBERS,
     begin_tick,
@@ -168,7 +168,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - c
     ground.time = work.timing.tick * work.timing.dt
     waypoints = path.waypoint[: settings.waypoints]
     pieces = path.piece[: settings.pieces]
-    feel(work.state, work.place.clearance, ground)
+    update_ground_contact(work.state, work.place.clearance, ground)
     if ground.stage == TAKING_OFF:
         _tick_take_off(work, own, waypoints, pieces)
     elif ground.stage == IN_AIR:
@@ -187,7 +187,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - c
 
 
 @inner
-def feel(state: Record, clearance: float, ground: Record) -> None:  # pragma: no cover - compiled
+def update_ground_contact(state: Record, clearance: float, ground: Record) -> None:  # pragma: no cover - compiled
     """Update which points touch the ground, which is level as in JSBSim.
 
     state: of `flight.dynamics.state.STATE`.  clearance: of the center of gravity, m.  ground: of `GROUND_STATE`.
@@ -214,15 +214,15 @@ def ended(work: Record, ground: Record) -> int:  # pragma: no cover - compiled
     if ground.stage == IN_AIR:
         return GROUND if ground.touches else status_in_air(work)
     if abs(state.roll) > STEEPEST_BANK:
-        return BANKED
+        return END_OVERBANK
     if ground.tipped and speed > ground.turnover:
-        return TIPPED
+        return END_TIPPED_OVER
     if ground.stage == TAKING_OFF:
         if ground.touches and (ground.lifted or not ground.rolls):
             return GROUND
         if ground.rolls and ground.motor > ground.time and ground.time > _MOTOR_START_TIMEOUT_S:
             return NO_MOTOR
-        return EMPTY if empty else 0
+        return END_BATTERY_EMPTY if empty else 0
     if ground.touches and not ground.landed:
         if math.hypot(ground.east - work.true.east, ground.north - work.true.north) > _TOUCHDOWN_DISTANCE_M:
             return GROUND
@@ -233,7 +233,7 @@ def ended(work: Record, ground: Record) -> int:  # pragma: no cover - compiled
     ground.rest = 0.0
     if not ground.touches and ground.stage < FLARING and state.airspeed < work.settings.slowest:
         return STALLED
-    return EMPTY if empty and not ground.touches else 0
+    return END_BATTERY_EMPTY if empty and not ground.touches else 0
 
 
 # ----------------------------------------------------------------------

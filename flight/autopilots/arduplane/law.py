@@ -13,7 +13,7 @@ from flight.guidance.inner_loops import follow_roll, steer_elevator
 from flight.guidance.path import find_on_path, leave_sharp_corners, profile
 from flight.mission.itinerary import UNLIMITED
 from flight.simulation.tick import (
-    FAR,
+    MISSED_ROUTE_DISTANCE_M,
     NOT_A_NUMBER,
     PATH_ROW,
     WORKSPACE,
@@ -593,7 +593,7 @@ def fly_as_ardupilot(
         # ArduPlane's own logic ends a loiter; an aircraft that loiters at the mission's end has not missed the route.
         last = b.stop == waypoints[-1].stop
         # An altitude that ArduPlane gave up to reach is a missed altitude.
-        memory.returning = last and (not b.to_height or abs(estimated.up - b.up) <= FAR)
+        memory.returning = last and (not b.to_height or abs(estimated.up - b.up) <= MISSED_ROUTE_DISTANCE_M)
         stays = b.stays == math.inf and own.stayed > UNLIMITED
         memory.done = last and (own.over or stays)
     if own.returning and waypoints[waypoints.shape[0] - 1].returns:

@@ -22,11 +22,11 @@ from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner
 
 # Upper limit of an acceptance radius, m: it is sent as whole metres in a byte.
-MAX_ACCEPTANCE = 255.0
+MAX_ACCEPTANCE_M = 255.0
 # Distance from the center, in radii, up to which the line to a loiter is followed.
 _APPROACH_LINE_RADII_RATIO = 3.0
 # Altitude tolerance at which a loiter to an altitude is done, m.
-REACHED_HEIGHT = 5.0
+LOITER_ALTITUDE_TOLERANCE_M = 5.0
 # A loiter to an altitude is also done when the altitude changed by less than that tolerance in this many laps.
 _ALTITUDE_CHECK_INTERVAL_LAPS = 3.0
 # Heading tolerance for leaving a loiter towards what follows, rad ...
@@ -34,7 +34,7 @@ _EXIT_HEADING_TOLERANCE_RAD = math.radians(10.0)
 # ... and its growth for each lap of waiting, rad.
 _EXIT_HEADING_GROWTH_RAD = math.radians(10.0)
 # Altitude tolerance for leaving the RTL loiter to join the landing sequence, m.
-JOINS_WITHIN = 10.0
+LANDING_JOIN_ALTITUDE_TOLERANCE_M = 10.0
 # A place closer to the center than this, in radii, cannot be headed for from the loiter: no heading is awaited.
 _MIN_EXIT_DISTANCE_RATIO = 1.05
 
@@ -50,7 +50,7 @@ def turn_distance(
     turn: rad, positive.  radius: WP_RADIUS, m.  length: L1 distance, m.
     air_density_factor: ratio of true to equivalent airspeed; the room for a turn grows as its square.
     """
-    acceptance_m = math.floor(min(MAX_ACCEPTANCE, acceptance))
+    acceptance_m = math.floor(min(MAX_ACCEPTANCE_M, acceptance))
     if acceptance_m > 0.0:
         return acceptance_m
     right_angle: float = min(radius * air_density_factor * air_density_factor, length)
@@ -231,7 +231,7 @@ def _update_loiter_progress(
         own.loitering = True
         own.next_look, own.up_before = _ALTITUDE_CHECK_INTERVAL_LAPS * 2.0 * math.pi, estimated.up
     own.bearing = bearing
-    if own.on_circle and abs(estimated.up - b.up) < REACHED_HEIGHT:
+    if own.on_circle and abs(estimated.up - b.up) < LOITER_ALTITUDE_TOLERANCE_M:
         own.at_height = True
 
 
@@ -242,7 +242,7 @@ def _is_loiter_done(estimated: Record, b: Record, own: Record) -> bool:  # pragm
         return False
     if b.to_height:
         if not own.at_height and own.circled >= own.next_look:
-            own.at_height = abs(estimated.up - own.up_before) < REACHED_HEIGHT
+            own.at_height = abs(estimated.up - own.up_before) < LOITER_ALTITUDE_TOLERANCE_M
             own.next_look, own.up_before = own.next_look + _ALTITUDE_CHECK_INTERVAL_LAPS * 2.0 * math.pi, estimated.up
         done: bool = own.at_height
         return done
@@ -311,7 +311,11 @@ def _join_landing(estimated: Record, waypoints: Records, b: Record, own: Record)
     after = own.leg + 2
     while after < waypoints.shape[0] and waypoints[after].returns:
         after += 1
-    if after >= waypoints.shape[0] or not own.on_circle or abs(estimated.up - b.up) >= JOINS_WITHIN:
+    if (
+        after >= waypoints.shape[0]
+        or not own.on_circle
+        or abs(estimated.up - b.up) >= LANDING_JOIN_ALTITUDE_TOLERANCE_M
+    ):
         return
     own.left_for = after - 1
     own.returning, own.climbed = False, False

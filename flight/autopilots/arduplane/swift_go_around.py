@@ -21,14 +21,14 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.point_mass import PointMass
 from flight.autopilots.arduplane.swift_return import (
     CLIMB,
-    RETURN_FLOWN,
+    RETURN_RESULT,
     RETURN_START,
-    Surroundings,
+    ReturnEnvironment,
     fill_stage,
     fly_stages,
     most_seconds,
     straight_on,
-    until_circle,
+    truncate_at_first_loiter,
 )
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.mission.return_path import LandingStart, nearest_landing
@@ -42,7 +42,7 @@ Floats = NDArray[np.float64]
 class GoArounds:
     """Simulated go-arounds.
 
-    flown: (n,) of `flight.autopilots.arduplane.swift_return.RETURN_FLOWN`.
+    flown: (n,) of `flight.autopilots.arduplane.swift_return.RETURN_RESULT`.
     ways: n arrays (t, 3) of positions at intervals of 1 s, m.
     landings: n, the landing sequence that each go-around joins.
     """
@@ -87,7 +87,7 @@ def fly_go_arounds(
     landings: Sequence[LandingStart],
     parameters: ArduPilotParameters,
     aircraft: PointMass,
-    around: Surroundings,
+    around: ReturnEnvironment,
 ) -> GoArounds:
     """Simulate a go-around from each of n places on a glide to the end of a landing sequence.
 
@@ -113,7 +113,7 @@ def fly_go_arounds(
     >>> bool(abs(way[k, 0]) < 1.0), bool(abs(way[-1, 0] - 800.0) < 100.0), bool(way[:, 2].min() > 797.0)
     (True, True, True)
     """
-    flown = np.zeros(len(starts), RETURN_FLOWN)
+    flown = np.zeros(len(starts), RETURN_RESULT)
     law, staged, climb = parameters.record(), _climb_parameters(parameters, pitch), np.zeros(1, CLIMB)[0]
     climb.climbs, climb.top, climb.slew = True, top, parameters.throttle_slew or math.inf
     climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
@@ -153,7 +153,7 @@ def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
 
 def _make_stages(sequence: Sequence[LandingStart], parameters: ArduPilotParameters) -> Records:
     """Return (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: the places up to the first loiter."""
-    flown = until_circle(sequence)
+    flown = truncate_at_first_loiter(sequence)
     stages: Records = np.zeros(len(flown), WAYPOINT)
     for stage, one in zip(stages, flown, strict=True):
         fill_stage(stage, one, parameters)

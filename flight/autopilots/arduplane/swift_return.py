@@ -30,7 +30,7 @@ from flight.autopilots.arduplane.law import (
     update_tecs,
     wind_up_throttle,
 )
-from flight.autopilots.arduplane.navigator import JOINS_WITHIN, navigate_legs, past_line
+from flight.autopilots.arduplane.navigator import LANDING_JOIN_ALTITUDE_TOLERANCE_M, navigate_legs, past_line
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.point_mass import PointMass, angle_of_attack, excess_power, move_on
 from flight.dynamics.state import STATE
@@ -39,7 +39,7 @@ from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import MOTION
 from flight.mission.itinerary import UNLIMITED
 from flight.mission.return_path import LandingStart, ReturnCircle
-from flight.simulation.tick import AT_HEIGHT, NEAR, WIDER
+from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M, RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
 from world.frames import POLYMAP, PolyMapRecord
 from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, read_only, record_dtype
@@ -70,20 +70,20 @@ NO_CLIMB: Record = np.zeros(1, CLIMB)[0]
 
 # End of an RTL: it reached its landing sequence, or flew its loiter at the target altitude once around and for
 # `flight.mission.itinerary.UNLIMITED` s.
-CIRCLED = 1
+RETURN_ARRIVED = 1
 # End of an RTL: it hit the ground.
-HIT = 2
+RETURN_GROUND_IMPACT = 2
 # End of an RTL: it left the elevation data.
-OFF_GROUND = 3
+RETURN_OFF_TERRAIN = 3
 # End of an RTL: it timed out.
-NEVER = 4
+RETURN_TIMEOUT = 4
 # End of an RTL: it fell below the caller's least clearance or distance.
-CUT = 5
+RETURN_ABORTED = 5
 # Outcome of one simulated RTL.  Heights above ground and distances outside kill spheres in m; threat -1 if none.
-RETURN_FLOWN = record_dtype(
+RETURN_RESULT = record_dtype(
     ("ended", np.int64),
     "seconds",  # to its end
-    "to_circle",  # s, first time within `AT_CIRCLE` of its target; NaN if it never is
+    "to_circle",  # s, first time within `LOITER_CAPTURE_RADIUS_M` of its target; NaN if it never is
     "circle_up",  # m, its altitude then
     "clearance",  # least of the whole RTL; after ground contact at most `DEEPEST` below the ground
     "clearance_time",  # after ground contact: the time of the first contact
@@ -98,9 +98,9 @@ RETURN_FLOWN = record_dtype(
     "energy",  # Wh, NaN if the envelope has no power data
     ("rows", np.int64),  # number of stored positions
 )
-# An RTL has arrived at its loiter within this distance of its target (m), or within `flight.simulation.tick.WIDER` of
+# An RTL has arrived at its loiter within this distance of its target (m), or within `flight.simulation.tick.RTL_ARRIVAL_LOITER_RADII` of
 # its radii.  Flights of ArduPlane were compared up to there.
-AT_CIRCLE = 200.0
+LOITER_CAPTURE_RADIUS_M = 200.0
 # An RTL that hits the ground is continued to this depth (m), to know by how much it hits, and what an RTL that barely
 # hits would meet after that.
 DEEPEST = 10.0
@@ -117,11 +117,11 @@ _TURN_BANK_RAD = math.radians(5.0)
 # Lag with which it settles at the airspeed of that turn, s.
 _TURN_AIRSPEED_LAG_S = 8.0
 # Delay from engine failure to the turn back, s; the delay used in the ArduPlane reference flights.
-REACTION = 3.0
+ENGINE_FAILURE_REACTION_S = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
+class ReturnEnvironment:
     """Terrain and threats that an RTL can meet, for compiled code.
 
     heights, to_pixel: of the terrain; one pixel without data if there is no terrain.
@@ -140,7 +140,7 @@ class Surroundings:
 class SwiftReturns:
     """Simulated RTLs.
 
-    flown: (n,) of `RETURN_FLOWN`.
+    flown: (n,) of `RETURN_RESULT`.
     ways: n arrays (t, 3) of positions at intervals of 1 s, m; empty if they were not stored.
     """
 
@@ -148,14 +148,14 @@ class SwiftReturns:
     ways: tuple[Floats, ...] = ()
 
 
-def surroundings(scenario: Scenario) -> Surroundings:
+def surroundings(scenario: Scenario) -> ReturnEnvironment:
     """Return the ground and the kill spheres of a scenario."""
     threats, terrain = scenario.threats, scenario.terrain
     spheres, radii = threats.position.reshape(-1, 3), threats.kill_radius
     if terrain is None:
         nothing: Heights = np.full((2, 2), np.nan, dtype=np.float32)
-        return Surroundings(read_only(nothing), np.zeros(1, POLYMAP)[0], spheres, radii, False)
-    return Surroundings(terrain.heights, terrain.to_pixel.record, spheres, radii, True)
+        return ReturnEnvironment(read_only(nothing), np.zeros(1, POLYMAP)[0], spheres, radii, False)
+    return ReturnEnvironment(terrain.heights, terrain.to_pixel.record, spheres, radii, True)
 
 
 def fly_returns(
@@ -163,7 +163,7 @@ def fly_returns(
     targets: Sequence[ReturnCircle | None],
     parameters: ArduPilotParameters,
     aircraft: PointMass,
-    around: Surroundings,
+    around: ReturnEnvironment,
     *,
     landings: Sequence[LandingStart | None] = (),
     keep: bool = False,
@@ -177,7 +177,7 @@ def fly_returns(
     landings: n landing sequences to join afterwards, up to the line-up or a loiter, None for no sequence; or empty.
     keep: True to store the positions.
     least: (n,) heights above ground and (n,) distances outside spheres, m, below which an RTL is aborted.
-    engine_out: True after an engine failure: the aircraft flies on for `REACTION` s, and ends at its loiter.
+    engine_out: True after an engine failure: the aircraft flies on for `ENGINE_FAILURE_REACTION_S` s, and ends at its loiter.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -195,7 +195,7 @@ def fly_returns(
     ...     point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind()),
     ...     surroundings(scenario),
     ... ).flown[0]
-    >>> int(flown["ended"]) == CIRCLED, bool(140.0 < flown["to_circle"] < 160.0)
+    >>> int(flown["ended"]) == RETURN_ARRIVED, bool(140.0 < flown["to_circle"] < 160.0)
     (True, True)
     """
     stages = [
@@ -204,7 +204,7 @@ def fly_returns(
     ]
     if engine_out:
         stages = [np.concatenate([straight_on(start), ends]) for start, ends in zip(starts, stages, strict=True)]
-    flown = np.zeros(len(starts), RETURN_FLOWN)
+    flown = np.zeros(len(starts), RETURN_RESULT)
     times = [most_seconds(start, ends, aircraft) for start, ends in zip(starts, stages, strict=True)]
     way = np.zeros((int(max(times, default=0.0)) + 2 if keep else 0, 3))
     ways, law = [], parameters.record()
@@ -227,7 +227,7 @@ def _make_stages(
 
     A place of a landing sequence is a waypoint, or the center of a loiter of the mission, which is the last target.
     """
-    places = until_circle(() if landing is None else (landing, *landing.onward))
+    places = truncate_at_first_loiter(() if landing is None else (landing, *landing.onward))
     stages: Records = np.zeros((target is not None) + len(places), WAYPOINT)
     stages["airspeed"] = aircraft.record.airspeed
     if target is not None:
@@ -241,13 +241,13 @@ def _make_stages(
     return stages
 
 
-def until_circle(places: Sequence[LandingStart]) -> Sequence[LandingStart]:
+def truncate_at_first_loiter(places: Sequence[LandingStart]) -> Sequence[LandingStart]:
     """Return the places of a landing sequence up to the first loiter.
 
     A point mass cannot say when the loiter is left.
 
     >>> spots = [LandingStart(k, (0.0, 0.0, 50.0), (0.0, 0.0, 50.0), circles=k == 2) for k in (1, 2, 3)]
-    >>> [one.item for one in until_circle(spots)]
+    >>> [one.item for one in truncate_at_first_loiter(spots)]
     [1, 2]
     """
     circles = [k for k, one in enumerate(places) if one.circles]
@@ -281,7 +281,7 @@ def most_seconds(start: Record, stages: Records, aircraft: PointMass) -> float:
     east, north, up, seconds = start["east"], start["north"], start["up"], 0.0
     for end in stages:
         distance = math.hypot(end["east"] - east, end["north"] - north)
-        around = 2.0 * math.pi * WIDER * abs(end["circle"])
+        around = 2.0 * math.pi * RTL_ARRIVAL_LOITER_RADII * abs(end["circle"])
         seconds += (distance + around) / slowest + abs(end["up"] - up) / 2.0
         east, north, up = end["east"], end["north"], end["up"]
     return float(_TIMEOUT_BASE_S + _TIMEOUT_RATIO * seconds)
@@ -317,20 +317,20 @@ def fly_stages(
         factor = true_by_equivalent(estimated.up)
         is_last = stage + 1 == stages.shape[0]
         distance = math.hypot(estimated.east - b.centre_east, estimated.north - b.centre_north)
-        wide = WIDER * abs(b.circle) * factor * factor
-        if is_last and distance < max(AT_CIRCLE, wide):
+        wide = RTL_ARRIVAL_LOITER_RADII * abs(b.circle) * factor * factor
+        if is_last and distance < max(LOITER_CAPTURE_RADIUS_M, wide):
             _record_arrival(estimated, time, engine_out, out)
         out.seconds = time
         _update_clearances(estimated, time, heights, to_pixel, spheres, radii, known, out)
-        if out.ended == NEVER and (out.clearance < floor or out.outside < apart):
-            out.ended = CUT
-        if out.ended != NEVER:
+        if out.ended == RETURN_TIMEOUT and (out.clearance < floor or out.outside < apart):
+            out.ended = RETURN_ABORTED
+        if out.ended != RETURN_TIMEOUT:
             break
         if _is_stage_complete(
             estimated, b, own, circling, climb, engine_out and stage == 0, stage == 0, time, is_last, wide, dt
         ):
             if is_last:
-                out.ended = CIRCLED
+                out.ended = RETURN_ARRIVED
                 break
             stage += 1
             _load_stage(stages, stage, waypoints, estimated, own)
@@ -346,7 +346,7 @@ def fly_stages(
         throttle = 0.0 if engine_out else own.throttle_demand
         used += dt * move_on(estimated, state, angle, throttle, aircraft, excess, power, dt)
     if out.clearance <= 0.0:
-        out.ended = HIT
+        out.ended = RETURN_GROUND_IMPACT
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
     held = motions.size + states.size + memories.size + turns.size + spaced.size == 10
     out.energy = used / 3600.0 if aircraft.has_power and held else math.nan
@@ -367,7 +367,7 @@ def _record_arrival(here: Record, time: float, engine_out: bool, out: Record) ->
         out.to_circle, out.circle_up = time, here.up
         if engine_out:
             # Without an engine it comes down in circles there.
-            out.ended = CIRCLED
+            out.ended = RETURN_ARRIVED
 
 
 @inner
@@ -380,7 +380,7 @@ def _is_stage_complete(
     waits: True while the aircraft flies straight on, until the engine failure is noticed.
     """
     if waits:
-        late: bool = time >= REACTION
+        late: bool = time >= ENGINE_FAILURE_REACTION_S
         return late
     if climb.climbs and is_first:
         # The climb ends no earlier than it has begun.
@@ -425,14 +425,16 @@ def _is_target_reached(
         return reached
     high = abs(here.up - b.up)
     if not is_last:
-        joins: bool = own.on_circle and high < JOINS_WITHIN
+        joins: bool = own.on_circle and high < LANDING_JOIN_ALTITUDE_TOLERANCE_M
         return joins
     off_e, off_n = here.east - b.centre_east, here.north - b.centre_north
     bearing = math.atan2(off_e, off_n)
     if circling.seconds > 0.0:
         circling.turned += wrap(bearing - circling.bearing)
     circling.bearing = bearing
-    if circling.seconds > 0.0 or (math.hypot(off_e, off_n) < max(NEAR, wide) and high < AT_HEIGHT):
+    if circling.seconds > 0.0 or (
+        math.hypot(off_e, off_n) < max(RTL_ARRIVAL_RADIUS_M, wide) and high < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
+    ):
         circling.seconds += dt
     around: bool = circling.seconds > UNLIMITED and abs(circling.turned) >= 2.0 * math.pi
     return around
@@ -447,7 +449,7 @@ def _initialise_outcome(start: Record, estimated: Record, known: bool, out: Reco
     out.clearance = out.clearance_before = math.inf if known else math.nan
     out.threat = -1
     out.outside, out.outside_before = math.inf, math.inf
-    out.to_circle, out.circle_up, out.energy, out.ended, out.rows = math.nan, math.nan, 0.0, NEVER, 0
+    out.to_circle, out.circle_up, out.energy, out.ended, out.rows = math.nan, math.nan, 0.0, RETURN_TIMEOUT, 0
 
 
 @inner
@@ -568,7 +570,7 @@ def _update_clearances(
         return
     clearance = here.up - ground_height(heights, to_pixel, here.east, here.north)
     if math.isnan(clearance):
-        out.ended = OFF_GROUND
+        out.ended = RETURN_OFF_TERRAIN
         return
     if clearance < out.clearance:
         if out.clearance > 0.0:
@@ -578,4 +580,4 @@ def _update_clearances(
             out.clearance_east, out.clearance_north, out.clearance_up = here.east, here.north, here.up
         out.clearance = clearance
     if clearance <= -DEEPEST:
-        out.ended, out.seconds = HIT, out.clearance_time
+        out.ended, out.seconds = RETURN_GROUND_IMPACT, out.clearance_time

@@ -19,7 +19,7 @@ from flight.autopilots.arduplane.law import (
     ROLL_LAG,
     roll_demand,
 )
-from flight.autopilots.arduplane.navigator import MAX_ACCEPTANCE, navigate_legs
+from flight.autopilots.arduplane.navigator import MAX_ACCEPTANCE_M, navigate_legs
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import ERRORS, MOTION
@@ -137,7 +137,7 @@ def _fill(
             if turns[i] == 0.0:
                 corner.acceptance = MIN_ACCEPTANCE
                 continue
-            low, high = MIN_ACCEPTANCE, MAX_ACCEPTANCE
+            low, high = MIN_ACCEPTANCE, MAX_ACCEPTANCE_M
             best, nearest = low, math.inf
             for _ in range(1 if fly_over else _SEARCH_ROUNDS):
                 step = (high - low) / (_ACCEPTANCES_PER_ROUND - 1)
@@ -147,7 +147,7 @@ def _fill(
                     if flown[0] < nearest:
                         best, nearest = acceptance, flown[0]
                         corner.excursion, corner.after = flown
-                low, high = max(MIN_ACCEPTANCE, best - step), min(MAX_ACCEPTANCE, best + step)
+                low, high = max(MIN_ACCEPTANCE, best - step), min(MAX_ACCEPTANCE_M, best + step)
             corner.acceptance = best
             corner.before = 0.0 if fly_over else best
 

@@ -17,7 +17,7 @@ from flight.autopilots.arduplane.ground_law import (
     IN_AIR,
     TAKING_OFF,
     ended,
-    feel,
+    update_ground_contact,
 )
 from flight.autopilots.sitl.flight import place_on_path
 from flight.simulation.tick import (
@@ -56,7 +56,7 @@ def program_ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no c
     if not begin_tick(work, heights):
         return NOT_A_NUMBER
     ground.time = work.timing.tick * work.timing.dt
-    feel(work.state, work.place.clearance, ground)
+    update_ground_contact(work.state, work.place.clearance, ground)
     place_on_path(work.true, path.piece[: settings.pieces], path.node[: settings.nodes], memory)
     memory.speed_command = path.waypoint[memory.leg].airspeed
     memory.done = False

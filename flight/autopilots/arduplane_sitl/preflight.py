@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.autopilots.sitl.conversation import ANSWERS, Awaited, Conversation, Talk
+from flight.autopilots.sitl.conversation import REPLY_TIMEOUT_S, Awaited, Conversation, Talk
 from flight.autopilots.sitl.mission import UploadedMission
 from flight.live.mission_server import MissionType
 from flight.mission.items import Command, Frame, Home, MissionItem
@@ -51,7 +51,7 @@ class Preflight(Conversation):
             lambda: self._command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, AUTO),
             "AUTO",
         )
-        under_way = Awaited("AUTO", ANSWERS, "is not in AUTO, armed")
+        under_way = Awaited("AUTO", REPLY_TIMEOUT_S, "is not in AUTO, armed")
         yield from self._wait_until(lambda: news.mode == AUTO and news.armed, under_way)
 
 

@@ -21,7 +21,7 @@ from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE
 from flight.autopilots.px4.law import PX4, px4_tick
 from flight.autopilots.px4.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, Px4Parameters
-from flight.autopilots.px4.tracking_error import off_height_chance, tracking_error
+from flight.autopilots.px4.tracking_error import altitude_miss_probability, tracking_error
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
@@ -244,15 +244,15 @@ class Px4(Autopilot):
         """Return the deviations of its law with these parameters; it flies over no waypoint."""
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
-    def off_height_chance(self, climb: float, sink: float, turbulence: Turbulence) -> float:
+    def altitude_miss_probability(self, climb: float, sink: float, turbulence: Turbulence) -> float:
         """Return the probability of an altitude miss above NAV_FW_ALT_RAD, in moderate turbulence."""
-        return off_height_chance(self.parameters["NAV_FW_ALT_RAD"], climb, sink, turbulence)
+        return altitude_miss_probability(self.parameters["NAV_FW_ALT_RAD"], climb, sink, turbulence)
 
     def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
         """Return the altitude gain in updrafts: it keeps its airspeed, and its sink rate is limited."""
         return height_in_updrafts(sink, turbulence)
 
-    def as_asked(
+    def with_scenario_rtl_settings(
         self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0
     ) -> Autopilot:
         """Return the autopilot with a scenario's RTL altitude as RTL_RETURN_ALT."""

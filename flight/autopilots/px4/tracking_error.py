@@ -97,13 +97,13 @@ def tracking_error(
     )
 
 
-def off_height_chance(acceptance: float, climb: float, sink: float, turbulence: Turbulence) -> float:
+def altitude_miss_probability(acceptance: float, climb: float, sink: float, turbulence: Turbulence) -> float:
     """Return the probability that gusts carry the aircraft beyond the altitude tolerance at a waypoint.
 
     acceptance: NAV_FW_ALT_RAD, m.  climb, sink: spare rates of the aircraft, m/s: an up- or downdraft that exceeds them
     carries the aircraft off until it ends.  Computed for moderate turbulence only, 0 for any other.
 
-    >>> round(off_height_chance(10.0, 4.0, 4.0, "moderate"), 3), off_height_chance(10.0, 4.0, 4.0, "light")
+    >>> round(altitude_miss_probability(10.0, 4.0, 4.0, "moderate"), 3), altitude_miss_probability(10.0, 4.0, 4.0, "light")
     (0.013, 0.0)
     """
     if turbulence != "moderate":

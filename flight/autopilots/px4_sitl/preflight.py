@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.autopilots.sitl.conversation import ANSWERS, SYSTEM, Awaited, Conversation, Talk
+from flight.autopilots.sitl.conversation import REPLY_TIMEOUT_S, SYSTEM, Awaited, Conversation, Talk
 from flight.autopilots.sitl.mission import UploadedMission
 from flight.live.mission_server import MissionType
 from flight.mission.items import Command, MissionItem
@@ -65,7 +65,7 @@ class Px4Preflight(Conversation):
     def set_out(self) -> Talk:
         """Start its mission mode; raise FlightError if it refuses."""
         yield from self._send_until_accepted(Command.DO_SET_MODE, lambda: self._set_mode(_AUTO, _MISSION), "MISSION")
-        under_way = Awaited("MISSION", ANSWERS, "is not in its mission mode, armed")
+        under_way = Awaited("MISSION", REPLY_TIMEOUT_S, "is not in its mission mode, armed")
         yield from self._wait_until(lambda: self._news.mode == MISSION_MODE and self._news.armed, under_way)
 
     def accompany(self) -> None:

@@ -22,13 +22,13 @@ SYSTEM = 1
 # MAVLink component id of the autopilot.
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 # Timeout for the first heartbeat, s of the autopilot's time.
-SPEAKS = 30.0
+HEARTBEAT_TIMEOUT_S = 30.0
 # Timeout for the position estimate, s of the autopilot's time.
-KNOWS = 60.0
+POSITION_TIMEOUT_S = 60.0
 # Timeout for a reply, s of the autopilot's time.
-ANSWERS = 5.0
+REPLY_TIMEOUT_S = 5.0
 # Timeout for the upload of a mission, s of the autopilot's time.
-TAKES = 30.0
+UPLOAD_TIMEOUT_S = 30.0
 # Interval between repeated requests, s of the autopilot's time.
 AGAIN = 1.0
 # Minimum wait by the clock, s: messages take real time, however fast the autopilot's time runs.
@@ -88,7 +88,7 @@ class Conversation:
         kind: expected autopilot, in words.  wanted: intervals in microseconds by the number of the message.
         """
         news = self._news
-        heard = Awaited("heartbeat", SPEAKS, "said nothing over MAVLink")
+        heard = Awaited("heartbeat", HEARTBEAT_TIMEOUT_S, "said nothing over MAVLink")
         yield from self._wait_until(lambda: news.vehicle is not None, heard, self._send_heartbeat)
         if news.vehicle != mavlink.MAV_TYPE_FIXED_WING:
             raise FlightError(
@@ -111,7 +111,7 @@ class Conversation:
         news = self._news
         yield from self._wait_until(
             lambda: news.ekf & _REQUIRED_EKF_FLAGS == _REQUIRED_EKF_FLAGS and not news.ekf & lost,
-            Awaited("EKF", KNOWS, "did not come to know where it is (EKF)"),
+            Awaited("EKF", POSITION_TIMEOUT_S, "did not come to know where it is (EKF)"),
             lambda: self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval),
         )
 
@@ -158,7 +158,7 @@ class Conversation:
         acknowledged.pop(int(command), None)
         yield from self._wait_until(
             lambda: acknowledged.get(int(command)) == mavlink.MAV_RESULT_ACCEPTED,
-            Awaited(what, ANSWERS, f"refused {what} ({command_name(int(command))})"),
+            Awaited(what, REPLY_TIMEOUT_S, f"refused {what} ({command_name(int(command))})"),
             ask,
         )
 
@@ -179,7 +179,7 @@ class Conversation:
             result = self._news.mission_result
             if result == mavlink.MAV_MISSION_ACCEPTED:
                 return
-            if result != mavlink.MAV_MISSION_NO_SPACE or started.longer_than(TAKES):
+            if result != mavlink.MAV_MISSION_NO_SPACE or started.longer_than(UPLOAD_TIMEOUT_S):
                 asked = self._news.requested
                 item = (
                     ""
@@ -197,7 +197,7 @@ class Conversation:
         news.requested = news.mission_result = None
         link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), kind))
         last, answered = None, self._start_stopwatch()
-        while news.mission_result is None and not answered.longer_than(ANSWERS):
+        while news.mission_result is None and not answered.longer_than(REPLY_TIMEOUT_S):
             if news.requested is not None and (news.requested != last or answered.longer_than(AGAIN)):
                 last, answered = news.requested, self._start_stopwatch()
                 if last < len(items):

@@ -30,10 +30,10 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import GROUND_PATIENCE
 from flight.simulation.start import Release, find_release, gear_of, release
 from flight.simulation.tick import (
-    NEAR,
     NOT_A_NUMBER,
     PATH_ROW,
-    WIDER,
+    RTL_ARRIVAL_LOITER_RADII,
+    RTL_ARRIVAL_RADIUS_M,
     WORKSPACE,
     WORKSPACE_NUMBERS,
     begin_tick,
@@ -131,7 +131,9 @@ def end_circling(true: Record, b: Record, memory: Record, dt: float) -> None:  #
     outwards = (true.velocity_east * out_e + true.velocity_north * out_n) / distance
     clockwise = (true.velocity_east * out_n - true.velocity_north * out_e) / distance
     around = math.copysign(1.0, b.circle) * clockwise
-    if memory.circled > 0.0 or (distance < max(NEAR, WIDER * abs(b.circle)) and around > abs(outwards)):
+    if memory.circled > 0.0 or (
+        distance < max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * abs(b.circle)) and around > abs(outwards)
+    ):
         memory.circled += dt
     # However wide it flies, it has not missed the mission's end.
     memory.returning = True

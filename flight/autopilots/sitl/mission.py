@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from flight.mission.ground_ways import GroundWays
 from flight.mission.items import Command, Frame, Home, MissionItem, is_navigation, on_grid
 from flight.mission.itinerary import loiter_of
-from flight.mission.route import Route, goes_no_further
+from flight.mission.route import Route, ends_at_plain_waypoint
 from flight.simulation.setup import FlightSetup
 from world.frames import GeoOrigin, to_geo
 
@@ -73,7 +73,7 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
         kept.append(_waypoint(kept[-1].seq + 1, route.waypoints[-1], 0.0, origin))
     if (route.return_from >= 0 and not lands) or kept[-1].command == Command.NAV_LOITER_UNLIM:
         return UploadedMission(_home(setup), _renumber(kept), setup.mission.rally)
-    if setup.autopilot.loiter_rules.ends_in_circle and goes_no_further(route, setup.mission):
+    if setup.autopilot.loiter_rules.ends_in_circle and ends_at_plain_waypoint(route, setup.mission):
         return UploadedMission(_home(setup), _renumber(kept))
     kept.append(_waypoint(kept[-1].seq + 1, _extra_point(route), 0.0, origin))
     return UploadedMission(_home(setup), _renumber(kept), setup.mission.rally if lands else ())

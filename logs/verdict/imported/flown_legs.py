@@ -11,13 +11,13 @@ from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track, approaches
 from logs.verdict.tolerances import (
-    ANOTHER_PLACE,
-    ARRIVED,
-    CAPTURE_RADIUS,
-    IN_ORDER,
-    MAX_NEAR,
-    MIN_NEAR,
-    PARTLY_FLOWN,
+    CAPTURE_RADIUS_M,
+    FINAL_WAYPOINT_TOLERANCE_M,
+    MAX_NEAR_WAYPOINT_M,
+    MIN_IN_ORDER_FRACTION,
+    MIN_NEAR_WAYPOINT_M,
+    PARTIAL_LEG_MIN_S,
+    PLAN_MISMATCH_DISTANCE_M,
 )
 
 Floats = NDArray[np.float64]
@@ -66,7 +66,7 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
     first, last = int(met[0]), int(met[-1])
     ended = len(setup.route.waypoints) - 1
     behind = float(aligned.track.time[-1] - aligned.track.time[aligned.rows[last]])
-    partial = last < ended and behind > PARTLY_FLOWN
+    partial = last < ended and behind > PARTIAL_LEG_MIN_S
     until = last + 1 if partial else last
     if until <= first:
         return None
@@ -129,9 +129,9 @@ def met_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDA
 
     Waypoints at the very start or end of the track are not included.
     """
-    edge = np.maximum(requirements.fly_by_offset + ARRIVED, requirements.setup.corridor)
+    edge = np.maximum(requirements.fly_by_offset + FINAL_WAYPOINT_TOLERANCE_M, requirements.setup.corridor)
     inside = (aligned.rows > 0) & (aligned.rows < len(aligned.track) - 1)
-    near = np.where(inside, aligned.distance < CAPTURE_RADIUS, aligned.distance <= edge)
+    near = np.where(inside, aligned.distance < CAPTURE_RADIUS_M, aligned.distance <= edge)
     return np.flatnonzero(near)
 
 
@@ -185,9 +185,9 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     if not flown:
         return None
     nearest, when = _closest(points, flown)
-    if nearest.min() > ANOTHER_PLACE:
+    if nearest.min() > PLAN_MISMATCH_DISTANCE_M:
         return PlanMismatch("place", distance=float(nearest.min()))
-    near = min(MAX_NEAR, max(MIN_NEAR, setup.corridor))
+    near = min(MAX_NEAR_WAYPOINT_M, max(MIN_NEAR_WAYPOINT_M, setup.corridor))
     passed = nearest <= near
     if passed.sum() < 3:
         return None
@@ -201,7 +201,7 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
             # The nearest row may be half a step from the waypoint.
             step = np.hypot(*(aligned.track.position[aligned.rows, :2] - aligned.track.position[low, :2]).T)
             in_order |= off <= near + step
-    if (in_order & passed).sum() >= IN_ORDER * passed.sum():
+    if (in_order & passed).sum() >= MIN_IN_ORDER_FRACTION * passed.sum():
         return None
     order = [int(k) for k in np.argsort(when, kind="stable") if passed[k]]
     return PlanMismatch("order", order=tuple(int(setup.route.items[k]) for k in order[:_MAX_NAMED]))

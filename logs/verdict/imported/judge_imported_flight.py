@@ -29,7 +29,7 @@ from logs.verdict.places import FLIGHT, LevelAnswer, Place
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules.registry import RULES
 from logs.verdict.summary import headline, undecided_text
-from logs.verdict.tolerances import LONGEST_UNSEEN
+from logs.verdict.tolerances import MAX_UNSEEN_TIME_S
 from logs.verdict.verdict import Verdict
 
 # ----------------------------------------------------------------------
@@ -274,7 +274,7 @@ def _unseen_text(flown: Sequence[FlownLegs]) -> str:
     long = []
     for legs in flown:
         time = legs.aligned.track.time
-        long += [(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(np.diff(time) > LONGEST_UNSEEN)]
+        long += [(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(np.diff(time) > MAX_UNSEEN_TIME_S)]
     if not long:
         return ""
     start, end = max(long, key=lambda pause: pause[1] - pause[0])

@@ -17,15 +17,15 @@ from logs.verdict.measures.route_requirements import (
     turn_requirements,
 )
 from logs.verdict.tolerances import (
-    CLOSER,
+    CORNER_CUT_TOLERANCE_M,
     FLY_OVER_SWING_RATIO,
-    KINK_SHARE,
-    KINK_WAYPOINTS,
+    KINK_FRACTION,
+    KINK_WAYPOINT_COUNT,
+    LOITER_SWING_RADII,
     NAVIGATION_SIGMAS,
-    PASS,
-    PLAN_TOLERANCE,
-    STEP,
-    SWING,
+    NEGLIGIBLE_STEP_M,
+    PLAN_TOLERANCE_RAD,
+    WAYPOINT_PASS_MARGIN_M,
 )
 
 Floats = NDArray[np.float64]
@@ -53,9 +53,9 @@ def reach(requirements: RouteRequirements, i: int) -> Reach:
     for a right angle or a sharper corner and at a fraction of it for a gentler corner.  At the mission's end, and where
     a return to launch begins, it uses all of WP_RADIUS.
     """
-    setup, own = requirements.setup, float(requirements.fly_by_offset[i]) + PASS
+    setup, own = requirements.setup, float(requirements.fly_by_offset[i]) + WAYPOINT_PASS_MARGIN_M
     stated = float(setup.route.acceptance[i])
-    tolerance = position_error(setup) + CLOSER[setup.scenario.wind.turbulence]
+    tolerance = position_error(setup) + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
     if stated > 0.0:
         return Reach(stated, "mission", tolerance)
     if not setup.autopilot.follows_path:
@@ -100,13 +100,13 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
         radius = np.where(requirements.setup.route.arcs[ends] == 0.0, requirements.radius[ends], 0.0)
         swings = np.where(np.isfinite(radius), radius, 0.0) * (1.0 - np.cos(requirements.turns[ends]))
         depths = np.maximum(depths, FLY_OVER_SWING_RATIO * swings)
-    turning = float(depths.max()) + PASS
+    turning = float(depths.max()) + WAYPOINT_PASS_MARGIN_M
     if requirements.setup.autopilot.loiter_rules.at_middle:
         arcs, tightest = requirements.setup.route.arcs[ends], requirements.tightest[ends]
         back = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
         # A loiter too tight for the bank is as wide as the bank limit makes the aircraft swing, whatever its radius.
         wide = float(arcs.max())
-        across = wide + (SWING * back if wide < back else wide + back) + PASS
+        across = wide + (LOITER_SWING_RADII * back if wide < back else wide + back) + WAYPOINT_PASS_MARGIN_M
         if arcs.any() and across > max(turning, half):
             return across, "circle"
     if turning > half:
@@ -143,10 +143,10 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
     """Return how near (m) a flyable path without the corner passes the waypoint, or None without one.
 
-    The path leaves out the waypoint and up to `KINK_WAYPOINTS` - 1 of its neighbours, passes each of them within
+    The path leaves out the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours, passes each of them within
     """
-    most, circles = KINK_SHARE * requirements.setup.corridor, requirements.setup.route.arcs > 0.0
-    for count in range(1, KINK_WAYPOINTS + 1):
+    most, circles = KINK_FRACTION * requirements.setup.corridor, requirements.setup.route.arcs > 0.0
+    for count in range(1, KINK_WAYPOINT_COUNT + 1):
         for first in range(max(1, i - count + 1), min(i, requirements.legs - count) + 1):
             last = first + count - 1
             chord = requirements.points[[first - 1, last + 1]]
@@ -167,7 +167,7 @@ def _has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
         if not 0 < old < requirements.legs:
             continue
         limit, _ = tighter_turn(requirements, old, float(made.limit[new]))
-        if abs(float(made.turns[new])) > limit + PLAN_TOLERANCE:
+        if abs(float(made.turns[new])) > limit + PLAN_TOLERANCE_RAD:
             return False
     return True
 
@@ -182,7 +182,7 @@ def _reduced_route(route: Route, kept: NDArray[np.int64]) -> Route:
 
 
 def step(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the height (m, positive) of the step that a leg is part of, or None above `STEP`.
+    """Return the height (m, positive) of the step that a leg is part of, or None above `NEGLIGIBLE_STEP_M`.
 
     The leg is beyond its slope limit.  A sequence of legs that is too steep overall, including this leg, is one step:
     the height of a staircase is the total height of its stairs.
@@ -191,9 +191,9 @@ def step(requirements: RouteRequirements, leg: int) -> float | None:
     sign = 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
     rises = sign * np.diff(requirements.points[:, 2])
     highest = float(rises[leg])
-    for first in range(leg, max(-1, leg - KINK_WAYPOINTS), -1):
-        for last in range(leg, min(requirements.legs, leg + KINK_WAYPOINTS)):
+    for first in range(leg, max(-1, leg - KINK_WAYPOINT_COUNT), -1):
+        for last in range(leg, min(requirements.legs, leg + KINK_WAYPOINT_COUNT)):
             rise, run = float(rises[first : last + 1].sum()), float(requirements.runs[first : last + 1].sum())
-            if math.atan2(rise, run) > limit + PLAN_TOLERANCE:
+            if math.atan2(rise, run) > limit + PLAN_TOLERANCE_RAD:
                 highest = max(highest, rise)
-    return highest if highest <= STEP else None
+    return highest if highest <= NEGLIGIBLE_STEP_M else None

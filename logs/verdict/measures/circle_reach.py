@@ -1,6 +1,6 @@
 """Find hazards within reach of a loiter that is flown wider than drawn.
 
-An autopilot that steers to the loiter's center and then orbits it as wide as it can may be anywhere within `SWING`
+An autopilot that steers to the loiter's center and then orbits it as wide as it can may be anywhere within `LOITER_SWING_RADII`
 radii of the bank limit from the center if the loiter is too tight for its bank; the direction of arrival decides where.
 A circle drawn around the center says nothing about the hazards next to it.
 """
@@ -10,12 +10,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.route import goes_no_further
+from flight.mission.route import ends_at_plain_waypoint
 from logs.verdict.measures.path_moves import MOVE
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.zone_visits import path_zones
-from logs.verdict.tolerances import CLEARANCE_TOLERANCE, HEIGHT_TOLERANCE, ROUNDING, SWING
+from logs.verdict.tolerances import CLEARANCE_TOLERANCE_M, HEIGHT_TOLERANCE_M, LOITER_SWING_RADII, ROUNDING_M
 from world.airspace.zones import Cylinder, Zone
 from world.airspace.zones_on_map import CIRCLE_CORNERS, zone_rings
 from world.kernels import Records
@@ -33,7 +33,7 @@ _STEP_M = 20.0
 _MAX_LEVELS = 12
 
 
-def within_reach(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
+def hazards_within(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
     """Return the hazards that a flight within a distance of a place could come too close to, in words.
 
     middle: (2,) east and north, m.  low, high: its least and greatest altitude, m AMSL.  reach: m.
@@ -46,20 +46,20 @@ def within_reach(requirements: RouteRequirements, middle: Floats, low: float, hi
     ]
 
 
-def beside_end(requirements: RouteRequirements) -> tuple[float, list[str]] | None:
+def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str]] | None:
     """Return the reach (m) of the loiter at a mission's end and the hazards within it, in words.
 
     None if the autopilot does not loiter there, or if the mission continues.
     """
     setup, rules = requirements.setup, requirements.setup.autopilot.loiter_rules
-    if not rules.ends_in_circle or not goes_no_further(setup.route, setup.mission):
+    if not rules.ends_in_circle or not ends_at_plain_waypoint(setup.route, setup.mission):
         return None
     up, speed = float(requirements.points[-1, 2]), float(requirements.route.airspeed[-1])
     held = max(requirements.limits.turn_radius(course, course + math.pi, up, speed) for course in (0.0, math.pi))
-    reach = SWING * max(abs(rules.radius), held)
+    reach = LOITER_SWING_RADII * max(abs(rules.radius), held)
     if not math.isfinite(reach):
         return reach, ["the wind leaves no way around it"]
-    return reach, within_reach(requirements, requirements.points[-1, :2], up, up, reach)
+    return reach, hazards_within(requirements, requirements.points[-1, :2], up, up, reach)
 
 
 def _ground(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
@@ -73,13 +73,13 @@ def _ground(requirements: RouteRequirements, middle: Floats, low: float, high: f
     if np.isnan(above).any():
         found.append("the terrain is not known")
     least = float(np.nanmin(above, initial=math.inf))
-    if least < requirements.limits.min_clearance - CLEARANCE_TOLERANCE:
+    if least < requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M:
         found.append(f"the ground is {least:.0f} m below")
     if limits.max_height_m is not None:
         # The greatest height above ground is the least height above ground of the same world upside down.
         under, _ = path_clearance(-ground.heights, ground.to_pixel.record, _points_at(rings, -high))
         most = -float(np.nanmin(under, initial=math.inf))
-        if most > limits.max_height_m + HEIGHT_TOLERANCE:
+        if most > limits.max_height_m + HEIGHT_TOLERANCE_M:
             found.append(f"the ground is {most:.0f} m below, over the {limits.max_height_m:.0f} m allowed")
     return found
 
@@ -103,10 +103,10 @@ def _zones(requirements: RouteRequirements, middle: Floats, low: float, high: fl
         return []
     terrain = requirements.setup.scenario.terrain
     rings, found = _rings(middle, reach, 0.0), set[int]()
-    levels = 1 if high - low < ROUNDING else min(_MAX_LEVELS, 2 + int((high - low) / _STEP_M))
+    levels = 1 if high - low < ROUNDING_M else min(_MAX_LEVELS, 2 + int((high - low) / _STEP_M))
     for up in np.linspace(low, high, levels):
         visits = path_zones(_moves(_points_at(rings, float(up))), airspace.records, terrain)
-        found |= {z for z in range(len(airspace.zones)) if visits[z].depth > ROUNDING or visits[z].unknown}
+        found |= {z for z in range(len(airspace.zones)) if visits[z].depth > ROUNDING_M or visits[z].unknown}
     return [f"{airspace.zones[z].kind} zone {airspace.zones[z].name or z} is not kept" for z in sorted(found)]
 
 
@@ -115,7 +115,7 @@ def _edges(requirements: RouteRequirements, middle: Floats, reach: float) -> lis
     if scenario.external:
         return []
     inside = min(float(min(at - low, high - at)) for at, (low, high) in zip(middle, scenario.bounds, strict=True))
-    return ["the area ends"] if inside < reach - ROUNDING else []
+    return ["the area ends"] if inside < reach - ROUNDING_M else []
 
 
 def _rings(middle: Floats, reach: float, spacing: float) -> Floats:

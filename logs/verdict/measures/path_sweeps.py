@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from logs.verdict.tolerances import FAR, FARTHEST, TOUCH
+from logs.verdict.tolerances import MAX_PLAUSIBLE_POSITION_M, SPHERE_FAR_DIAGONALS, SPHERE_STAY_TOLERANCE_S
 from world.frames import PolyMapRecord
 from world.geometry import segment_exposure, sphere_window
 from world.kernels import compiled, inner, read_only
@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 # Number of segments that share one bounding box.
 _BLOCK_SEGMENTS = 256
-# Number of segments joined to one if a sphere's center is `FAR` from a block of them.
+# Number of segments joined to one if a sphere's center is `SPHERE_FAR_DIAGONALS` from a block of them.
 _JOINED_SEGMENTS = 16
 
 
@@ -110,7 +110,7 @@ def _path_spheres(
             if low < out.closest[m]:
                 _closest(points, time, block, centres[m], m, out)
             if low <= radii[m]:
-                whole = high <= radii[m] and low > FAR * boxes.diagonal[block]
+                whole = high <= radii[m] and low > SPHERE_FAR_DIAGONALS * boxes.diagonal[block]
                 _inside(points, time, block, _JOINED_SEGMENTS if whole else 1, centres[m], radii[m], scales[m], m, out)
     return out
 
@@ -236,7 +236,7 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
         return []
     step = np.diff(time)
     start, end = (time[rows] + share[rows] * step[rows] for share in (enter, leave))
-    first = np.flatnonzero(np.append(True, start[1:] - end[:-1] > TOUCH))
+    first = np.flatnonzero(np.append(True, start[1:] - end[:-1] > SPHERE_STAY_TOLERANCE_S))
     found: list[Passage] = []
     for here in np.split(np.arange(rows.size), first[1:]):
         row, last = rows[here[np.argmin(closest[rows[here]])]], rows[here[-1]]
@@ -262,7 +262,7 @@ def _clearances(
     low = np.full(count, math.nan)
     at = np.zeros(count)
     for k in range(count):
-        if np.abs(position[k : k + 2]).max() <= FARTHEST:
+        if np.abs(position[k : k + 2]).max() <= MAX_PLAUSIBLE_POSITION_M:
             low[k], at[k] = segment_clearance(heights, to_pixel, position[k], position[k + 1])
     return low, at
 
@@ -274,6 +274,6 @@ def _windows(position: Floats, centre: Floats, radius: float) -> tuple[Floats, F
     enter = np.zeros(count)
     leave = np.zeros(count)
     for k in range(count):
-        if np.abs(position[k : k + 2]).max() <= FARTHEST:
+        if np.abs(position[k : k + 2]).max() <= MAX_PLAUSIBLE_POSITION_M:
             closest[k], enter[k], leave[k] = sphere_window(position[k], position[k + 1], centre, radius)
     return closest, enter, leave

@@ -15,12 +15,12 @@ from logs.verdict.measures.acceptance import position_error, reach
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.tolerances import (
-    MIN_PHOTO_HEIGHT,
-    PHOTO_ASIDE,
-    PHOTO_BANK,
-    PHOTO_COURSE,
-    PHOTO_HEIGHT,
-    PHOTO_STEP,
+    MAX_PHOTO_BANK_RAD,
+    MAX_PHOTO_COURSE_ERROR_RAD,
+    MIN_PHOTO_HEIGHT_ERROR_M,
+    PHOTO_HEIGHT_FRACTION,
+    PHOTO_OFFSET_FRACTION,
+    PHOTO_STEP_M,
 )
 
 Floats = NDArray[np.float64]
@@ -61,7 +61,7 @@ class LineMeasure:
 
 def allowed_aside(requirements: RouteRequirements, survey: Survey) -> float:
     """Return how far to the side of its line a photo may be taken, m."""
-    return PHOTO_ASIDE * survey.spacing + position_error(requirements.setup)
+    return PHOTO_OFFSET_FRACTION * survey.spacing + position_error(requirements.setup)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,11 +92,11 @@ def _rows(requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey
     position = aligned.track.position[window]
     along, across, course = axis.of(position)
     turned = np.abs(np.angle(np.exp(1j * (aligned.course[window] - course))))
-    ahead = turned <= PHOTO_COURSE
+    ahead = turned <= MAX_PHOTO_COURSE_ERROR_RAD
     off, allowed = _height_errors(requirements, axis, position, along)
     needed = {
         "away": np.abs(across) <= allowed_aside(requirements, survey),
-        "banked": np.abs(aligned.track.attitude[window, ROLL]) <= PHOTO_BANK,
+        "banked": np.abs(aligned.track.attitude[window, ROLL]) <= MAX_PHOTO_BANK_RAD,
         "high": np.abs(off) <= allowed,
         "dark": _camera_on(requirements, line, position, along, ahead, axis.length),
     }
@@ -154,7 +154,7 @@ def _height_errors(
 ) -> tuple[Floats, Floats]:
     """Return each row's error from the planned height above ground, m, and its tolerance."""
     planned = over_ground(requirements, axis.at(along))
-    allowed = np.maximum(MIN_PHOTO_HEIGHT, PHOTO_HEIGHT * planned)
+    allowed = np.maximum(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * planned)
     return over_ground(requirements, position) - planned, allowed
 
 
@@ -194,7 +194,7 @@ def _camera_on(
 
 def _cells(along: Floats, state: Flags, length: float) -> Flags:
     """Return True for each step of a line that lies between two rows in a state."""
-    count = max(1, math.ceil(length / PHOTO_STEP))
+    count = max(1, math.ceil(length / PHOTO_STEP_M))
     both = state[:-1] & state[1:] & (np.diff(along) > 0.0)
     edges = np.clip(along / length * count, 0.0, count)
     begin, end = np.floor(edges[:-1]).astype(int)[both], np.ceil(edges[1:]).astype(int)[both]
@@ -277,7 +277,7 @@ def _line_strip(
     """Return a line as flown, or as planned; None if it was not flown."""
     if aligned is None:
         axis = LineAxis(requirements.points[line.first : line.last + 1])
-        along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP) + 1))
+        along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
         legs = np.clip(np.searchsorted(axis.along, along, "right") - 1, 0, len(axis.along) - 2) + line.first
         places, speeds = axis.at(along), requirements.ground_speed[legs]
         return _Strip(places, over_ground(requirements, places), speeds, np.ones(len(along), dtype=np.bool_))
@@ -318,7 +318,7 @@ def _with_side_overlap(
     ends = [axis.of(places)[0] for places in corners]
     low = min(float(along.min()) for along in ends)
     length = max(float(along.max()) for along in ends) - low
-    count = max(1, math.ceil(length / PHOTO_STEP))
+    count = max(1, math.ceil(length / PHOTO_STEP_M))
     middles = (np.arange(count) + 0.5) * length / count
     last = np.full((4, count), np.nan)
     for number in np.argsort(survey.offsets).tolist():

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.route import Route
-from flight.simulation.tick import NEAR, WIDER
-from logs.verdict.tolerances import CAPTURE_RADIUS
+from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
+from logs.verdict.tolerances import CAPTURE_RADIUS_M
 from world.kernels import compiled, read_only
 
 Floats = NDArray[np.float64]
@@ -88,7 +88,7 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
         read_only(np.ascontiguousarray(position[rows, :2])),
         read_only(samples.places),
         read_only(samples.radii),
-        CAPTURE_RADIUS,
+        CAPTURE_RADIUS_M,
         anywhere,
     )
     begins, until = rows[ends[:, 0]], rows[ends[:, 1]]
@@ -141,7 +141,7 @@ def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> 
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     wide = float(np.hypot(*(corners - middle).T).max()) + _LOITER_MARGIN_M
     if 0 <= route.return_from < first < route.return_until:
-        wide = max(wide, NEAR, WIDER * radius)
+        wide = max(wide, RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
     return middle, wide
 
 

@@ -28,7 +28,7 @@ from flight.mission.surveys import Survey, camera_spacing, find_surveys
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.places import Place
-from logs.verdict.tolerances import LARGEST_OFFSET, OFF_SPEED, U_TURN
+from logs.verdict.tolerances import MAX_FLY_BY_OFFSET_RADII, SPEED_TOLERANCE_MPS, U_TURN_RAD
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.airspace.zones import Zone
 from world.errors import MissionError
@@ -188,7 +188,7 @@ def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, flo
         return 0.0, 0.0
     if fly_over:
         return 0.0, radius * fly_over_run(turn)
-    if turn > U_TURN:
+    if turn > U_TURN_RAD:
         return math.inf, math.inf
     tangent = tangent_length(turn, radius)
     return tangent, tangent
@@ -530,7 +530,7 @@ def _fly_by_offsets(route: Route, turning: TurnRequirements) -> Floats:
     out = np.zeros(len(turning.radius))
     for i in np.flatnonzero(np.isfinite(turning.radius) & ~route.fly_over).tolist():
         radius = float(turning.radius[i])
-        out[i] = min(fly_by_offset(abs(float(turning.turns[i])), radius), LARGEST_OFFSET * radius)
+        out[i] = min(fly_by_offset(abs(float(turning.turns[i])), radius), MAX_FLY_BY_OFFSET_RADII * radius)
     return out
 
 
@@ -600,7 +600,7 @@ def slope_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
 def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
     """Return the fly-by arc at a leg's end if it is too steep.
 
-    None if the airspeed stays within `OFF_SPEED`: the climb or descent that the aircraft cannot make on the arc changes
+    None if the airspeed stays within `SPEED_TOLERANCE_MPS`: the climb or descent that the aircraft cannot make on the arc changes
     its speed by g dh / V.
     """
     i = leg + 1
@@ -615,4 +615,4 @@ def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
     if not np.isfinite(limits).all() or not (limits > 0.0).all():
         return None
     limit, speed = float(np.tan(limits).mean()), float(requirements.route.airspeed[leg])
-    return SteepArc(tangent, limit) if GRAVITY * (abs(tangent) - limit) * length / speed > OFF_SPEED else None
+    return SteepArc(tangent, limit) if GRAVITY * (abs(tangent) - limit) * length / speed > SPEED_TOLERANCE_MPS else None

@@ -11,32 +11,32 @@ from flight.simulation.track import THROTTLE
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across
 from logs.verdict.tolerances import (
-    ACCELERATION,
-    CLEAR_OF_BLEND,
-    CLEAR_OF_TURN,
-    COURSE_FLOOR,
-    FULL,
-    FULL_THROTTLE,
-    IDLE,
-    INDEPENDENT,
-    KNOWN_TO,
-    MAX_UNSTEADY,
-    NO_CURRENT,
-    ROUGH_COURSE,
-    ROUGH_SLOPE,
-    SATURATED,
-    SETTLED_AFTER,
-    SHORTEST_COURSE,
-    SHORTEST_SLOPE,
-    SHORTEST_TIME,
-    SHOWN_OVER,
-    SINGULAR,
-    SLOPE_FLOOR,
-    SLOWEST_LIFTED,
-    SPEED_MEMORY,
-    SURE,
-    THROUGHOUT,
-    UNSURE,
+    ABILITY_SAMPLE_INTERVAL_S,
+    ABILITY_SETTLING_S,
+    ABILITY_SIGMAS,
+    ABILITY_WINDOW_S,
+    BLEND_EXCLUSION_M,
+    CLIMB_RATE_RESOLUTION_MPS,
+    COURSE_ERROR_FLOOR_RAD,
+    FULL_THROTTLE_FRACTION,
+    IDLE_THROTTLE_FRACTION,
+    MAX_ABILITY_STD_ERROR_RAD,
+    MAX_CONDITION_NUMBER,
+    MAX_STEADY_ACCELERATION_MPS2,
+    MAX_UNSTEADINESS_RAD,
+    MIN_AIRBORNE_AIRSPEED_MPS,
+    MIN_COURSE_STRETCH_M,
+    MIN_SLOPE_STRETCH_M,
+    MIN_STRETCH_TIME_S,
+    ROUGH_COURSE_ERROR_RAD,
+    ROUGH_SLOPE_ERROR_RAD,
+    SATURATED_FRACTION,
+    SATURATED_THROTTLE_FRACTION,
+    SATURATED_TIME_S,
+    SLOPE_ERROR_FLOOR_RAD,
+    SPEED_MEMORY_S,
+    TURN_EXCLUSION_M,
+    ZERO_CURRENT_A,
 )
 from world.kernels import compiled
 
@@ -81,8 +81,8 @@ def straight_span(
     """
     start, end = clear, clear
     if level:
-        start, end = (max(clear, float(blend) + CLEAR_OF_BLEND) for blend in requirements.blend[leg : leg + 2])
-    low = requirements.after[leg] + (start if leg > 0 else min(clear, CLEAR_OF_BLEND))
+        start, end = (max(clear, float(blend) + BLEND_EXCLUSION_M) for blend in requirements.blend[leg : leg + 2])
+    low = requirements.after[leg] + (start if leg > 0 else min(clear, BLEND_EXCLUSION_M))
     return low, requirements.runs[leg] - requirements.before[leg + 1] - (end if leg + 1 < requirements.legs else 0.0)
 
 
@@ -92,12 +92,14 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
         return None
     rows = aligned.leg_rows(leg)
     along, across = along_across(requirements, leg, aligned.track.position[rows])
-    low, high = straight_span(requirements, leg, CLEAR_OF_TURN)
+    low, high = straight_span(requirements, leg, TURN_EXCLUSION_M)
     inside = (along >= low) & (along <= high)
-    if inside.sum() >= 20 and np.ptp(along[inside]) >= SHORTEST_COURSE:
+    if inside.sum() >= 20 and np.ptp(along[inside]) >= MIN_COURSE_STRETCH_M:
         bend, rest = fit_line(along[inside], across[inside])
         run = float(np.ptp(along[inside]))
-        return LegFit(requirements.courses[leg] + math.atan(bend), _angle_tolerance(COURSE_FLOOR, rest, run), run, True)
+        return LegFit(
+            requirements.courses[leg] + math.atan(bend), _angle_tolerance(COURSE_ERROR_FLOOR_RAD, rest, run), run, True
+        )
     # A short leg: the mean course between its turns, over at least a second.
     low, high = straight_span(requirements, leg, 0.0)
     between = np.flatnonzero((along >= low) & (along <= high))
@@ -111,7 +113,7 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
         wide = aligned.around(first, last, 0.5)
         first, last = wide.start, wide.stop - 1
     # In the frame of the course column, which is unwrapped, so that a full circle shows.
-    return LegFit(float(aligned.course[first : last + 1].mean()), ROUGH_COURSE, float(np.ptp(along)), False)
+    return LegFit(float(aligned.course[first : last + 1].mean()), ROUGH_COURSE_ERROR_RAD, float(np.ptp(along)), False)
 
 
 def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
@@ -121,29 +123,32 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
     rows = aligned.leg_rows(leg)
     position = aligned.track.position[rows]
     along, _ = along_across(requirements, leg, position)
-    low, high = straight_span(requirements, leg, CLEAR_OF_TURN, level=True)
+    low, high = straight_span(requirements, leg, TURN_EXCLUSION_M, level=True)
     inside = (along >= low) & (along <= high)
-    if inside.sum() >= 20 and np.ptp(along[inside]) >= SHORTEST_SLOPE:
+    if inside.sum() >= 20 and np.ptp(along[inside]) >= MIN_SLOPE_STRETCH_M:
         rise, rest = fit_line(along[inside], position[inside, 2])
         run = float(np.ptp(along[inside]))
-        return LegFit(math.atan(rise), _angle_tolerance(SLOPE_FLOOR, rest, run), run, True)
+        return LegFit(math.atan(rise), _angle_tolerance(SLOPE_ERROR_FLOOR_RAD, rest, run), run, True)
     time = aligned.track.time[rows]
     if time[-1] - time[0] < 1.0:
         return None
     # A short leg: the least-squares slope of at least four seconds about its midpoint, or of the whole leg if shorter.
     middle = float(np.interp(0.5 * requirements.runs[leg], np.maximum.accumulate(along), time))
-    start = min(max(middle - 0.5 * SHORTEST_TIME, float(time[0])), max(float(time[0]), float(time[-1]) - SHORTEST_TIME))
-    window = (time >= start) & (time <= start + SHORTEST_TIME)
+    start = min(
+        max(middle - 0.5 * MIN_STRETCH_TIME_S, float(time[0])),
+        max(float(time[0]), float(time[-1]) - MIN_STRETCH_TIME_S),
+    )
+    window = (time >= start) & (time <= start + MIN_STRETCH_TIME_S)
     run_at = aligned.distance_run[rows][window]
     if run_at.size < 2 or np.ptp(run_at) < 1.0:
         return None
     rise, _ = fit_line(run_at, position[window, 2])
-    return LegFit(math.atan(rise), ROUGH_SLOPE, float(np.ptp(run_at)), False)
+    return LegFit(math.atan(rise), ROUGH_SLOPE_ERROR_RAD, float(np.ptp(run_at)), False)
 
 
 def _angle_tolerance(floor: float, rest: float, run: float) -> float:
     """Return the tolerance of a fitted angle: residuals at the ends of the run rotate the line."""
-    return min(floor + math.atan2(2.0 * rest, run), MAX_UNSTEADY)
+    return min(floor + math.atan2(2.0 * rest, run), MAX_UNSTEADINESS_RAD)
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +166,7 @@ class Ability:
 
     def covers(self, planned: float) -> bool:
         """Return True if the ability exceeds a leg's slope (rad) by more than its own error."""
-        return self.slope - SURE * self.error > abs(planned)
+        return self.slope - ABILITY_SIGMAS * self.error > abs(planned)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +177,7 @@ class SlopeMeasure:
     height_error: m, largest distance above (negative: below) the leg's line.
     short: True if no part of the leg is clear of the blends.
     at_full, at_idle: s with the throttle at its limits.
-    slow, fast: m/s, the largest mean airspeed error below and above the command over `SATURATED` seconds at those
+    slow, fast: m/s, the largest mean airspeed error below and above the command over `SATURATED_TIME_S` seconds at those
         limits, without the part that a gust explains; 0 for none.
     ability: the aircraft's ability at the throttle limit that the leg needs, if the flight reached that limit.
     finished: the leg was flown to its end.
@@ -212,7 +217,7 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
 def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[float | None, bool]:
     """Return the largest signed distance from the leg's line, m, and whether no part is clear of blends."""
     along, _ = along_across(requirements, leg, position)
-    low, high = straight_span(requirements, leg, CLEAR_OF_TURN, level=True)
+    low, high = straight_span(requirements, leg, TURN_EXCLUSION_M, level=True)
     inside = (along >= low) & (along <= high)
     short = not inside.any()
     if short:
@@ -230,7 +235,7 @@ def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int
     rows = aligned.leg_rows(leg)
     speeds = requirements.route.airspeed
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
-    start = float(aligned.track.time[rows.start]) + change / ACCELERATION
+    start = float(aligned.track.time[rows.start]) + change / MAX_STEADY_ACCELERATION_MPS2
     return slice(max(rows.start, int(np.searchsorted(aligned.track.time, start))), rows.stop)
 
 
@@ -246,7 +251,7 @@ def _saturation(requirements: RouteRequirements, aligned: AlignedTrack, leg: int
     error = track.airspeed[rows].astype(np.float64) - commanded
     # A gust along the track changes the airspeed without any energy, so it has to be off without the gust as well.
     steady = _speed_in_mean_wind(requirements, aligned, rows) - commanded
-    width = max(1, round(SATURATED / tick))
+    width = max(1, round(SATURATED_TIME_S / tick))
     lifted = lifted_speed(aligned.track.time, aligned.track.airspeed, aligned.track.wind[:, 2], rows.stop)[rows]
     slow = _largest_mean_within(full, np.minimum(-error, -steady) - np.maximum(0.0, -lifted), width)
     fast = _largest_mean_within(idle, np.minimum(error, steady) - np.maximum(0.0, lifted), width)
@@ -257,11 +262,11 @@ def _at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: sli
     """Return the rows that have the throttle at full, and those that have it at idle."""
     track = aligned.track
     throttle = track.controls[rows, THROTTLE]
-    full = throttle >= FULL
-    idle = throttle <= IDLE
+    full = throttle >= FULL_THROTTLE_FRACTION
+    idle = throttle <= IDLE_THROTTLE_FRACTION
     # An aircraft that burns fuel draws no current at all.
     if not requirements.setup.envelope.motor_braking and track.current.any():
-        idle |= (track.current[rows] <= NO_CURRENT) & ~full
+        idle |= (track.current[rows] <= ZERO_CURRENT_A) & ~full
     return full, idle
 
 
@@ -278,13 +283,13 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     if rows.stop - rows.start < 3:
         return None
     full, idle = _at_limits(requirements, aligned, rows)
-    full &= track.controls[rows, THROTTLE] >= FULL_THROTTLE
+    full &= track.controls[rows, THROTTLE] >= SATURATED_THROTTLE_FRACTION
     along, _ = along_across(requirements, leg, track.position[rows])
     low, high = straight_span(requirements, leg, 0.0)
-    use = _rows_after(full if sign > 0.0 else idle, round(SETTLED_AFTER / aligned.tick))
+    use = _rows_after(full if sign > 0.0 else idle, round(ABILITY_SETTLING_S / aligned.tick))
     use &= (along >= low) & (along <= high)
     seconds = float(use.sum() * aligned.tick)
-    if seconds < SHOWN_OVER:
+    if seconds < ABILITY_WINDOW_S:
         return None
     velocity = track.velocity[rows].astype(np.float64)
     air = velocity - track.wind[rows]
@@ -293,7 +298,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     commanded, up = float(requirements.route.airspeed[leg]), track.position[rows, 2][use]
     top = float(up.max())
     faster = np.sqrt((air[use] ** 2).sum(axis=1)) - commanded
-    fit = _plane_at_origin(rate, faster, 0.01 * (up - top), seconds / INDEPENDENT)
+    fit = _plane_at_origin(rate, faster, 0.01 * (up - top), seconds / ABILITY_SAMPLE_INTERVAL_S)
     if fit is None:
         return None
     tail, cross = requirements.setup.scenario.wind.along(float(requirements.courses[leg]), top)
@@ -303,7 +308,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     ]
     error = abs(slopes[1] - slopes[0])
     # Written so that NaN gives None.
-    return Ability(sign * slopes[0], error, seconds) if error <= UNSURE else None
+    return Ability(sign * slopes[0], error, seconds) if error <= MAX_ABILITY_STD_ERROR_RAD else None
 
 
 def _rows_after(mask: Flags, count: int) -> Flags:
@@ -317,12 +322,12 @@ def _plane_at_origin(value: Floats, x: Floats, y: Floats, independent: float) ->
     columns = [np.ones_like(x), x] + ([y] if np.ptp(y) > 1e-3 else [])
     table = np.column_stack(columns)
     moments = table.T @ table / len(x)
-    if np.linalg.cond(moments) > SINGULAR:
+    if np.linalg.cond(moments) > MAX_CONDITION_NUMBER:
         return None
     inverse = np.linalg.inv(moments)
     found = inverse @ (table.T @ value) / len(x)
     rest = value - table @ found
-    return float(found[0]), math.sqrt(float((rest.var() + KNOWN_TO**2) * inverse[0, 0]) / independent)
+    return float(found[0]), math.sqrt(float((rest.var() + CLIMB_RATE_RESOLUTION_MPS**2) * inverse[0, 0]) / independent)
 
 
 def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> Floats:
@@ -342,8 +347,8 @@ def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) ->
     out = np.zeros(stop)
     for k in range(1, stop):
         step = time[k] - time[k - 1]
-        gain = GRAVITY * rising[k] / max(SLOWEST_LIFTED, airspeed[k])
-        out[k] = (out[k - 1] + gain * step) / (1.0 + step / SPEED_MEMORY)
+        gain = GRAVITY * rising[k] / max(MIN_AIRBORNE_AIRSPEED_MPS, airspeed[k])
+        out[k] = (out[k - 1] + gain * step) / (1.0 + step / SPEED_MEMORY_S)
     return out
 
 
@@ -354,5 +359,5 @@ def _largest_mean_within(mask: NDArray[np.bool_], value: Floats, width: int) -> 
     total = np.concatenate([[0.0], np.cumsum(value)])
     count = np.concatenate([[0], np.cumsum(mask)])
     means = (total[width:] - total[:-width]) / width
-    held = count[width:] - count[:-width] >= THROUGHOUT * width
+    held = count[width:] - count[:-width] >= SATURATED_FRACTION * width
     return max(0.0, float(means[held].max())) if held.any() else 0.0

@@ -13,13 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
-from flight.simulation.tick import NEAR
+from flight.simulation.tick import RTL_ARRIVAL_RADIUS_M
 from flight.simulation.track import Track
 from logs.verdict.measures.acceptance import reach
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_progress import RouteProgress, route_progress
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.tolerances import ARRIVED, CAPTURE_RADIUS, CHORD_TIME, FARTHEST, FASTEST, MAX_PLAUSIBLE
+from logs.verdict.tolerances import (
+    CAPTURE_RADIUS_M,
+    CHORD_TIME_S,
+    FINAL_WAYPOINT_TOLERANCE_M,
+    MAX_PLAUSIBLE_POSITION_M,
+    MAX_PLAUSIBLE_SPEED_MPS,
+    MAX_PLAUSIBLE_VALUE,
+)
 from world.kernels import compiled, read_only
 
 Floats = NDArray[np.float64]
@@ -142,17 +149,20 @@ def _arrival_distances(requirements: RouteRequirements) -> Floats:
     """Return the distance from each waypoint, (w,) m, within which a track that ends there has passed it."""
     route, follows_path = requirements.setup.route, requirements.setup.autopilot.follows_path
     offsets = requirements.fly_by_offset if follows_path else np.zeros(len(route.waypoints))
-    arrived = [max(float(offset) + ARRIVED, reach(requirements, i).radius) for i, offset in enumerate(offsets)]
+    arrived = [
+        max(float(offset) + FINAL_WAYPOINT_TOLERANCE_M, reach(requirements, i).radius)
+        for i, offset in enumerate(offsets)
+    ]
     first = route.return_from
     if first >= 0:
         # A return ends where its autopilot loiters, which is not where the loiter is drawn.
         until = route.return_until
-        arrived[first + 1 : until] = [max(NEAR, radius) for radius in arrived[first + 1 : until]]
+        arrived[first + 1 : until] = [max(RTL_ARRIVAL_RADIUS_M, radius) for radius in arrived[first + 1 : until]]
     if requirements.setup.autopilot.loiter_rules.at_middle:
         # A mission that ends on a loiter about a center ends anywhere on it, as wide as it is flown.
         ends, item = route.arcs.size - 1, route.items[-1]
         while ends > 0 and route.items[ends] == item and route.arcs[ends - 1]:
-            arrived[ends] = max(arrived[ends], NEAR)
+            arrived[ends] = max(arrived[ends], RTL_ARRIVAL_RADIUS_M)
             ends -= 1
     return np.array(arrived)
 
@@ -220,15 +230,18 @@ def _usable(track: Track, *, own: bool) -> NDArray[np.bool_]:
     are checked here, and each rule checks what else it needs.
     """
     good = np.isfinite(track.time)
-    plausible: tuple[tuple[str, float], ...] = (("position", FARTHEST), ("velocity", FASTEST))
+    plausible: tuple[tuple[str, float], ...] = (
+        ("position", MAX_PLAUSIBLE_POSITION_M),
+        ("velocity", MAX_PLAUSIBLE_SPEED_MPS),
+    )
     if own:
         for name in ("airspeed", "current", "energy"):
             good &= np.isfinite(getattr(track, name))
         plausible = (
             *plausible,
-            ("attitude", MAX_PLAUSIBLE),
-            ("controls", MAX_PLAUSIBLE),
-            ("wind", MAX_PLAUSIBLE),
+            ("attitude", MAX_PLAUSIBLE_VALUE),
+            ("controls", MAX_PLAUSIBLE_VALUE),
+            ("wind", MAX_PLAUSIBLE_VALUE),
         )
     for name, largest in plausible:
         # A NaN is not within any bound.
@@ -246,9 +259,9 @@ def _passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tupl
     """
     position, count, last = track.position, len(apexes), len(track) - 1
     tick = max(1e-6, float(track.time[-1] - track.time[0]) / last)
-    step = max(1, int(CHORD_TIME / tick), -(-len(track) * count // _CELLS))
+    step = max(1, int(CHORD_TIME_S / tick), -(-len(track) * count // _CELLS))
     first, until = read_only(progress.first // step), read_only(progress.last // step)
-    chords, capped = _align(read_only(position), apexes, first, until, step, CAPTURE_RADIUS)
+    chords, capped = _align(read_only(position), apexes, first, until, step, CAPTURE_RADIUS_M)
     rows = np.zeros(count, dtype=np.int64)
     distance = np.zeros(count)
     # Missed waypoints lie between their neighbours; waypoints after the last one that was met lie at the end.

@@ -10,7 +10,7 @@ from flight.simulation.track import ROLL
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.slopes import leg_course
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
-from logs.verdict.tolerances import WATCHED
+from logs.verdict.tolerances import SETTLING_WATCH_TIME_S
 
 Floats = NDArray[np.float64]
 
@@ -172,7 +172,7 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int)
     held, radius = _bank_and_radius(aligned, around)
     angle, tolerance, fitted = _course_change(requirements, aligned, i)
     watched = np.arange(position.shape[0]) <= max(leave, end)
-    watched &= track.time[first : last + 1] <= track.time[first + leave] + WATCHED
+    watched &= track.time[first : last + 1] <= track.time[first + leave] + SETTLING_WATCH_TIME_S
     turned = abs(float(aligned.course[first + leave] - aligned.course[first + entry]))
     return TurnMeasure(
         angle=angle,

@@ -14,7 +14,7 @@ from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.places import Place
-from logs.verdict.tolerances import ROUNDING
+from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.wording import place_text
 from world.airspace.zone_kernels import zone_records
 from world.terrain import Terrain
@@ -71,7 +71,7 @@ def way_clearance(ground: Terrain, way: Way) -> tuple[float, float]:
     return float(low[k]), float(run[k] + found[k][1] * (run[k + 1] - run[k]))
 
 
-def entered_by_way(requirements: RouteRequirements, way: Way) -> str:
+def first_obstacle_on(requirements: RouteRequirements, way: Way) -> str:
     """Return the name of the first missile sphere or zone that a path enters, or "" if it enters none.
 
     Ignores zones the path starts in, and inclusion zones with a floor.
@@ -87,7 +87,7 @@ def entered_by_way(requirements: RouteRequirements, way: Way) -> str:
         records = zone_records([airspace.zones[z] for z in relevant])
         met = path_zones(straight_moves(way.points, way.run), records, scenario.terrain)
         for z, visit in zip(relevant, met, strict=True):
-            if visit.depth > ROUNDING and visit.entry_time > 0.0:
+            if visit.depth > ROUNDING_M and visit.entry_time > 0.0:
                 return place_text(airspace.place(z))
     return ""
 

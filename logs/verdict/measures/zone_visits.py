@@ -171,7 +171,7 @@ VISIT = record_dtype(
     ("unknown", np.bool_),
 )
 # Precision of depths beyond a zone's limit, m: half of the rounding of a waypoint.  A numerical precision: the verdict
-# tolerates `logs.verdict.tolerances.ROUNDING`.
+# tolerates `logs.verdict.tolerances.ROUNDING_M`.
 DEPTH_PRECISION = 0.01
 # Precision of the places where a path enters and leaves, m.
 EDGE_PRECISION = 1e-3

@@ -24,7 +24,7 @@ from logs.verdict.returns.judge_returns import (
     heights_above_ground,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
-from logs.verdict.returns.suggest_returns import come_home
+from logs.verdict.returns.suggest_returns import meets_return_limits
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -125,7 +125,7 @@ def drawn_returns(
     return DrawnReturns(returns, worst_returns(world, starts, returns), least, glides)
 
 
-def plainly_drawn(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
+def draw_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
     """Return judged returns without glides and least altitudes, which take longest."""
     return DrawnReturns(returns, worst_returns(world, starts, returns), LeastHeights(np.zeros(0), np.zeros(0)))
 
@@ -170,7 +170,7 @@ def least_heights(world: ReturnWorld, starts: ReturnStarts) -> LeastHeights:
     chosen = starts.at(rows)
     begins = heights_above_ground(world, chosen)
     lowest = np.where(np.isfinite(begins), np.minimum(0.0, world.limit - begins), math.nan)
-    safe = come_home(world, chosen)
+    safe = meets_return_limits(world, chosen)
     # Altitudes relative to the flight, m: the last one that was safe, and the last one that was not.
     good, bad = np.where(safe, 0.0, math.nan), np.where(safe, math.nan, 0.0)
     direction = np.where(safe, -1.0, 1.0)
@@ -197,5 +197,5 @@ def _safe_from(world: ReturnWorld, starts: ReturnStarts, above: Floats, asked: F
     if asked.any():
         rows = starts.rows[asked].copy()
         rows["up"] += above[asked]
-        found[asked] = come_home(world, replace(starts.at(np.flatnonzero(asked)), rows=rows))
+        found[asked] = meets_return_limits(world, replace(starts.at(np.flatnonzero(asked)), rows=rows))
     return found

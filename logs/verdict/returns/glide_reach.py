@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.law import stall_bank
 from flight.autopilots.arduplane.point_mass import PointMass, excess_power
-from flight.autopilots.arduplane.swift_return import REACTION, Surroundings
+from flight.autopilots.arduplane.swift_return import ENGINE_FAILURE_REACTION_S, ReturnEnvironment
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from logs.verdict.returns.glide_map import GlideMap, Needs, steps
 from world.geometry import wrap
@@ -38,7 +38,7 @@ _GLIDER = record_dtype("airspeed", "bank", "west", "south", "cell")
 
 
 def heights_left(
-    starts: Records, needs: Needs, aircraft: PointMass, around: Surroundings, airspeed: float, bank: float
+    starts: Records, needs: Needs, aircraft: PointMass, around: ReturnEnvironment, airspeed: float, bank: float
 ) -> tuple[Floats, Codes]:
     """Return each start's altitude (n,) above the least from which a place is reached, m, and that place.
 
@@ -93,9 +93,9 @@ def _look_ahead(
         worst = -excess_power(excess, 0.0, slowest, start.up, aircraft) / max(1.0, 0.95 * slowest - wind)
         for side in (-1.0, 1.0):
             yaw = math.atan2(air_east, air_north)
-            here.east = start.east + REACTION * start.velocity_east
-            here.north = start.north + REACTION * start.velocity_north
-            here.up = start.up - REACTION * max(straight, -start.velocity_up)
+            here.east = start.east + ENGINE_FAILURE_REACTION_S * start.velocity_east
+            here.north = start.north + ENGINE_FAILURE_REACTION_S * start.velocity_north
+            here.up = start.up - ENGINE_FAILURE_REACTION_S * max(straight, -start.velocity_up)
             before = 0.0
             for part in range(_MAX_TURN_STEPS):
                 over_east, over_north = fast * math.sin(yaw) + wind_east, fast * math.cos(yaw) + wind_north

@@ -2,7 +2,7 @@
 
 import math
 
-from flight.autopilots.arduplane.swift_return import REACTION
+from flight.autopilots.arduplane.swift_return import ENGINE_FAILURE_REACTION_S
 from logs.verdict.returns.judge_glides import MARGIN, REACHES, Glide, GlideRange, Glides, GlideSite, NotJudged, Reach
 
 _NOT_JUDGED_TEXTS: dict[NotJudged, str] = {
@@ -117,7 +117,7 @@ def glide_notes(glides: Glides) -> list[str]:
     if not glides.each:
         return []
     notes = [
-        f"without the engine: on for {REACTION:.0f} s, then at AIRSPEED_MIN {glides.airspeed:g} m/s, {MARGIN:.0f} m"
+        f"without the engine: on for {ENGINE_FAILURE_REACTION_S:.0f} s, then at AIRSPEED_MIN {glides.airspeed:g} m/s, {MARGIN:.0f} m"
         " above ground all the way, outside missiles' spheres, through zones",
         "flat by the elevation file: it knows no trees, houses or water",
     ]

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.swift_return import CIRCLED, HIT, fly_returns
+from flight.autopilots.arduplane.swift_return import RETURN_ARRIVED, RETURN_GROUND_IMPACT, fly_returns
 from flight.mission.placing import landing_places
 from flight.mission.return_path import ReturnCircle, ReturnTarget
 from logs.verdict.returns.glide_footprint import GlideFootprint
@@ -287,19 +287,19 @@ def _own_glides(world: ReturnWorld, starts: ReturnStarts) -> list[OwnGlide]:
 def _own_glide(world: ReturnWorld, target: ReturnTarget, flown: Record) -> OwnGlide:
     clearance = float(flown["clearance_before"])
     over, short, at = math.nan, math.nan, _NOWHERE
-    if flown["ended"] == CIRCLED and world.scenario.terrain is not None:
+    if flown["ended"] == RETURN_ARRIVED and world.scenario.terrain is not None:
         over = float(flown["circle_up"] - world.scenario.terrain.height(*target.position[:2]))
-    if flown["ended"] == HIT:
+    if flown["ended"] == RETURN_GROUND_IMPACT:
         at = (float(flown["clearance_east"]), float(flown["clearance_north"]), float(flown["clearance_up"]))
         short = math.dist(at[:2], target.position[:2])
     return OwnGlide(target, _own_end(flown, clearance, over), over, clearance, at, short)
 
 
 def _own_end(flown: Record, clearance: float, over: float) -> OwnEnd:
-    if flown["ended"] == HIT:
+    if flown["ended"] == RETURN_GROUND_IMPACT:
         return "ground"
     if flown["outside"] <= 0.0:
         return "threat"
-    if flown["ended"] != CIRCLED:
+    if flown["ended"] != RETURN_ARRIVED:
         return "unknown"
     return "arrives" if min(clearance, over) >= MARGIN else "low"

@@ -22,11 +22,11 @@ from flight.autopilots.arduplane.failsafes import Cause, failsafe_causes
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.point_mass import PointMass, point_mass
 from flight.autopilots.arduplane.swift_return import (
-    CIRCLED,
-    HIT,
-    NEVER,
-    OFF_GROUND,
-    Surroundings,
+    RETURN_ARRIVED,
+    RETURN_GROUND_IMPACT,
+    RETURN_OFF_TERRAIN,
+    RETURN_TIMEOUT,
+    ReturnEnvironment,
     fly_returns,
     surroundings,
 )
@@ -45,7 +45,7 @@ from logs.verdict.measures.path_moves import MOVE
 from logs.verdict.measures.route_requirements import Airspace, airspace_of
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.returns.return_starts import ReturnStarts
-from logs.verdict.tolerances import CLEARANCE_TOLERANCE, RESERVE
+from logs.verdict.tolerances import CLEARANCE_TOLERANCE_M, ENERGY_RESERVE_FRACTION
 from world.errors import MissionError
 from world.kernels import Record, Records
 from world.scenario import Scenario
@@ -79,7 +79,7 @@ TURN = 2.0
 # Fraction of its starting height that a return from a flown take-off or landing has to keep: it may be sinking.
 _LOW_START_FRACTION = 0.5
 # Least height above ground from which returns in a take-off or a landing are judged, m: nothing turns below it.
-TOUCHING = 10.0
+MIN_JUDGED_HEIGHT_M = 10.0
 # A return from higher up is left out if it hits the ground or gets low within this run, m, because it sinks by the rest
 # of that fraction.
 _SINK_RUN_M = 500.0
@@ -272,7 +272,7 @@ class ReturnWorld:
     home: ReturnPlace
     rally: tuple[ReturnPlace, ...]
     aircraft: PointMass
-    around: Surroundings
+    around: ReturnEnvironment
     airspace: Airspace
     stands_in: bool = False
     other_law: bool = False
@@ -447,7 +447,7 @@ def judge_returns(
         causes=world.causes,
         limit=world.limit,
         airspace=world.airspace,
-        reserve=RESERVE * world.setup.battery,
+        reserve=ENERGY_RESERVE_FRACTION * world.setup.battery,
         flown=starts.flown,
         again=tuple(again),
         stands_in=world.stands_in,
@@ -463,12 +463,12 @@ def sinks_down(one: ReturnFlown, height: float) -> bool:
 
     That is no fault of its path.
 
-    height: its starting height above ground, m.  Below `TOUCHING` this is any return that hits the ground or gets low
+    height: its starting height above ground, m.  Below `MIN_JUDGED_HEIGHT_M` this is any return that hits the ground or gets low
     near its start; higher up, one that loses half of its height by then.  A return that flies into rising ground, or
     hits a hill later, is judged.
     """
     run = math.dist(one.start[:2], one.clearance_at[:2])
-    sinks = height < TOUCHING or one.start[2] - one.clearance_at[2] >= (1.0 - _LOW_START_FRACTION) * height
+    sinks = height < MIN_JUDGED_HEIGHT_M or one.start[2] - one.clearance_at[2] >= (1.0 - _LOW_START_FRACTION) * height
     return one.kind in ("ground", "low", "unsure") and sinks and run <= _SINK_RUN_M
 
 
@@ -521,20 +521,20 @@ def kind_of(world: ReturnWorld, flown: Record, zone: int, left: float, floor: fl
     zone: the zone that it violates, -1 for none.  left: Wh left at the end, NaN if unknown.
     floor: required height above ground, m.
     """
-    if flown["ended"] == HIT:
+    if flown["ended"] == RETURN_GROUND_IMPACT:
         return "ground"
     if flown["threat"] >= 0 and flown["outside"] <= 0.0:
         return "threat"
     if zone >= 0:
         return "zone"
-    if flown["ended"] == NEVER:
+    if flown["ended"] == RETURN_TIMEOUT:
         return "lost"
-    if left < RESERVE * world.setup.battery:
+    if left < ENERGY_RESERVE_FRACTION * world.setup.battery:
         return "energy"
-    if flown["clearance"] < floor - CLEARANCE_TOLERANCE:
+    if flown["clearance"] < floor - CLEARANCE_TOLERANCE_M:
         # Applies wherever the return goes after that.
         return "low"
-    return "unknown" if flown["ended"] == OFF_GROUND or math.isnan(flown["clearance"]) else "safe"
+    return "unknown" if flown["ended"] == RETURN_OFF_TERRAIN or math.isnan(flown["clearance"]) else "safe"
 
 
 def _judge_return(
@@ -621,10 +621,10 @@ def _with_offsets(world: ReturnWorld, one: ReturnFlown, flown: Record, higher: f
     moved["clearance"] += higher
     moved["outside"] += farther
     if moved["clearance"] <= 0.0:
-        moved["ended"] = HIT
-    elif moved["ended"] == HIT:
+        moved["ended"] = RETURN_GROUND_IMPACT
+    elif moved["ended"] == RETURN_GROUND_IMPACT:
         # It was simulated on from where it grazed the ground: energy and zones cover the whole path.
-        moved["ended"] = NEVER if math.isnan(one.seconds) else CIRCLED
+        moved["ended"] = RETURN_TIMEOUT if math.isnan(one.seconds) else RETURN_ARRIVED
     kind = kind_of(world, moved, one.zone, one.left, one.floor)
     return replace(one, clearance=float(moved["clearance"]), outside=float(moved["outside"]), kind=kind)
 

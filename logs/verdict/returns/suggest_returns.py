@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.parameters import CLIMB_BEFORE_TURN
-from flight.autopilots.arduplane.swift_return import CIRCLED
+from flight.autopilots.arduplane.swift_return import RETURN_ARRIVED
 from flight.mission.return_path import ReturnPlace, ReturnTarget
 from logs.verdict.returns.judge_returns import (
     KINDS,
@@ -26,7 +26,7 @@ from logs.verdict.returns.judge_returns import (
     zone_met,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
-from logs.verdict.tolerances import RESERVE
+from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
 from world.kernels import Records
 
 Floats = NDArray[np.float64]
@@ -96,14 +96,14 @@ def _requirements(world: ReturnWorld, starts: ReturnStarts, margin: float = MARG
     )
 
 
-def come_home(world: ReturnWorld, starts: ReturnStarts) -> Flags:
+def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
     """Return True for each RTL return (n,) that keeps the limits themselves, by the point mass alone."""
     return _returns_meeting(world, starts, _requirements(world, starts, 0.0), _keeps_all)
 
 
 def _keeps_ground(_world: ReturnWorld, flown: Records, needs: _Needs) -> Flags:
     """Return True for each return that keeps its required height above ground, and arrives."""
-    return np.asarray((flown["ended"] == CIRCLED) & (flown["clearance"] >= needs.clearance))
+    return np.asarray((flown["ended"] == RETURN_ARRIVED) & (flown["clearance"] >= needs.clearance))
 
 
 def _keeps_all(world: ReturnWorld, flown: Records, needs: _Needs) -> Flags:
@@ -132,7 +132,7 @@ def _targets_meeting(
         return good
     if world.setup.envelope.power_level.size and world.battery_known:
         left = world.setup.battery - np.nan_to_num(starts.used) - flown["energy"]
-        good &= ~(left < RESERVE * world.setup.battery)
+        good &= ~(left < ENERGY_RESERVE_FRACTION * world.setup.battery)
     for k, way in enumerate(ways):
         good[k] = good[k] and (len(way) < 2 or zone_met(world, way) < 0)
     return good

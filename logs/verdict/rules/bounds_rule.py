@@ -11,7 +11,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import stay_inside
-from logs.verdict.tolerances import ROUNDING
+from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.wording import place_text
 
 Floats = NDArray[np.float64]
@@ -27,13 +27,13 @@ def bounds_findings(
         return [make_finding("bounds", FLIGHT, ok=None, reason=reason, unit="m")]
     planned, side, k = _inside_box(requirements, requirements.points)
     found, at = planned, f"at {place_text(requirements.waypoint(k))}"
-    ok: bool | None = planned >= -ROUNDING
+    ok: bool | None = planned >= -ROUNDING_M
     flown_margin = math.nan
     if not geometric and aligned is None:
         ok, at = None, "nothing was flown"
     elif aligned is not None:
         found, side, k = _inside_box(requirements, aligned.track.position)
-        flown_margin, ok = found, found >= -ROUNDING
+        flown_margin, ok = found, found >= -ROUNDING_M
         at = f"at {aligned.track.time[k]:.1f} s"
     where = f"{abs(found):.0f} m {'inside' if found >= 0.0 else 'beyond'} the {side} {at}"
     return [
@@ -46,7 +46,7 @@ def bounds_findings(
             flown=flown_margin,
             limit=0.0,
             source="scenario",
-            tolerance=ROUNDING,
+            tolerance=ROUNDING_M,
             margin=found if ok is not None else None,
             unit="m",
             method="least distance inside the box",
@@ -73,7 +73,7 @@ def _inside_box(requirements: RouteRequirements, points: Floats) -> tuple[float,
 
 RULE = Rule(
     name="bounds",
-    tolerances=("ROUNDING",),
+    tolerances=("ROUNDING_M",),
     judge=bounds_findings,
     whole=True,
     suggest=stay_inside,

@@ -14,7 +14,13 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import fly_higher
-from logs.verdict.tolerances import BELOW_HOME_M, CLEARANCE_TOLERANCE, GROUND_LEG_ROOM, HOME_ERROR_M, NEAR_FIELD
+from logs.verdict.tolerances import (
+    BELOW_HOME_M,
+    CLEARANCE_TOLERANCE_M,
+    FIELD_RADIUS_M,
+    GROUND_LEG_CLEARANCE_M,
+    HOME_ERROR_M,
+)
 from world.frames import to_map
 from world.terrain import Terrain
 
@@ -44,7 +50,7 @@ def clearance_findings(
         if geometric:
             out.append(_planned_clearance(requirements, leg, planned, least, ground.vertical_error))
         else:
-            short = planned < least - CLEARANCE_TOLERANCE
+            short = planned < least - CLEARANCE_TOLERANCE_M
             out.append(_flown_clearance(requirements, aligned, leg, planned, requirement, planned_short=short))
     return [*_home_above_ground(requirements, ground, out), *out]
 
@@ -104,7 +110,7 @@ class _Requirement(NamedTuple):
         requirement = np.full(len(points), self.limit)
         for east, north in self.fields:
             away = np.hypot(points[:, 0] - east, points[:, 1] - north)
-            requirement[away <= NEAR_FIELD] = min(self.limit, GROUND_LEG_ROOM)
+            requirement[away <= FIELD_RADIUS_M] = min(self.limit, GROUND_LEG_CLEARANCE_M)
         return requirement
 
     def worst(self, low: Floats, points: Floats) -> tuple[float, float]:
@@ -159,7 +165,7 @@ def _last_clear_waypoint(requirements: RouteRequirements, final: int) -> int:
     if terrain is None:
         return final
     over = waypoints[:, 2] - terrain.height(waypoints[:, 0], waypoints[:, 1])
-    high = np.flatnonzero(over >= requirements.limits.min_clearance - CLEARANCE_TOLERANCE)
+    high = np.flatnonzero(over >= requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M)
     return int(high[-1]) if high.size else final
 
 
@@ -172,7 +178,7 @@ def _terrain_error_text(clearance: float, limit: float, error: float | None) -> 
     """Return a clearance (m) less the terrain's stated error, in words; "" if none is stated."""
     if error is None or math.isnan(clearance):
         return ""
-    short = f", less than the {limit:.0f} m required" if limit - CLEARANCE_TOLERANCE > clearance - error else ""
+    short = f", less than the {limit:.0f} m required" if limit - CLEARANCE_TOLERANCE_M > clearance - error else ""
     return f"; {clearance - error:.1f} m less the terrain's stated error of {error:g} m{short}"
 
 
@@ -182,17 +188,17 @@ def _planned_clearance(
     reason = f"{planned:.1f} m above ground at the lowest"
     if math.isnan(planned):
         reason = "the leg leaves the known terrain"
-    elif planned < limit - CLEARANCE_TOLERANCE:
+    elif planned < limit - CLEARANCE_TOLERANCE_M:
         reason += f"; {limit:.0f} m are required"
     return make_finding(
         "clearance",
         requirements.leg(leg),
-        ok=None if math.isnan(planned) else planned >= limit - CLEARANCE_TOLERANCE,
+        ok=None if math.isnan(planned) else planned >= limit - CLEARANCE_TOLERANCE_M,
         reason=reason + _terrain_error_text(planned, limit, error),
         planned=planned,
         limit=limit,
         source=_source(requirements, limit),
-        tolerance=CLEARANCE_TOLERANCE,
+        tolerance=CLEARANCE_TOLERANCE_M,
         margin=planned - limit,
         unit="m",
         method="exact along the fly-by path",
@@ -220,7 +226,7 @@ def _flown_clearance(
             k = first + row
             least = float(aligned.low[k])
             reason = f"{least:.1f} m above ground {_when_and_where(aligned, k, float(aligned.low_at[k]))}"
-            ok = least >= limit - CLEARANCE_TOLERANCE
+            ok = least >= limit - CLEARANCE_TOLERANCE_M
         if not known.all():
             k = first + int(np.argmin(known))
             off = f"off the known terrain {_when_and_where(aligned, k, 0.0)}"
@@ -241,7 +247,7 @@ def _flown_clearance(
         flown=least,
         limit=limit,
         source=_source(requirements, limit),
-        tolerance=CLEARANCE_TOLERANCE,
+        tolerance=CLEARANCE_TOLERANCE_M,
         margin=least - limit,
         unit="m",
         method="exact along the flown track",
@@ -256,7 +262,7 @@ def _when_and_where(aligned: AlignedTrack, k: int, fraction: float) -> str:
 
 RULE = Rule(
     name="clearance",
-    tolerances=("BELOW_HOME_M", "CLEARANCE_TOLERANCE", "GROUND_LEG_ROOM", "HOME_ERROR_M", "NEAR_FIELD"),
+    tolerances=("BELOW_HOME_M", "CLEARANCE_TOLERANCE_M", "GROUND_LEG_CLEARANCE_M", "HOME_ERROR_M", "FIELD_RADIUS_M"),
     judge=clearance_findings,
     suggest=fly_higher,
     log=LogNeeds(("heights",)),

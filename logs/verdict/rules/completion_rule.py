@@ -12,7 +12,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import Rule
-from logs.verdict.tolerances import CONTRADICTION, GAP_STEPS, LONGEST_GAP
+from logs.verdict.tolerances import MAX_ROW_GAP_S, MAX_ROW_GAP_TICKS, MAX_VELOCITY_DISAGREEMENT_MPS
 from logs.verdict.wording import place_text_within
 
 
@@ -72,14 +72,14 @@ def _record_faults(aligned: AlignedTrack) -> list[Message]:
     track, out = aligned.track, []
     step = np.diff(track.time)
     gap = int(np.argmax(step))
-    if step[gap] > max(LONGEST_GAP, GAP_STEPS * float(np.median(step))):
+    if step[gap] > max(MAX_ROW_GAP_S, MAX_ROW_GAP_TICKS * float(np.median(step))):
         out.append(message(f"rows are missing from {track.time[gap]:.1f} s to {track.time[gap + 1]:.1f} s"))
     # Across missing rows the mean velocity is meaningless.
-    short = step <= LONGEST_GAP
+    short = step <= MAX_ROW_GAP_S
     moved = np.diff(track.position, axis=0)[short] / step[short, None]
     mean = 0.5 * (track.velocity[1:].astype(np.float64) + track.velocity[:-1])[short]
     off = np.sqrt(((moved - mean) ** 2).sum(axis=1))
-    if off.size and off.max() > CONTRADICTION:
+    if off.size and off.max() > MAX_VELOCITY_DISAGREEMENT_MPS:
         k = int(np.argmax(off))
         out.append(message(f"position and velocity contradict each other at {track.time[:-1][short][k]:.2f} s"))
     return out
@@ -216,14 +216,14 @@ def _next_waypoint_text(setup: FlightSetup, legs: FlownLegs) -> str:
 RULE = Rule(
     name="completion",
     tolerances=(
-        "CONTRADICTION",
-        "GAP_STEPS",
-        "LONGEST_GAP",
-        "PARTLY_FLOWN",
-        "IN_ORDER",
-        "MIN_NEAR",
-        "MAX_NEAR",
-        "ANOTHER_PLACE",
+        "MAX_VELOCITY_DISAGREEMENT_MPS",
+        "MAX_ROW_GAP_TICKS",
+        "MAX_ROW_GAP_S",
+        "PARTIAL_LEG_MIN_S",
+        "MIN_IN_ORDER_FRACTION",
+        "MIN_NEAR_WAYPOINT_M",
+        "MAX_NEAR_WAYPOINT_M",
+        "PLAN_MISMATCH_DISTANCE_M",
     ),
     judge_end=completion_findings,
     judge_imported_end=imported_completion,

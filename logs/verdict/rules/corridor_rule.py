@@ -9,7 +9,7 @@ from logs.verdict.measures.acceptance import corner_depths, corridor_limit, fart
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across
 from logs.verdict.rule import Rule
-from logs.verdict.tolerances import ON_COURSE, ROUNDING
+from logs.verdict.tolerances import ROUNDING_M, RUNWAY_COURSE_TOLERANCE_RAD
 
 
 def corridor_findings(
@@ -33,7 +33,7 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
     planned, flown, ok = float(corner_depths(requirements)[leg : leg + 2].max()), math.nan, None
     faults, facts = [], []
     if geometric:
-        ok = planned <= limit + ROUNDING
+        ok = planned <= limit + ROUNDING_M
         facts.append(f"its turns are planned within {planned:.1f} m of the legs")
         if not ok:
             faults.append(message(f"its turns lead {planned:.0f} m off the legs", f"; the corridor is {limit:.0f} m"))
@@ -58,7 +58,7 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
         flown=flown,
         limit=limit,
         source=source,
-        tolerance=ROUNDING if geometric else 0.0,
+        tolerance=ROUNDING_M if geometric else 0.0,
         margin=limit - (planned if geometric else flown),
         unit="m",
         method="the turns' own arcs" if geometric else "greatest distance from the leg and its neighbours, each row",
@@ -76,7 +76,7 @@ def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, 
         return rows
     off = np.abs(np.sin(0.5 * (aligned.course[rows] - requirements.courses[leg])))
     aside = along_across(requirements, leg, np.asarray(aligned.track.position[rows], dtype=np.float64))[1]
-    on_course = (off < math.sin(0.5 * ON_COURSE)) & (np.abs(aside) <= limit)
+    on_course = (off < math.sin(0.5 * RUNWAY_COURSE_TOLERANCE_RAD)) & (np.abs(aside) <= limit)
     return slice(rows.start + int(np.argmax(on_course)), rows.stop) if on_course.any() else rows
 
 
@@ -87,6 +87,6 @@ def _when_and_where(aligned: AlignedTrack, row: int) -> str:
 
 RULE = Rule(
     name="corridor",
-    tolerances=("ROUNDING", "PASS", "FLY_OVER_SWING_RATIO", "ON_COURSE"),
+    tolerances=("ROUNDING_M", "WAYPOINT_PASS_MARGIN_M", "FLY_OVER_SWING_RATIO", "RUNWAY_COURSE_TOLERANCE_RAD"),
     judge=corridor_findings,
 )

@@ -9,7 +9,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import use_less_energy
-from logs.verdict.tolerances import RESERVE, UNDECIDED
+from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION, UNDECIDED_FRACTION
 
 
 def energy_findings(
@@ -21,7 +21,7 @@ def energy_findings(
     within the limit is undecided if the aircraft's power is uncertain; an imported log has it measured.
     """
     setup = requirements.setup
-    usable = (1.0 - RESERVE) * setup.battery
+    usable = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
     predicted, peak = predicted_energy(requirements)
     faults = [_endless_jump_message(requirements, usable)] if setup.route.endless >= 0 else []
     guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
@@ -34,7 +34,7 @@ def energy_findings(
         used = math.nan if track is None else float(track.energy.max())
         current = math.nan if track is None else float(track.current.max())
     measured = setup.source is not None and not geometric
-    most = used * (1.0 + (0.0 if measured else UNDECIDED * setup.envelope.power_sd))
+    most = used * (1.0 + (0.0 if measured else UNDECIDED_FRACTION * setup.envelope.power_sd))
     doubt = not faults and not guessed and used <= usable < most
     if math.isnan(used):
         reason = "the aircraft's power is not known at these speeds" if geometric else "nothing was flown"
@@ -49,7 +49,7 @@ def energy_findings(
         elif doubt:
             reason += f"; what {setup.envelope.source} says of the power is give or take {setup.envelope.power_sd:.0%}"
         elif used > usable:
-            reason += f"; {RESERVE:.0%} are to be left"
+            reason += f"; {ENERGY_RESERVE_FRACTION:.0%} are to be left"
     return [
         make_finding(
             "energy",
@@ -99,7 +99,7 @@ def _used_text(requirements: RouteRequirements, used: float, current: float) -> 
 
 RULE = Rule(
     name="energy",
-    tolerances=("RESERVE", "UNDECIDED"),
+    tolerances=("ENERGY_RESERVE_FRACTION", "UNDECIDED_FRACTION"),
     judge=energy_findings,
     whole=True,
     suggest=use_less_energy,

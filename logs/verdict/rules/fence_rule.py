@@ -18,7 +18,7 @@ from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.places import FLIGHT, MISSION
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import pass_zone
-from logs.verdict.tolerances import ROUNDING
+from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.wording import place_text
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.airspace.zones import Zone
@@ -39,7 +39,7 @@ def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
     moves = planned_moves(route_requirements(setup, envelope=False))
 
     def is_entered(zone: Zone) -> bool:
-        return bool(path_zones(moves, zone_records([zone]), setup.scenario.terrain)[0].depth > ROUNDING)
+        return bool(path_zones(moves, zone_records([zone]), setup.scenario.terrain)[0].depth > ROUNDING_M)
 
     return is_entered
 
@@ -106,7 +106,7 @@ def _compliance_finding(requirements: RouteRequirements, planned: Records, flown
         flown=None if flown is None else max(0.0, float(flown["depth"].max())),
         limit=0.0,
         source="zones",
-        tolerance=ROUNDING,
+        tolerance=ROUNDING_M,
         margin=margin,
         unit="m",
         method=_METHOD,
@@ -118,12 +118,12 @@ def _zone_finding(requirements: RouteRequirements, z: int, planned: Record, flow
     airspace = requirements.airspace
     zone = airspace.zones[z]
     visit = planned if flown is None else flown
-    ok: bool | None = visit.depth <= ROUNDING
+    ok: bool | None = visit.depth <= ROUNDING_M
     if ok and visit.unknown:
         ok = None
     side_text, stay = ("inside", "enters it") if zone.kind == "exclusion" else ("outside", "leaves it")
     faults, notes = [], []
-    if visit.depth > ROUNDING:
+    if visit.depth > ROUNDING_M:
         faults.append(
             message(
                 f"{visit.depth:.1f} m {side_text}",
@@ -137,7 +137,7 @@ def _zone_finding(requirements: RouteRequirements, z: int, planned: Record, flow
         notes.append("touches it")
     if visit.unknown:
         notes.append("the ground that it counts from is not known all along")
-    if flown is not None and planned.depth > ROUNDING:
+    if flown is not None and planned.depth > ROUNDING_M:
         notes.append(f"the planned path is {planned.depth:.1f} m {side_text} at {_where(requirements, planned, 'at')}")
     return make_finding(
         "fence",
@@ -149,11 +149,11 @@ def _zone_finding(requirements: RouteRequirements, z: int, planned: Record, flow
         flown=None if flown is None else max(0.0, flown.depth),
         limit=0.0,
         source=_source(requirements, z),
-        tolerance=ROUNDING,
+        tolerance=ROUNDING_M,
         margin=-visit.depth,
         unit="m",
         method=_METHOD,
-        facts=_facts(visit) if visit.depth > ROUNDING else (),
+        facts=_facts(visit) if visit.depth > ROUNDING_M else (),
     )
 
 
@@ -185,7 +185,7 @@ def _where(requirements: RouteRequirements, visit: Record, event: str) -> str:
 
 RULE = Rule(
     name="fence",
-    tolerances=("ROUNDING",),
+    tolerances=("ROUNDING_M",),
     judge=fence_findings,
     suggest=pass_zone,
     log=LogNeeds(("heights",)),

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.swift_go_around import aborted_at, climb_rows, fly_go_arounds
-from flight.autopilots.arduplane.swift_return import HIT, NEVER, OFF_GROUND
+from flight.autopilots.arduplane.swift_return import RETURN_GROUND_IMPACT, RETURN_OFF_TERRAIN, RETURN_TIMEOUT
 from flight.autopilots.autopilot import LandingGlide
 from flight.mission.ground_ways import climb_pitch
 from flight.mission.items import Command, MissionItem, command_name
@@ -27,11 +27,17 @@ from logs.verdict.findings import GROUND_WAY, Fact, Finding, make_finding, messa
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.ways import Way, entered_by_way, first_item, is_laid_out, landing_item
+from logs.verdict.measures.ways import Way, first_item, first_obstacle_on, is_laid_out, landing_item
 from logs.verdict.places import FLIGHT
 from logs.verdict.returns.judge_returns import ReturnWorld, return_world
 from logs.verdict.rule import Rule
-from logs.verdict.tolerances import EARLY_TOUCH, GO_AROUND_ERROR, GO_AROUND_ROOM, NEAR_LINE_UP, ON_THE_SPOT
+from logs.verdict.tolerances import (
+    EARLY_TOUCHDOWN_DISTANCE_M,
+    GO_AROUND_CLEARANCE_M,
+    GO_AROUND_MODEL_ERROR_M,
+    LINE_UP_DISTANCE_M,
+    MIN_LEG_LENGTH_M,
+)
 from world.kernels import Record, Records
 from world.terrain import Terrain
 
@@ -103,7 +109,7 @@ class _Aborted(NamedTuple):
     over: float
     at_once: bool
     room: float = math.inf
-    needed: float = GO_AROUND_ROOM
+    needed: float = GO_AROUND_CLEARANCE_M
     climb: float = math.inf
     after: float = math.nan
     entered: str = ""
@@ -158,7 +164,7 @@ def _landing(requirements: RouteRequirements, ground: Terrain, at: int, item: Mi
     height = setup.autopilot.go_around_height(item.params[0], climbed)
     landings = _landings(requirements, at)
     low, under = setup.route.landing_ground, float(ground.height(float(end[0]), float(end[1])))
-    if height is None or math.isnan(home + low + under) or run < ON_THE_SPOT or begin[2] <= low:
+    if height is None or math.isnan(home + low + under) or run < MIN_LEG_LENGTH_M or begin[2] <= low:
         return None
     wind = setup.scenario.wind.along(course, low)[0]
     point = np.array([end[0], end[1], low])
@@ -245,7 +251,7 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
 
 def _abort_places(landing: _Landing) -> Floats:
     """Return where a glide is aborted: (n,) m before the landing point, up to its flare or touchdown."""
-    last = min(landing.run, max(landing.glide.flare_distance, EARLY_TOUCH))
+    last = min(landing.run, max(landing.glide.flare_distance, EARLY_TOUCHDOWN_DISTANCE_M))
     count = min(_MAX_ABORT_PLACES, max(2, math.ceil((landing.run - last) / _ABORT_SPACING_M) + 1))
     return np.linspace(landing.run, last, count)
 
@@ -295,11 +301,11 @@ def _judge_go_around(
 ) -> _Aborted:
     """Judge a simulated go-around.
 
-    flown: of `flight.autopilots.arduplane.swift_return.RETURN_FLOWN`.  positions: (n, 3) m, a second apart.
+    flown: of `flight.autopilots.arduplane.swift_return.RETURN_RESULT`.  positions: (n, 3) m, a second apart.
     goal: its destination.  top: altitude above which its climb is over, m AMSL.
     """
     rows, ended = climb_rows(positions, top), int(flown["ended"])
-    state = state._replace(lost=ended == NEVER, open=_unknown_part_text(ended, climbs=rows < len(positions)))
+    state = state._replace(lost=ended == RETURN_TIMEOUT, open=_unknown_part_text(ended, climbs=rows < len(positions)))
     if goal.lands and rows < len(positions):
         # Its path on a glide that begins anywhere is unknown; the path before is known.
         positions, ended = positions[: rows + 1], 0
@@ -311,16 +317,16 @@ def _judge_go_around(
     way = Way(positions, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
     low = path_clearance(ground.heights, ground.to_pixel.record, positions)[0]
     least = float(np.nanmin(low, initial=math.inf))
-    state = state._replace(entered=entered_by_way(requirements, way))
-    if ended == HIT or least <= 0.0:
+    state = state._replace(entered=first_obstacle_on(requirements, way))
+    if ended == RETURN_GROUND_IMPACT or least <= 0.0:
         return state._replace(room=min(least, 0.0), after=float(flown["clearance_time"]))
     ahead = (positions[:-1, :2] - landing.point[:2]) @ (math.sin(landing.course), math.cos(landing.course)) > 0.0
     climb = float(np.nanmin(low[:rows][ahead[:rows]], initial=math.inf))
-    if climb < GO_AROUND_ERROR and not state.open:
+    if climb < GO_AROUND_MODEL_ERROR_M and not state.open:
         passes = (
             f"aborted {state.before:.0f} m before the landing point it passes the ground in its climb by {climb:.0f} m"
         )
-        state = state._replace(open=f"{passes}, and may be flown {GO_AROUND_ERROR:.0f} m lower")
+        state = state._replace(open=f"{passes}, and may be flown {GO_AROUND_MODEL_ERROR_M:.0f} m lower")
     minimum = _required_heights(ground, goal, 0.5 * (positions[:-1] + positions[1:]))[rows:]
     back = np.where(np.isnan(low[rows:]), math.inf, low[rows:])
     if not back.size:
@@ -334,7 +340,7 @@ def _unknown_part_text(ended: int, *, climbs: bool) -> str:
 
     It follows from how it ended, and whether it climbs to its height.
     """
-    if ended != OFF_GROUND:
+    if ended != RETURN_OFF_TERRAIN:
         return ""
     return "it leads to where the ground is not known" if climbs else "it does not reach its height on known ground"
 
@@ -344,11 +350,11 @@ def _required_heights(ground: Terrain, goal: LandingStart, points: Floats) -> Fl
 
     Less near lower goals.
     """
-    minimum = np.full(len(points), GO_AROUND_ROOM)
+    minimum = np.full(len(points), GO_AROUND_CLEARANCE_M)
     for east, north, up in (one.place for one in (goal, *goal.onward)):
         high = up - float(ground.height(east, north))
-        near = np.hypot(points[:, 0] - east, points[:, 1] - north) <= NEAR_LINE_UP
-        if high < GO_AROUND_ROOM:
+        near = np.hypot(points[:, 0] - east, points[:, 1] - north) <= LINE_UP_DISTANCE_M
+        if high < GO_AROUND_CLEARANCE_M:
             minimum[near] = np.minimum(minimum[near], high)
     return minimum
 
@@ -400,7 +406,13 @@ def _outcome_text(worst: _Aborted) -> str:
 
 RULE = Rule(
     name="go_around",
-    tolerances=("GO_AROUND_ROOM", "NEAR_LINE_UP", "GO_AROUND_ERROR", "EARLY_TOUCH", "ON_THE_SPOT"),
+    tolerances=(
+        "GO_AROUND_CLEARANCE_M",
+        "LINE_UP_DISTANCE_M",
+        "GO_AROUND_MODEL_ERROR_M",
+        "EARLY_TOUCHDOWN_DISTANCE_M",
+        "MIN_LEG_LENGTH_M",
+    ),
     judge=go_around_findings,
     of_route=True,
 )

@@ -5,7 +5,7 @@ touchdown rule judge what is flown there.  Other departures and approaches are n
 mission's items and judged against ground, missile spheres and zones, whether the mission was flown or not.
 
 If a mission takes off, the aircraft climbs from the ground at home towards the next place, or on the course that the
-scenario's `[launch]` states.  An obstacle at its steepest climb fails; an obstacle only at `MIN_CLIMB` of that climb
+scenario's `[launch]` states.  An obstacle at its steepest climb fails; an obstacle only at `MIN_CLIMB_FRACTION` of that climb
 leaves the finding undecided.  If the mission does not take off, a pilot flies the aircraft to its first waypoint,
 perhaps on another path: an obstacle on the straight path leaves the finding undecided.
 
@@ -27,8 +27,8 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.ways import (
     Profile,
     Way,
-    entered_by_way,
     first_item,
+    first_obstacle_on,
     is_laid_out,
     landing_item,
     straight_way,
@@ -37,15 +37,15 @@ from logs.verdict.measures.ways import (
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
-    ABOVE_FLARE,
-    EARLY_TOUCH,
-    FIRST_CLIMB,
-    GLIDE_ERROR,
-    LAUNCH_RUN,
-    MIN_CLIMB,
-    ON_THE_SPOT,
-    PLAN_TOLERANCE,
-    POINT_ERROR,
+    EARLY_TOUCHDOWN_DISTANCE_M,
+    FIRST_CLIMB_HEIGHT_M,
+    FLARE_HEIGHT_MARGIN_M,
+    GLIDE_PATH_TOLERANCE_M,
+    LANDING_POINT_ERROR_M,
+    LAUNCH_RUN_M,
+    MIN_CLIMB_FRACTION,
+    MIN_LEG_LENGTH_M,
+    PLAN_TOLERANCE_RAD,
 )
 from logs.verdict.wording import place_text
 from world.frames import to_map
@@ -136,7 +136,7 @@ def climbout_findings(
         return [_unjudged("climbout", place, reason, opens=True)]
     met, least = (
         _find_obstacles(requirements, straight_way(begin, course, _takeoff_profile(low, up, run, slope, climb)))
-        for climb in (steepest, max(1e-3, MIN_CLIMB * certain))
+        for climb in (steepest, max(1e-3, MIN_CLIMB_FRACTION * certain))
     )
     return [_launch_finding(requirements, launch.way, place, met, least, (begin, low, up), certain == steepest)]
 
@@ -174,7 +174,7 @@ def _launch(requirements: RouteRequirements) -> _Launch:
     if stated is None or stated.course is None:
         return along
     way = f"on the launch course {round(math.degrees(stated.course)) % 360}°"
-    if abs(float(wrap(stated.course - along.course))) <= PLAN_TOLERANCE:
+    if abs(float(wrap(stated.course - along.course))) <= PLAN_TOLERANCE_RAD:
         return along._replace(way=way)
     return _Launch(stated.course, math.inf, 0.0, way)
 
@@ -184,7 +184,7 @@ def _climb_profile(low: float, up: float, run: float, climb: float) -> Profile:
 
     low: ground, up: place, m AMSL.  run: distance of the place, m.
     """
-    top = max(up, low + FIRST_CLIMB)
+    top = max(up, low + FIRST_CLIMB_HEIGHT_M)
     reached = (top - low) / climb
     if reached >= run:
         return [(0.0, low), (run, low + climb * run)]
@@ -205,12 +205,12 @@ def _takeoff_profile(low: float, up: float, run: float, slope: float, climb: flo
 
 
 def _find_obstacles(requirements: RouteRequirements, way: Way) -> _Obstacles:
-    """Return the obstacles on a path up from home, beyond `LAUNCH_RUN` of ground."""
+    """Return the obstacles on a path up from home, beyond `LAUNCH_RUN_M` of ground."""
     ground, end = requirements.setup.scenario.terrain, float(way.run[-1])
-    entered = entered_by_way(requirements, way)
-    if ground is None or end <= LAUNCH_RUN:
+    entered = first_obstacle_on(requirements, way)
+    if ground is None or end <= LAUNCH_RUN_M:
         return _Obstacles(math.inf, 0.0, entered)
-    return _Obstacles(*way_clearance(ground, way.between(LAUNCH_RUN, end)), entered)
+    return _Obstacles(*way_clearance(ground, way.between(LAUNCH_RUN_M, end)), entered)
 
 
 def _unflown_start_finding(place: Place, met: _Obstacles) -> Finding:
@@ -253,7 +253,7 @@ def _launch_finding(
         other = _other_courses(requirements, *launch)
         fault = message(fault.brief, fault.text[len(fault.brief) :] + other)
         return _finding("climbout", place, met, False if is_known else None, fault, "" if is_known else GROUND_WAY)
-    at_least = f"{subject}, at {100.0 * MIN_CLIMB:.0f} % of the steepest,"
+    at_least = f"{subject}, at {100.0 * MIN_CLIMB_FRACTION:.0f} % of the steepest,"
     if math.isnan(least.clearance) and not least.entered:
         return _finding("climbout", place, met, None, message(f"{at_least} leads to where the ground is not known"))
     if not least.free:
@@ -304,7 +304,7 @@ def approach_findings(
     begin, point = requirements.points[leg], requirements.points[at]
     run, course, low = float(requirements.runs[leg]), float(requirements.courses[leg]), setup.route.landing_ground
     high, under = float(begin[2]), float(ground.height(float(point[0]), float(point[1])))
-    if math.isnan(low) or math.isnan(under) or run < ON_THE_SPOT:
+    if math.isnan(low) or math.isnan(under) or run < MIN_LEG_LENGTH_M:
         reason = "the height of the ground at the landing point is not known"
         return [_unjudged("approach", place, reason, opens=True)]
     if high <= low:
@@ -313,31 +313,31 @@ def approach_findings(
     glide = setup.autopilot.landing_glide(high - low, run, setup.scenario.wind.along(course, low)[0], low)
     flare = (run - glide.flare_distance, low + glide.flare_height)
     way = straight_way(begin, course, [(0.0, high), *([flare] if glide.flare_distance > 0.0 else []), (run, low)])
-    last, room, at_run = run - EARLY_TOUCH, math.inf, 0.0
+    last, room, at_run = run - EARLY_TOUCHDOWN_DISTANCE_M, math.inf, 0.0
     if last > 0.0:
         room, at_run = way_clearance(ground, way.between(0.0, last))
-    met = _Obstacles(room, run - at_run, entered_by_way(requirements, way))
+    met = _Obstacles(room, run - at_run, first_obstacle_on(requirements, way))
     subject = f"the glide to {item}"
     if math.isnan(met.clearance) and not met.entered:
         return [_finding("approach", place, met, None, message(f"the ground below {subject} is not known"))]
     obstacle_message = met.obstacle_message(subject, "before the landing point")
     # With a landing point below the ground the glide hits the ground early: the elevation file may be some metres off.
-    if met.entered or met.clearance + min(POINT_ERROR, max(0.0, under - low)) < 0.0:
+    if met.entered or met.clearance + min(LANDING_POINT_ERROR_M, max(0.0, under - low)) < 0.0:
         return [_finding("approach", place, met, False, obstacle_message)]
     if met.clearance < 0.0:
         fault = message(
             f"the landing point of {item} is {under - low:.0f} m below the ground", f": {obstacle_message.text}"
         )
         return [_finding("approach", place, met, None, fault, GROUND_WAY)]
-    if low - under > POINT_ERROR:
+    if low - under > LANDING_POINT_ERROR_M:
         fault = message(f"the landing point of {item} is {low - under:.0f} m above the ground")
         return [_finding("approach", place, met, None, fault, GROUND_WAY)]
-    until = run - glide.flare_distance - max(0.0, ABOVE_FLARE - glide.flare_height) / glide.slope
+    until = run - glide.flare_distance - max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
     room = way_clearance(ground, way.between(0.0, until))[0] if until > 0.0 else math.inf
-    if room < GLIDE_ERROR:
+    if room < GLIDE_PATH_TOLERANCE_M:
         fault = message(
             f"{subject} passes the ground by {room:.1f} m",
-            f", and may be flown {GLIDE_ERROR:.0f} m lower than laid out",
+            f", and may be flown {GLIDE_PATH_TOLERANCE_M:.0f} m lower than laid out",
         )
         return [_finding("approach", place, met, None, fault, GROUND_WAY)]
     reason = f"glides down at {math.degrees(math.atan(glide.slope)):.1f}°"
@@ -345,7 +345,7 @@ def approach_findings(
         reason += (
             f", flares {glide.flare_height:.1f} m over the landing point and {glide.flare_distance:.0f} m before it"
         )
-    reason += f"; {_room_text(met)} until {EARLY_TOUCH:.0f} m before it"
+    reason += f"; {_room_text(met)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before it"
     reason += "" if setup.ground_ways.approach is not None else "; not flown: the flight ends in the air"
     return [_finding("approach", place, met, True, message(reason))]
 
@@ -382,11 +382,17 @@ def _finding(rule: str, place: Place, met: _Obstacles, ok: bool | None, said: Me
 
 CLIMBOUT = Rule(
     name="climbout",
-    tolerances=("LAUNCH_RUN", "FIRST_CLIMB", "MIN_CLIMB", "PLAN_TOLERANCE", "ROUNDING"),
+    tolerances=("LAUNCH_RUN_M", "FIRST_CLIMB_HEIGHT_M", "MIN_CLIMB_FRACTION", "PLAN_TOLERANCE_RAD", "ROUNDING_M"),
     judge=climbout_findings,
 )
 APPROACH = Rule(
     name="approach",
-    tolerances=("EARLY_TOUCH", "GLIDE_ERROR", "ABOVE_FLARE", "POINT_ERROR", "ROUNDING"),
+    tolerances=(
+        "EARLY_TOUCHDOWN_DISTANCE_M",
+        "GLIDE_PATH_TOLERANCE_M",
+        "FLARE_HEIGHT_MARGIN_M",
+        "LANDING_POINT_ERROR_M",
+        "ROUNDING_M",
+    ),
     judge=approach_findings,
 )

@@ -16,7 +16,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import fly_lower
-from logs.verdict.tolerances import HEIGHT_TOLERANCE
+from logs.verdict.tolerances import HEIGHT_TOLERANCE_M
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -123,16 +123,16 @@ def _finding(
     else:
         ceiling = requirements.setup.scenario.ceiling
         high = f"{judged.height:.1f} m above ground {judged.where}"
-        if judged.height > limit + HEIGHT_TOLERANCE:
+        if judged.height > limit + HEIGHT_TOLERANCE_M:
             faults.append(message(high, f"; {limit:g} m are allowed"))
         elif math.isfinite(judged.height):
             facts.append(f"{high} at the highest")
-        if judged.amsl > ceiling + HEIGHT_TOLERANCE:
+        if judged.amsl > ceiling + HEIGHT_TOLERANCE_M:
             faults.append(message(f"{judged.amsl:.1f} m AMSL", f", above the scenario's ceiling of {ceiling:.0f} m"))
         if not judged.known:
             facts.append("part of the ground below it is not known")
         ok = False if faults else True if judged.known else None
-    if planned is not None and planned is not judged and planned.height > limit + HEIGHT_TOLERANCE:
+    if planned is not None and planned is not judged and planned.height > limit + HEIGHT_TOLERANCE_M:
         facts.append(f"the planned path comes up to {planned.height:.1f} m")
     return make_finding(
         "height",
@@ -144,7 +144,7 @@ def _finding(
         flown=None if judged is None or judged is planned else judged.height,
         limit=limit,
         source=requirements.limits_source,
-        tolerance=HEIGHT_TOLERANCE,
+        tolerance=HEIGHT_TOLERANCE_M,
         margin=None if judged is None else limit - judged.height,
         unit="m",
         method=f"exact along the {by}",
@@ -153,7 +153,7 @@ def _finding(
 
 RULE = Rule(
     name="height",
-    tolerances=("HEIGHT_TOLERANCE",),
+    tolerances=("HEIGHT_TOLERANCE_M",),
     judge=height_findings,
     suggest=fly_lower,
     log=LogNeeds(("heights",), planned_heights=True),

@@ -15,9 +15,16 @@ from flight.simulation.track import Track
 from logs.verdict.findings import GROUND_WAY, Fact, Finding, make_finding, message, reason_of
 from logs.verdict.measures.route_requirements import FlownGround, RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.ways import Way, entered_by_way, track_way, way_clearance
+from logs.verdict.measures.ways import Way, first_obstacle_on, track_way, way_clearance
 from logs.verdict.rule import Rule
-from logs.verdict.tolerances import CLIMB_ERROR, LAUNCH_ROOM, LAUNCH_RUN, LAUNCH_SINK, RUNWAY_ROOM, TOUCHED
+from logs.verdict.tolerances import (
+    CLIMB_MODEL_ERROR_M,
+    CONTACT_HEIGHT_M,
+    LAUNCH_CLEARANCE_M,
+    LAUNCH_RUN_M,
+    MAX_LAUNCH_HEIGHT_LOSS_M,
+    RUNWAY_MARGIN_M,
+)
 from logs.verdict.wording import gentle_launch_text
 
 Floats = NDArray[np.float64]
@@ -47,21 +54,23 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
     if top <= take_off.top:
         brief = f"the take-off ended {top - take_off.base:.0f} m above home"
         faults.append(message(brief, f", short of {take_off.top - take_off.base:.0f} m"))
-    if lost > LAUNCH_SINK:
-        faults.append(message(f"sinks {lost:.1f} m after the launch", f"; {LAUNCH_SINK:g} m are allowed"))
+    if lost > MAX_LAUNCH_HEIGHT_LOSS_M:
+        faults.append(message(f"sinks {lost:.1f} m after the launch", f"; {MAX_LAUNCH_HEIGHT_LOSS_M:g} m are allowed"))
     left = _runway_left(requirements, take_off, position)
-    if left < RUNWAY_ROOM:
+    if left < RUNWAY_MARGIN_M:
         brief = f"leaves the ground {take_off.launch.run - left:.0f} m from home"
-        runway_text = f"; the runway is {take_off.launch.run:.0f} m long, of which {RUNWAY_ROOM:.0f} m are to be left"
+        runway_text = (
+            f"; the runway is {take_off.launch.run:.0f} m long, of which {RUNWAY_MARGIN_M:.0f} m are to be left"
+        )
         faults.append(message(brief, runway_text))
-    if room < LAUNCH_ROOM:
+    if room < LAUNCH_CLEARANCE_M:
         faults.append(message(f"{room:.1f} m above ground", f" {where:.0f} m from home, on the course that is held"))
-    entered = entered_by_way(requirements, way)
+    entered = first_obstacle_on(requirements, way)
     if entered:
         faults.append(message(f"the climb enters {entered}"))
     known = _description(take_off, track, run, room)
     open_ = []
-    if not faults and LAUNCH_ROOM <= room < LAUNCH_ROOM + CLIMB_ERROR:
+    if not faults and LAUNCH_CLEARANCE_M <= room < LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M:
         brief = f"the launch passes {room:.1f} m above ground {where:.0f} m from home"
         open_.append(message(brief, ", nearer than the law's climb is known"))
     elif not faults and math.isnan(room):
@@ -73,10 +82,10 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
         reason=reason_of(faults or open_, known),
         faults=faults or open_,
         flown=room,
-        limit=LAUNCH_ROOM,
+        limit=LAUNCH_CLEARANCE_M,
         source="check",
         tolerance=0.0,
-        margin=room - LAUNCH_ROOM,
+        margin=room - LAUNCH_CLEARANCE_M,
         unit="m",
         method="exact along the flown track",
         check=GROUND_WAY if open_ else "",
@@ -93,12 +102,12 @@ def _climb_clearance(requirements: RouteRequirements, way: Way) -> tuple[float, 
     if terrain is None:
         return math.nan, math.nan
     # On a runway the aircraft is on the ground: heights apply from lift-off on.
-    first = LAUNCH_RUN
+    first = LAUNCH_RUN_M
     take_off = None if requirements.ground is None else requirements.ground.ways.take_off
     if take_off is not None and take_off.launch.method == "runway":
         standing = float(position[0, 2] - take_off.home[2])
         above = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
-        over = above > standing + LAUNCH_ROOM + CLIMB_ERROR
+        over = above > standing + LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M
         first = max(first, float(run[int(np.argmax(over))]) if over.any() else float(run[-1]))
     if run[-1] <= first:
         return math.inf, math.nan
@@ -111,7 +120,9 @@ def _runway_left(requirements: RouteRequirements, take_off: TakeOff, position: F
     if take_off.launch.method != "runway" or terrain is None:
         return math.inf
     standing = float(position[0, 2] - take_off.home[2])
-    on_it = np.flatnonzero(position[:, 2] - terrain.height(position[:, 0], position[:, 1]) <= standing + TOUCHED)
+    on_it = np.flatnonzero(
+        position[:, 2] - terrain.height(position[:, 0], position[:, 1]) <= standing + CONTACT_HEIGHT_M
+    )
     last = position[on_it[-1] if on_it.size else 0]
     return take_off.launch.run - math.dist(last[:2], take_off.home[:2])
 
@@ -128,12 +139,20 @@ def _description(take_off: TakeOff, track: Track, run: Floats, room: float) -> l
         course = round(math.degrees(math.atan2(*track.velocity[-1, :2].tolist()))) % 360
         known.append(f"climbs at {rise / run[-1]:.2f}, at last on {course}°")
     if math.isfinite(room):
-        known.append(f"{room:.0f} m above ground or more beyond {LAUNCH_RUN:.0f} m")
+        known.append(f"{room:.0f} m above ground or more beyond {LAUNCH_RUN_M:.0f} m")
     return known
 
 
 RULE = Rule(
     name="launch",
-    tolerances=("LAUNCH_RUN", "LAUNCH_ROOM", "CLIMB_ERROR", "LAUNCH_SINK", "RUNWAY_ROOM", "TOUCHED", "ROUNDING"),
+    tolerances=(
+        "LAUNCH_RUN_M",
+        "LAUNCH_CLEARANCE_M",
+        "CLIMB_MODEL_ERROR_M",
+        "MAX_LAUNCH_HEIGHT_LOSS_M",
+        "RUNWAY_MARGIN_M",
+        "CONTACT_HEIGHT_M",
+        "ROUNDING_M",
+    ),
     judge=launch_findings,
 )

@@ -13,12 +13,18 @@ from numpy.typing import NDArray
 
 from flight.mission.itinerary import loiter_of
 from logs.verdict.findings import UNKNOWN_WAY, Finding, Message, badness, make_finding, message, reason_of
-from logs.verdict.measures.circle_reach import beside_end, within_reach
+from logs.verdict.measures.circle_reach import end_loiter_hazards, hazards_within
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, approaches
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.tolerances import BANK_TOLERANCE, PASS, RADIUS_TOLERANCE, SWING, WIDER_SHARE
+from logs.verdict.tolerances import (
+    BANK_TOLERANCE_RAD,
+    LOITER_SWING_RADII,
+    LOITER_WIDENING_FRACTION,
+    RADIUS_TOLERANCE_FRACTION,
+    WAYPOINT_PASS_MARGIN_M,
+)
 from logs.verdict.wording import place_text
 from world.geometry import tangent_length
 
@@ -118,7 +124,7 @@ def end_findings(
 
     aligned: not read.
     """
-    hazards = beside_end(requirements) if geometric else None
+    hazards = end_loiter_hazards(requirements) if geometric else None
     if hazards is None:
         return []
     reach, found = hazards
@@ -159,7 +165,7 @@ def _loiter_finding(
     if own and faults and math.isfinite(tightest):
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
         bank = _bank_held(requirements, circle, tightest, at)
-        if bank <= requirements.limits.max_bank + BANK_TOLERANCE + 1e-9:
+        if bank <= requirements.limits.max_bank + BANK_TOLERANCE_RAD + 1e-9:
             facts.append(f"{name} asks for less than the {tightest:.0f} m of the bank limit: flown wider")
             faults = []
             open_text = "" if aligned is not None else _hazards_text(requirements, circle, tightest)
@@ -175,7 +181,12 @@ def _loiter_finding(
     mean = float(radii.mean()) if radii.size else math.nan
     if radii.size:
         facts.append(f"flown with {radii.min():.1f} to {radii.max():.1f} m")
-        if at_middle and not own and circle.turns >= 1.0 and mean > circle.radius * (1.0 + WIDER_SHARE) + PASS:
+        if (
+            at_middle
+            and not own
+            and circle.turns >= 1.0
+            and mean > circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
+        ):
             faults.append(message(f"flown with {mean:.0f} m where {circle.radius:.0f} m is asked for"))
     ok: bool | None = not (faults or bad)
     if ok and any(item.ok is None for item in at):
@@ -194,7 +205,7 @@ def _loiter_finding(
         flown=mean,
         limit=tightest,
         source="aircraft" if known else "none",
-        tolerance=RADIUS_TOLERANCE,
+        tolerance=RADIUS_TOLERANCE_FRACTION,
         margin=circle.radius - tightest,
         unit="m",
         method="radius over the ground against the bank limit's in this wind; each corner as a turn",
@@ -240,8 +251,8 @@ def _bank_held(requirements: RouteRequirements, circle: Circle, tightest: float,
 def _hazards_text(requirements: RouteRequirements, circle: Circle, tightest: float) -> str:
     """Return the hazards too close to a loiter that is flown wider than drawn, in words; "" for none."""
     heights = requirements.points[circle.first : circle.last + 1, 2]
-    reach = SWING * tightest
-    found = within_reach(requirements, circle.middle, float(heights.min()), float(heights.max()), reach)
+    reach = LOITER_SWING_RADII * tightest
+    found = hazards_within(requirements, circle.middle, float(heights.min()), float(heights.max()), reach)
     if not found:
         return ""
     near = f"within the {reach:.0f} m of its middle that it may get to"
@@ -255,12 +266,12 @@ def _reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: Cir
     """
     away, _ = approaches(aligned.track.position, circle.middle)
     early = requirements.setup.autopilot.turn_distance(math.pi, float(requirements.points[circle.first, 2]))
-    return bool(away.min() <= circle.radius + early + PASS)
+    return bool(away.min() <= circle.radius + early + WAYPOINT_PASS_MARGIN_M)
 
 
 def _too_small(requirements: RouteRequirements, circle: Circle, tightest: float) -> list[Message]:
     """Return a fault if a loiter is smaller than the bank limit's radius (m)."""
-    if circle.radius >= tightest - RADIUS_TOLERANCE:
+    if circle.radius >= tightest - RADIUS_TOLERANCE_FRACTION:
         return []
     speed, bank = float(requirements.route.airspeed[circle.first]), math.degrees(requirements.limits.max_bank)
     needs = f"at {speed:.0f} m/s and {bank:.0f}° bank the aircraft needs {tightest:.0f} m"
@@ -284,7 +295,13 @@ def _corner_text(corner: Place) -> str:
 
 RULE = Rule(
     name="loiter",
-    tolerances=("RADIUS_TOLERANCE", "PASS", "BANK_TOLERANCE", "SWING", "WIDER_SHARE"),
+    tolerances=(
+        "RADIUS_TOLERANCE_FRACTION",
+        "WAYPOINT_PASS_MARGIN_M",
+        "BANK_TOLERANCE_RAD",
+        "LOITER_SWING_RADII",
+        "LOITER_WIDENING_FRACTION",
+    ),
     judge=end_findings,
     merge=fold_loiters,
     log=LogNeeds(aircraft=True),

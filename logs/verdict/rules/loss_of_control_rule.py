@@ -11,7 +11,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import Rule
-from logs.verdict.tolerances import MAX_BANK, SLOWEST, SLOWEST_SHARE
+from logs.verdict.tolerances import MAX_CONTROLLED_BANK_RAD, MIN_CONTROLLED_AIRSPEED_MPS, MIN_CONTROLLED_STALL_RATIO
 from logs.verdict.wording import place_text
 
 Floats = NDArray[np.float64]
@@ -33,8 +33,8 @@ def departure_findings(
         faults.append(
             message(f"{aligned.bad_rows} rows without usable numbers, the first {_time_text(aligned.first_bad)}")
         )
-    if (bank > MAX_BANK).any():
-        k = int(np.argmax(bank > MAX_BANK))
+    if (bank > MAX_CONTROLLED_BANK_RAD).any():
+        k = int(np.argmax(bank > MAX_CONTROLLED_BANK_RAD))
         faults.append(message(f"bank {math.degrees(bank[k]):.0f}° at {track.time[k]:.1f} s"))
     faults += slow
     if (aligned.low <= 0.0).any():
@@ -58,10 +58,10 @@ def departure_findings(
             reason=reason_of(faults) if faults else steady,
             faults=faults,
             flown=math.degrees(most),
-            limit=math.degrees(MAX_BANK),
+            limit=math.degrees(MAX_CONTROLLED_BANK_RAD),
             source="check",
             tolerance=0.0,
-            margin=math.degrees(MAX_BANK - most),
+            margin=math.degrees(MAX_CONTROLLED_BANK_RAD - most),
             unit="deg",
             method="every row",
         )
@@ -95,13 +95,20 @@ def _time_text(time: float) -> str:
 def _slowest(requirements: RouteRequirements, up: Floats) -> Floats:
     """Return the airspeed below which the aircraft is considered out of flight, at each altitude."""
     if requirements.setup.aircraft == "aerosonde":
-        return np.full(up.shape, SLOWEST)
+        return np.full(up.shape, MIN_CONTROLLED_AIRSPEED_MPS)
     envelope = requirements.setup.envelope
-    return np.asarray(SLOWEST_SHARE * np.interp(up, envelope.amsl, envelope.level_speed_min))
+    return np.asarray(MIN_CONTROLLED_STALL_RATIO * np.interp(up, envelope.amsl, envelope.level_speed_min))
 
 
 RULE = Rule(
     name="departure",
-    tolerances=("MAX_BANK", "SLOWEST", "SLOWEST_SHARE", "FARTHEST", "FASTEST", "MAX_PLAUSIBLE"),
+    tolerances=(
+        "MAX_CONTROLLED_BANK_RAD",
+        "MIN_CONTROLLED_AIRSPEED_MPS",
+        "MIN_CONTROLLED_STALL_RATIO",
+        "MAX_PLAUSIBLE_POSITION_M",
+        "MAX_PLAUSIBLE_SPEED_MPS",
+        "MAX_PLAUSIBLE_VALUE",
+    ),
     judge=departure_findings,
 )

@@ -36,13 +36,13 @@ from logs.verdict.measures.mission_ends import missing_ends_text
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
-    PX4_BETWEEN_WAYPOINTS,
-    PX4_FIRST_WAYPOINT,
-    PX4_GATE_APART,
-    PX4_LANDING_BUFFER,
-    PX4_MAX_PWM,
-    PX4_MAX_SERVO,
-    PX4_TAKEOFF_BUFFER,
+    PX4_FIRST_WAYPOINT_DISTANCE_M,
+    PX4_GATE_SPACING_M,
+    PX4_LANDING_BUFFER_RAD,
+    PX4_MAX_PWM_VALUE,
+    PX4_MAX_SERVO_INDEX,
+    PX4_TAKEOFF_BUFFER_M,
+    PX4_WAYPOINT_SPACING_M,
 )
 from world.frames import GeoOrigin, to_map
 
@@ -201,13 +201,13 @@ def _validity(mission: Mission) -> Iterator[_Remark]:
                 item.seq,
                 f"{name} in frame {item.frame}, above terrain, which PX4 does not take; ArduPlane does",
             )
-        elif item.command == C.DO_SET_SERVO and not 0 <= item.params[0] <= PX4_MAX_SERVO:
-            yield REFUSED, item.seq, f"actuator number {item.params[0]:g} is out of bounds 0..{PX4_MAX_SERVO}"
-        elif item.command == C.DO_SET_SERVO and not abs(item.params[1]) <= PX4_MAX_PWM:
+        elif item.command == C.DO_SET_SERVO and not 0 <= item.params[0] <= PX4_MAX_SERVO_INDEX:
+            yield REFUSED, item.seq, f"actuator number {item.params[0]:g} is out of bounds 0..{PX4_MAX_SERVO_INDEX}"
+        elif item.command == C.DO_SET_SERVO and not abs(item.params[1]) <= PX4_MAX_PWM_VALUE:
             yield (
                 REFUSED,
                 item.seq,
-                f"actuator value {item.params[1]:g} is out of bounds -{PX4_MAX_PWM:g}..{PX4_MAX_PWM:g}",
+                f"actuator value {item.params[1]:g} is out of bounds -{PX4_MAX_PWM_VALUE:g}..{PX4_MAX_PWM_VALUE:g}",
             )
     if mission.items and mission.items[0].command == C.NAV_LAND:
         yield REFUSED, mission.items[0].seq, "starts with landing"
@@ -225,8 +225,8 @@ def _takeoff(mission: Mission, limits: MissionChecks) -> Iterator[_Remark]:
     for item in mission.items:
         if item.command in TAKEOFFS:
             height = _height_above_home(mission, item)
-            if height - PX4_TAKEOFF_BUFFER < limits.acceptance:
-                least, radius = limits.acceptance + PX4_TAKEOFF_BUFFER, f"NAV_ACC_RAD {limits.acceptance:g} m"
+            if height - PX4_TAKEOFF_BUFFER_M < limits.acceptance:
+                least, radius = limits.acceptance + PX4_TAKEOFF_BUFFER_M, f"NAV_ACC_RAD {limits.acceptance:g} m"
                 low = message(
                     f"takeoff altitude {height:.1f} m too low: at least {least:g} m", f", {radius} and 1 m more"
                 )
@@ -275,7 +275,7 @@ def _approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) -> Ite
             yield REFUSED, item.seq, "unsupported landing approach entrance: only LOITER_TO_ALT or WAYPOINT"
             continue
         angle = math.atan2(rise, run)
-        if angle > limits.landing_angle + PX4_LANDING_BUFFER:
+        if angle > limits.landing_angle + PX4_LANDING_BUFFER_RAD:
             steep = f"the landing glide slope {math.degrees(angle):.1f}° is steeper than {steepest:.1f}°"
             yield REFUSED, item.seq, steep
 
@@ -303,12 +303,12 @@ def _distance_to_first(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]
         return
     home = MissionItem(0, int(C.NAV_WAYPOINT), 0, (0.0,) * 4, mission.home.lat_deg, mission.home.lon_deg, 0.0)
     away = _distance_between(home, places[0], origin)
-    if not away < PX4_FIRST_WAYPOINT:
+    if not away < PX4_FIRST_WAYPOINT_DISTANCE_M:
         # A warning in the releases whose control law is simulated here.
         yield (
             None,
             places[0].seq,
-            f"first waypoint too far away: {away:.0f} m from home, maximum {PX4_FIRST_WAYPOINT:.0f} m",
+            f"first waypoint too far away: {away:.0f} m from home, maximum {PX4_FIRST_WAYPOINT_DISTANCE_M:.0f} m",
         )
 
 
@@ -321,7 +321,7 @@ def _gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     ]
     for before, after in itertools.pairwise(places):
         gates = C.CONDITION_GATE in (before.command, after.command)
-        if gates and _distance_between(before, after, origin) < PX4_GATE_APART:
+        if gates and _distance_between(before, after, origin) < PX4_GATE_SPACING_M:
             yield REFUSED, after.seq, "distance between waypoint and gate too close"
 
 
@@ -333,9 +333,9 @@ def _distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     east, north = to_map(origin, [item.lat_deg for item in places], [item.lon_deg for item in places])
     runs = np.hypot(np.diff(east), np.diff(north))
     k = int(np.argmax(runs))
-    if runs[k] > PX4_BETWEEN_WAYPOINTS:
+    if runs[k] > PX4_WAYPOINT_SPACING_M:
         reason = f"{runs[k]:.0f} m between waypoints; PX4 releases with MIS_DIST_WPS refuse more than"
-        yield True, places[k + 1].seq, f"{reason} {PX4_BETWEEN_WAYPOINTS:.0f} m by default, today's have no limit"
+        yield True, places[k + 1].seq, f"{reason} {PX4_WAYPOINT_SPACING_M:.0f} m by default, today's have no limit"
 
 
 def _below_home(mission: Mission) -> Iterator[_Remark]:
@@ -364,8 +364,14 @@ def _fence(setup: FlightSetup) -> Iterator[_Remark]:
 RULE = Rule(
     name="mission",
     tolerances=(
-        *("PX4_TAKEOFF_BUFFER", "PX4_LANDING_BUFFER"),
-        *("PX4_FIRST_WAYPOINT", "PX4_BETWEEN_WAYPOINTS", "PX4_GATE_APART", "PX4_MAX_SERVO", "PX4_MAX_PWM"),
+        *("PX4_TAKEOFF_BUFFER_M", "PX4_LANDING_BUFFER_RAD"),
+        *(
+            "PX4_FIRST_WAYPOINT_DISTANCE_M",
+            "PX4_WAYPOINT_SPACING_M",
+            "PX4_GATE_SPACING_M",
+            "PX4_MAX_SERVO_INDEX",
+            "PX4_MAX_PWM_VALUE",
+        ),
     ),
     judge_items=mission_findings,
 )

@@ -16,7 +16,7 @@ from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.items import Command
 from flight.mission.itinerary import UNLIMITED
 from flight.mission.return_path import RETURN_NOT_FLOWN_ON
-from flight.simulation.tick import AT_HEIGHT, NEAR, WIDER
+from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M, RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
 from logs.verdict.findings import UNKNOWN_RETURN, Finding, Message, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -153,8 +153,10 @@ def circled(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
     track = aligned.track
     east, north, up = (track.position - (end.east, end.north, end.up)).T
     # True radii grow with altitude as the square of true airspeed.
-    wide = WIDER * abs(end.radius) * true_by_equivalent(end.up) ** 2
-    at_loiter = (np.hypot(east, north) < max(NEAR, wide)) & (np.abs(up) < AT_HEIGHT)
+    wide = RTL_ARRIVAL_LOITER_RADII * abs(end.radius) * true_by_equivalent(end.up) ** 2
+    at_loiter = (np.hypot(east, north) < max(RTL_ARRIVAL_RADIUS_M, wide)) & (
+        np.abs(up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
+    )
     if not at_loiter.any():
         return False
     first = int(np.argmax(at_loiter))

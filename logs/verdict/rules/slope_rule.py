@@ -11,18 +11,18 @@ from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import ease_slope
 from logs.verdict.tolerances import (
-    CALM,
-    GUST_SHARE,
-    LEVEL,
-    OFF_HEIGHT,
-    OFF_HEIGHT_SHORT,
-    OFF_SLOPE,
-    OFF_SPEED,
-    ON_THE_SPOT,
-    PLAN_TOLERANCE,
-    SATURATED,
-    SHOWN_TOLERANCE,
-    SURE,
+    ABILITY_SIGMAS,
+    ABILITY_TOLERANCE_RAD,
+    CALM_WIND_MPS,
+    GUST_SPEED_FRACTION,
+    HEIGHT_ERROR_LIMIT_M,
+    LEVEL_SLOPE_RAD,
+    MIN_LEG_LENGTH_M,
+    PLAN_TOLERANCE_RAD,
+    SATURATED_TIME_S,
+    SHORT_LEG_HEIGHT_ERROR_LIMIT_M,
+    SLOPE_TOLERANCE_RAD,
+    SPEED_TOLERANCE_MPS,
 )
 from logs.verdict.wording import place_text
 from world.wind import W20
@@ -48,11 +48,11 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
     planned = float(requirements.slopes[leg])
     limit, source = slope_limit(requirements, leg)
     sign = 1.0 if planned >= 0.0 else -1.0
-    if abs(planned) <= LEVEL and not _in_envelope(requirements, leg):
+    if abs(planned) <= LEVEL_SLOPE_RAD and not _in_envelope(requirements, leg):
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
-        limit = max(limit, LEVEL)
+        limit = max(limit, LEVEL_SLOPE_RAD)
     faults, facts = [], [f"slope {math.degrees(planned):+.2f}°"]
-    if abs(planned) > limit + PLAN_TOLERANCE:
+    if abs(planned) > limit + PLAN_TOLERANCE_RAD:
         rise = step(requirements, leg)
         if rise is None:
             faults.append(_too_steep(requirements, leg, limit, source))
@@ -93,7 +93,7 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
         flown=None if fit is None else math.degrees(fit.value),
         limit=math.degrees(sign * limit),
         source=source,
-        tolerance=math.degrees(PLAN_TOLERANCE if fit is None else fit.tolerance),
+        tolerance=math.degrees(PLAN_TOLERANCE_RAD if fit is None else fit.tolerance),
         margin=math.degrees(limit - sign * judged),
         unit="deg",
         method=method,
@@ -115,7 +115,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     )
     limit, sure = float(limits[leg]), float(certain[leg])
     # When judged without the aircraft's limits, there is no limit to be in doubt.
-    if abs(planned) <= max(LEVEL, sure) or not sure < limit < math.inf:
+    if abs(planned) <= max(LEVEL_SLOPE_RAD, sure) or not sure < limit < math.inf:
         return ""
     slope, known, give = (math.degrees(angle) for angle in (abs(planned), limit, off))
     return f"{verb} {slope:.1f}°, and what {envelope.source} says of the limit is {known:.1f}° give or take {give:.1f}°"
@@ -151,7 +151,7 @@ def _too_steep(requirements: RouteRequirements, leg: int, limit: float, source: 
     planned = float(requirements.slopes[leg])
     verb = "climbs" if planned >= 0.0 else "falls"
     asks = f"{math.degrees(abs(planned)):.1f}° for {_distance(float(requirements.runs[leg]))}"
-    if requirements.runs[leg] < ON_THE_SPOT:
+    if requirements.runs[leg] < MIN_LEG_LENGTH_M:
         rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
         asks = f"{round(rise, 1):g} m on the spot, {math.degrees(abs(planned)):.1f}°"
     return message(f"leg {leg} {verb} {asks}", f"; {_limit_text(requirements, leg, limit, source)}", placed=True)
@@ -168,7 +168,7 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
         return f"{at} the aircraft has no steady flight on this course"
     wind = requirements.setup.scenario.wind
     tail, cross = wind.along(float(requirements.courses[leg]), up)
-    if math.hypot(tail, cross) < CALM:
+    if math.hypot(tail, cross) < CALM_WIND_MPS:
         return f"{at} the aircraft can {math.degrees(limit):.1f}° in calm air"
     calm = requirements.setup.envelope.slope_limits(speed, up)[0 if requirements.slopes[leg] >= 0.0 else 1]
     blows = f"{abs(tail):.0f} m/s {'tailwind' if tail > 0.0 else 'headwind'}"
@@ -226,18 +226,18 @@ def _flown_faults(
         flown = math.degrees(fit.value)
         if sign * fit.value > limit + fit.tolerance:
             faults.append(message(f"flown {flown:+.1f}°, beyond {math.degrees(limit):.1f}°"))
-        if fit.fitted and abs(fit.value - planned) > OFF_SLOPE + fit.tolerance:
+        if fit.fitted and abs(fit.value - planned) > SLOPE_TOLERANCE_RAD + fit.tolerance:
             faults.append(message(f"flown at {flown:+.1f}° instead of {math.degrees(planned):+.1f}°"))
     if measure.height_error is not None:
         off = abs(measure.height_error)
-        if off > (OFF_HEIGHT_SHORT if measure.short else OFF_HEIGHT):
+        if off > (SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.short else HEIGHT_ERROR_LIMIT_M):
             side = "above" if measure.height_error > 0.0 else "below"
             faults.append(message(f"{off:.0f} m {side} the leg"))
     covered = not weak and measure.ability is not None and measure.ability.covers(planned)
-    most = OFF_SPEED + GUST_SHARE * W20[requirements.setup.scenario.wind.turbulence]
+    most = SPEED_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
     for name, held, off, way in _throttle_times(measure):
         # If the aircraft showed more ability than the leg needs, the air caused the speed error.
-        if held >= SATURATED and off > most and not (covered and name == _throttle(planned)):
+        if held >= SATURATED_TIME_S and off > most and not (covered and name == _throttle(planned)):
             faults.append(message(f"throttle at {name} for {held:.0f} s and {off:.1f} m/s too {way}"))
     return faults
 
@@ -250,9 +250,9 @@ def _throttle(planned: float) -> str:
 def _performance_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
     """Return a fault if the aircraft showed a smaller limit than the leg needs."""
     ability, planned = measure.ability, float(requirements.slopes[leg])
-    if ability is None or abs(planned) <= LEVEL:
+    if ability is None or abs(planned) <= LEVEL_SLOPE_RAD:
         return []
-    if ability.slope - abs(planned) >= -SHOWN_TOLERANCE - SURE * ability.error:
+    if ability.slope - abs(planned) >= -ABILITY_TOLERANCE_RAD - ABILITY_SIGMAS * ability.error:
         return []
     verb = "climb" if planned >= 0.0 else "sink"
     speed = float(requirements.route.airspeed[leg])
@@ -268,21 +268,51 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
 RULE = Rule(
     name="slope",
     tolerances=(
-        *("PLAN_TOLERANCE", "ON_THE_SPOT", "STEP", "KINK_WAYPOINTS", "OFF_SLOPE", "OFF_HEIGHT", "OFF_HEIGHT_SHORT"),
         *(
-            "LEVEL",
-            "UNDECIDED",
-            "CALM",
-            "OFF_SPEED",
-            "GUST_SHARE",
-            "SHOWN_TOLERANCE",
-            "SURE",
-            "SATURATED",
-            "SPEED_MEMORY",
+            "PLAN_TOLERANCE_RAD",
+            "MIN_LEG_LENGTH_M",
+            "NEGLIGIBLE_STEP_M",
+            "KINK_WAYPOINT_COUNT",
+            "SLOPE_TOLERANCE_RAD",
+            "HEIGHT_ERROR_LIMIT_M",
+            "SHORT_LEG_HEIGHT_ERROR_LIMIT_M",
         ),
-        *("SLOWEST_LIFTED", "THROUGHOUT", "FULL", "IDLE", "NO_CURRENT", "FULL_THROTTLE", "SHOWN_OVER"),
-        *("SETTLED_AFTER", "INDEPENDENT", "KNOWN_TO", "SINGULAR", "UNSURE", "ACCELERATION", "CLEAR_OF_BLEND"),
-        *("SHORTEST_SLOPE", "SHORTEST_TIME", "SLOPE_FLOOR", "MAX_UNSTEADY", "ROUGH_SLOPE"),
+        *(
+            "LEVEL_SLOPE_RAD",
+            "UNDECIDED_FRACTION",
+            "CALM_WIND_MPS",
+            "SPEED_TOLERANCE_MPS",
+            "GUST_SPEED_FRACTION",
+            "ABILITY_TOLERANCE_RAD",
+            "ABILITY_SIGMAS",
+            "SATURATED_TIME_S",
+            "SPEED_MEMORY_S",
+        ),
+        *(
+            "MIN_AIRBORNE_AIRSPEED_MPS",
+            "SATURATED_FRACTION",
+            "FULL_THROTTLE_FRACTION",
+            "IDLE_THROTTLE_FRACTION",
+            "ZERO_CURRENT_A",
+            "SATURATED_THROTTLE_FRACTION",
+            "ABILITY_WINDOW_S",
+        ),
+        *(
+            "ABILITY_SETTLING_S",
+            "ABILITY_SAMPLE_INTERVAL_S",
+            "CLIMB_RATE_RESOLUTION_MPS",
+            "MAX_CONDITION_NUMBER",
+            "MAX_ABILITY_STD_ERROR_RAD",
+            "MAX_STEADY_ACCELERATION_MPS2",
+            "BLEND_EXCLUSION_M",
+        ),
+        *(
+            "MIN_SLOPE_STRETCH_M",
+            "MIN_STRETCH_TIME_S",
+            "SLOPE_ERROR_FLOOR_RAD",
+            "MAX_UNSTEADINESS_RAD",
+            "ROUGH_SLOPE_ERROR_RAD",
+        ),
     ),
     judge=slope_findings,
     suggest=ease_slope,

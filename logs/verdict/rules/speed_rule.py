@@ -14,19 +14,19 @@ from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import fly_level_speed
 from logs.verdict.tolerances import (
-    ACCELERATION,
-    GUST_SHARE,
+    GUST_DURATION_S,
     GUST_SIGMAS,
-    GUST_TIME,
-    HELD_SPEED_SHARE,
-    LEAST_GROUND_SPEED,
-    LEVEL,
-    MEASURED_SHARE,
-    OFF_MEAN,
-    PLAN_TOLERANCE,
-    SATURATED,
-    SLOWEST,
-    TAKE_UP,
+    GUST_SPEED_FRACTION,
+    HELD_SPEED_FRACTION,
+    LEVEL_SLOPE_RAD,
+    MAX_STEADY_ACCELERATION_MPS2,
+    MEAN_SPEED_TOLERANCE_MPS,
+    MEASURED_FRACTION,
+    MIN_CONTROLLED_AIRSPEED_MPS,
+    MIN_GROUND_SPEED_MPS,
+    PLAN_TOLERANCE_RAD,
+    SATURATED_TIME_S,
+    SLOPE_CHANGE_LAG_M,
 )
 from world.wind import W20
 
@@ -74,7 +74,9 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
             mean, tolerance, least = measured
             off = abs(mean - commanded)
             notes.append(f"flown {mean:.2f} m/s on average, {least:.1f} m/s at the slowest second")
-            if off > OFF_MEAN + tolerance and not _caused_by_air(requirements, aligned, leg, mean - commanded):
+            if off > MEAN_SPEED_TOLERANCE_MPS + tolerance and not _caused_by_air(
+                requirements, aligned, leg, mean - commanded
+            ):
                 text = f"flown {mean:.1f} m/s on average, {off:.1f} m/s off the commanded {commanded:.1f} m/s"
                 notes += [text] if requirements.envelope else []
                 faults += [] if requirements.envelope else [message(text)]
@@ -138,19 +140,19 @@ def _find_held_speed(
     the leg is too steep for the aircraft, the slope rule names the cause.  For an imported flight it is a fact only:
     its airspeed sensor may have the same error.
     """
-    if abs(float(requirements.slopes[leg])) > slope_limit(requirements, leg)[0] + PLAN_TOLERANCE:
+    if abs(float(requirements.slopes[leg])) > slope_limit(requirements, leg)[0] + PLAN_TOLERANCE_RAD:
         return None
     rows = steady_rows(requirements, aligned, leg)
     time = aligned.track.time[rows]
-    if requirements.setup.source is not None or time.size < 2 or 0.5 * float(time[-1] - time[0]) < SATURATED:
+    if requirements.setup.source is not None or time.size < 2 or 0.5 * float(time[-1] - time[0]) < SATURATED_TIME_S:
         return None
     half = rows.start + int(np.searchsorted(time, 0.5 * float(time[0] + time[-1])))
     speed = float(aligned.track.airspeed[half : rows.stop].astype(np.float64).mean())
-    off, allowed = speed - commanded, max(OFF_MEAN, HELD_SPEED_SHARE * commanded)
+    off, allowed = speed - commanded, max(MEAN_SPEED_TOLERANCE_MPS, HELD_SPEED_FRACTION * commanded)
     tolerance = _gust_spread(requirements, float(aligned.track.time[rows.stop - 1] - aligned.track.time[half]))
     if abs(off) <= allowed + tolerance or _caused_by_air(requirements, aligned, leg, off):
         return None
-    if off > 0.0 and float(requirements.ground_speed[leg]) < LEAST_GROUND_SPEED:
+    if off > 0.0 and float(requirements.ground_speed[leg]) < MIN_GROUND_SPEED_MPS:
         return None
     return _HeldSpeed(speed, allowed, tolerance)
 
@@ -180,17 +182,17 @@ def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[
 
 
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
-    """Return a note if a leg is too short to take up its speed at `ACCELERATION` from the leg before."""
+    """Return a note if a leg is too short to take up its speed at `MAX_STEADY_ACCELERATION_MPS2` from the leg before."""
     before = float(requirements.route.airspeed[leg - 1]) if leg else commanded
     change, run = commanded - before, float(requirements.runs[leg])
-    seconds = abs(change) / ACCELERATION
+    seconds = abs(change) / MAX_STEADY_ACCELERATION_MPS2
     # Distance at the mean of both speeds over ground, in the wind along the leg.
     start = float(requirements.ground_speed[leg]) - change
     needs = seconds * (start + 0.5 * change)
     if not needs > run or not start > 0.0:
         return []
     # start t + a t^2 / 2 = run
-    rate = math.copysign(ACCELERATION, change)
+    rate = math.copysign(MAX_STEADY_ACCELERATION_MPS2, change)
     end = math.sqrt(max(0.0, start * start + 2.0 * rate * run)) - start + before
     return [
         f"from {before:.1f} to {commanded:.1f} m/s takes about {seconds:.0f} s and {needs:.0f} m, and the leg has"
@@ -250,27 +252,45 @@ def _measure_leg(requirements: RouteRequirements, aligned: AlignedTrack, leg: in
     """
     rows = steady_rows(requirements, aligned, leg)
     time = aligned.track.time[rows]
-    if time.size < 2 or time[-1] - time[0] < min(SATURATED, MEASURED_SHARE * float(requirements.runs[leg]) / SLOWEST):
+    if time.size < 2 or time[-1] - time[0] < min(
+        SATURATED_TIME_S, MEASURED_FRACTION * float(requirements.runs[leg]) / MIN_CONTROLLED_AIRSPEED_MPS
+    ):
         return None
     speed = aligned.track.airspeed[rows].astype(np.float64)
     lasts = float(time[-1] - time[0])
     least = float(_second_means(aligned, rows).min())
     spread = _gust_spread(requirements, lasts)
-    steepened = leg > 0 and abs(float(requirements.slopes[leg] - requirements.slopes[leg - 1])) > LEVEL
-    return float(speed.mean()), spread + (TAKE_UP / lasts if steepened else 0.0), least
+    steepened = leg > 0 and abs(float(requirements.slopes[leg] - requirements.slopes[leg - 1])) > LEVEL_SLOPE_RAD
+    return float(speed.mean()), spread + (SLOPE_CHANGE_LAG_M / lasts if steepened else 0.0), least
 
 
 def _gust_spread(requirements: RouteRequirements, seconds: float) -> float:
     """Return how far gusts may carry the mean airspeed over some seconds, m/s."""
-    gust = GUST_SHARE * W20[requirements.setup.scenario.wind.turbulence]
-    return GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_TIME / max(seconds, 1e-3)))
+    gust = GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
+    return GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_DURATION_S / max(seconds, 1e-3)))
 
 
 RULE = Rule(
     name="speed",
     tolerances=(
-        *("ACCELERATION", "GUST_SHARE", "GUST_SIGMAS", "GUST_TIME", "HELD_SPEED_SHARE", "LEAST_GROUND_SPEED", "LEVEL"),
-        *("MEASURED_SHARE", "OFF_MEAN", "PLAN_TOLERANCE", "SATURATED", "SLOWEST", "TAKE_UP", "UNDECIDED"),
+        *(
+            "MAX_STEADY_ACCELERATION_MPS2",
+            "GUST_SPEED_FRACTION",
+            "GUST_SIGMAS",
+            "GUST_DURATION_S",
+            "HELD_SPEED_FRACTION",
+            "MIN_GROUND_SPEED_MPS",
+            "LEVEL_SLOPE_RAD",
+        ),
+        *(
+            "MEASURED_FRACTION",
+            "MEAN_SPEED_TOLERANCE_MPS",
+            "PLAN_TOLERANCE_RAD",
+            "SATURATED_TIME_S",
+            "MIN_CONTROLLED_AIRSPEED_MPS",
+            "SLOPE_CHANGE_LAG_M",
+            "UNDECIDED_FRACTION",
+        ),
     ),
     judge=speed_findings,
     suggest=fly_level_speed,

@@ -21,7 +21,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import fly_faster
-from logs.verdict.tolerances import GUST_SHARE, STALL_MEAN, STALL_TOLERANCE
+from logs.verdict.tolerances import GUST_SPEED_FRACTION, STALL_AVERAGING_TIME_S, STALL_TOLERANCE_MPS
 from world.wind import W20
 
 Floats = NDArray[np.float64]
@@ -104,7 +104,7 @@ def level_stall(requirements: RouteRequirements, up: float) -> float:
 
 def _flown(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Finding]:
     track = aligned.track
-    width = max(1, min(len(track), round(STALL_MEAN / aligned.tick)))
+    width = max(1, min(len(track), round(STALL_AVERAGING_TIME_S / aligned.tick)))
     speed, load = _means(track.airspeed, width), _means(track.load_factor, width)
     bank = _means(np.abs(track.attitude[:, ROLL]), width)
     up = _means(track.position[:, 2], width)
@@ -118,7 +118,7 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Findi
     if not np.isfinite(margin).any():
         return []
     k = int(np.nanargmin(margin))
-    tolerance = STALL_TOLERANCE + GUST_SHARE * W20[requirements.setup.scenario.wind.turbulence]
+    tolerance = STALL_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
     found = _Margin(float(speed[k]), float(stall[k]), float(level[k]), float(bank[k]))
     return [_finding(found, f"at {track.time[k + width // 2]:.1f} s", tolerance, geometric=False)]
 
@@ -151,7 +151,7 @@ def _finding(found: _Margin, where: str, tolerance: float, *, geometric: bool) -
 
 RULE = Rule(
     name="stall",
-    tolerances=("STALL_MEAN", "STALL_TOLERANCE", "GUST_SHARE"),
+    tolerances=("STALL_AVERAGING_TIME_S", "STALL_TOLERANCE_MPS", "GUST_SPEED_FRACTION"),
     judge=stall_findings,
     whole=True,
     suggest=fly_faster,

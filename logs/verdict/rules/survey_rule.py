@@ -10,13 +10,19 @@ import numpy as np
 
 from flight.mission.surveys import PhotoLine, Survey
 from logs.verdict.findings import UNKNOWN_WAY, Fact, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.circle_reach import within_reach
+from logs.verdict.measures.circle_reach import hazards_within
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measure_line, measure_overlap
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.tolerances import PHOTO_BANK, PHOTO_OVERLAP, PHOTO_SHARE, PLAN_TOLERANCE, TURN_AROUND_RADII
+from logs.verdict.tolerances import (
+    MAX_PHOTO_BANK_RAD,
+    PHOTO_COVERAGE_FRACTION,
+    PHOTO_OVERLAP_FRACTION,
+    PLAN_TOLERANCE_RAD,
+    TURN_AROUND_RADII,
+)
 
 # Checks of the photos' overlap.
 FRONT, SIDE = "front overlap", "side overlap"
@@ -56,7 +62,7 @@ def _overlaps(requirements: RouteRequirements, aligned: AlignedTrack | None, sur
     for check, share, specified, line in sides:
         if share is None or specified is None:
             continue
-        limit = specified - PHOTO_OVERLAP
+        limit = specified - PHOTO_OVERLAP_FRACTION
         ok = share >= limit
         text = overlap_text(measure, check)
         faults = [] if ok else [message(text)]
@@ -111,7 +117,7 @@ def _turn_arounds(requirements: RouteRequirements, survey: Survey) -> list[Findi
         radius = float(radii[np.isfinite(radii)].max(initial=0.0))
         reach = float(np.hypot(*(points[:, :2] - middle).T).max()) + TURN_AROUND_RADII * radius
         low, high = float(points[:, 2].min()), float(points[:, 2].max())
-        if found := within_reach(requirements, middle, low, high, reach):
+        if found := hazards_within(requirements, middle, low, high, reach):
             ends = {0: "the turn onto the first line", len(ways) - 1: "the turn off the last line"}
             reason = (
                 f"{ends.get(number, f'turn-around {number}')} is too tight to be flown as drawn, and within"
@@ -125,7 +131,7 @@ def _turn_arounds(requirements: RouteRequirements, survey: Survey) -> list[Findi
 def _too_tight(requirements: RouteRequirements, i: int) -> bool:
     """Return True if a corner has no room for its turn."""
     turn = abs(float(requirements.turns[i]))
-    return 0 < i < requirements.legs and turn > turn_limit(requirements, i)[0] + PLAN_TOLERANCE
+    return 0 < i < requirements.legs and turn > turn_limit(requirements, i)[0] + PLAN_TOLERANCE_RAD
 
 
 def _line_text(requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int) -> str:
@@ -146,7 +152,7 @@ def _planned(requirements: RouteRequirements, survey: Survey, line: PhotoLine, n
     cut_in = _clipped(float(requirements.after[line.begins]) - lead_in, length)
     cut_out = _clipped(_turn_lead(requirements, line) - lead_out, length)
     share = max(0.0, length - cut_in - cut_out) / length
-    ok = share >= PHOTO_SHARE
+    ok = share >= PHOTO_COVERAGE_FRACTION
     name = _line_text(requirements, survey, line, number)
     faults, facts = [], [f"{name}: its turns leave {100.0 * share:.0f} % of its {length:.0f} m straight"]
     if not ok:
@@ -180,7 +186,7 @@ def _flown(
     measure = None if aligned is None else measure_line(requirements, aligned, survey, line)
     if measure is None:
         return _finding(requirements, line, None, [], [f"{name}: not flown"], math.nan, geometric=False)
-    ok = measure.good >= PHOTO_SHARE
+    ok = measure.good >= PHOTO_COVERAGE_FRACTION
     faults = [] if ok else [_fault(measure, name)]
     facts = [] if not ok else [f"{name}: {100.0 * measure.good:.0f} % of its {measure.length:.0f} m can be used"]
     if measure.missed:
@@ -192,7 +198,7 @@ def lost_text(measure: LineMeasure) -> str:
     """Describe the defects of the lost parts of a line, the largest first; "" if next to nothing is lost."""
     lacks = {
         f"not along it within {measure.allowed_aside:.0f} m": measure.away,
-        f"banked beyond {math.degrees(PHOTO_BANK):.0f}°": measure.banked,
+        f"banked beyond {math.degrees(MAX_PHOTO_BANK_RAD):.0f}°": measure.banked,
         f"more than {measure.allowed_off:.0f} m off its height over ground": measure.high,
         "with the camera off": measure.dark,
     }
@@ -237,9 +243,9 @@ def _finding(
         faults=faults,
         planned=100.0 * share if geometric else 100.0,
         flown=None if geometric else 100.0 * share,
-        limit=100.0 * PHOTO_SHARE,
+        limit=100.0 * PHOTO_COVERAGE_FRACTION,
         source="default",
-        margin=100.0 * (share - PHOTO_SHARE),
+        margin=100.0 * (share - PHOTO_COVERAGE_FRACTION),
         unit="%",
         method="the turns' arcs" if geometric else "on the line, level, at its height, camera on",
         facts=numbers,
@@ -249,8 +255,15 @@ def _finding(
 RULE = Rule(
     name="survey",
     tolerances=(
-        *("PHOTO_SHARE", "PHOTO_ASIDE", "PHOTO_BANK", "PHOTO_HEIGHT", "MIN_PHOTO_HEIGHT", "PHOTO_COURSE"),
-        *("PHOTO_STEP", "PHOTO_OVERLAP", "TURN_AROUND_RADII"),
+        *(
+            "PHOTO_COVERAGE_FRACTION",
+            "PHOTO_OFFSET_FRACTION",
+            "MAX_PHOTO_BANK_RAD",
+            "PHOTO_HEIGHT_FRACTION",
+            "MIN_PHOTO_HEIGHT_ERROR_M",
+            "MAX_PHOTO_COURSE_ERROR_RAD",
+        ),
+        *("PHOTO_STEP_M", "PHOTO_OVERLAP_FRACTION", "TURN_AROUND_RADII"),
     ),
     judge=survey_findings,
     log=LogNeeds(("attitude",), planned_heights=True, full_leg=True),

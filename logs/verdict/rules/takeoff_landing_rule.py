@@ -15,7 +15,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
-from logs.verdict.tolerances import PLAN_TOLERANCE
+from logs.verdict.tolerances import PLAN_TOLERANCE_RAD
 from logs.verdict.wording import gentle_launch_text, place_text
 from world.airfield import Launch
 
@@ -127,7 +127,7 @@ def _slope(requirements: RouteRequirements, rule: str, first: int, last: int, lo
     limit, source = _limit(requirements, first, low, high, slope)
     verb = "climbs" if slope >= 0.0 else "sinks"
     text = f"{verb} {abs(high - low):.0f} m in {run:.0f} m, {math.degrees(abs(slope)):.1f}°"
-    within = abs(slope) <= limit + PLAN_TOLERANCE
+    within = abs(slope) <= limit + PLAN_TOLERANCE_RAD
     ways = requirements.setup.ground_ways
     flown = (ways.take_off if rule == "takeoff" else ways.approach) is not None
     reason = f"{text} of {math.degrees(limit):.1f}°"
@@ -146,7 +146,7 @@ def _slope(requirements: RouteRequirements, rule: str, first: int, last: int, lo
         planned=math.degrees(abs(slope)),
         limit=math.degrees(limit),
         source=source,
-        tolerance=math.degrees(PLAN_TOLERANCE),
+        tolerance=math.degrees(PLAN_TOLERANCE_RAD),
         margin=math.degrees(limit - abs(slope)),
         unit="deg",
         method="mission items",
@@ -173,11 +173,11 @@ def _limit(requirements: RouteRequirements, leg: int, low: float, high: float, s
 
 TAKEOFF = Rule(
     name="takeoff",
-    tolerances=("PLAN_TOLERANCE",),
+    tolerances=("PLAN_TOLERANCE_RAD",),
     judge=takeoff_findings,
 )
 LANDING = Rule(
     name="landing",
-    tolerances=("PLAN_TOLERANCE",),
+    tolerances=("PLAN_TOLERANCE_RAD",),
     judge=landing_findings,
 )

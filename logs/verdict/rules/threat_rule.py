@@ -170,7 +170,7 @@ def _sphere_finding(place: Place, plan: _Visit, track: _Visit | None, radius: fl
 
 RULE = Rule(
     name="threat",
-    tolerances=("NAVIGATION_SIGMAS", "FAR", "TOUCH"),
+    tolerances=("NAVIGATION_SIGMAS", "SPHERE_FAR_DIAGONALS", "SPHERE_STAY_TOLERANCE_S"),
     judge=threat_findings,
     suggest=pass_threat,
     log=LogNeeds(("heights",)),

@@ -19,18 +19,18 @@ from logs.verdict.findings import GROUND_WAY, Fact, Finding, Message, make_findi
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.ways import entered_by_way, track_way
+from logs.verdict.measures.ways import first_obstacle_on, track_way
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
-    ABOVE_FLARE,
-    EARLY_TOUCH,
-    FINAL_ROOM,
-    GUST_TOUCH_ERROR,
-    POINT_ERROR,
-    TOUCH_ERROR,
-    TOUCH_SINK,
-    TOUCHED,
+    CONTACT_HEIGHT_M,
+    EARLY_TOUCHDOWN_DISTANCE_M,
+    FINAL_APPROACH_CLEARANCE_M,
+    FLARE_HEIGHT_MARGIN_M,
+    GUST_TOUCHDOWN_ERROR_M,
+    LANDING_POINT_ERROR_M,
+    MAX_TOUCHDOWN_SINK_MPS,
+    TOUCHDOWN_ERROR_M,
 )
 from logs.verdict.wording import place_text
 from world.terrain import Terrain
@@ -89,7 +89,7 @@ def touchdown_findings(
         return [make_finding("touchdown", place, ok=False, reason=fault.text, faults=[fault], unit="m")]
     landing = _measure_landing(requirements, track, terrain, approach, k)._replace(over=over)
     faults = _detect_faults(approach, landing)
-    if entered := entered_by_way(requirements, track_way(track)):
+    if entered := first_obstacle_on(requirements, track_way(track)):
         faults.append(message(f"the final enters {entered}"))
     gusts = requirements.setup.scenario.wind.turbulence != "none"
     return [_finding(place, approach, landing, faults, gusts=gusts)]
@@ -131,7 +131,7 @@ def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[M
     if not faults and not open_ and math.isnan(landing.room):
         open_ = [message("the ground below the final is not known")]
     messages = faults or open_
-    inside = 0.5 * approach.strip.length - TOUCH_ERROR
+    inside = 0.5 * approach.strip.length - TOUCHDOWN_ERROR_M
     farthest = max(landing.stop[0], abs(landing.touch[0]))
     return make_finding(
         "touchdown",
@@ -177,7 +177,7 @@ def _touchdown_row(track: Track, terrain: Terrain) -> int | None:
     # The aircraft has landed only if it has stopped.
     if not speed[-1] < 1.0:
         return None
-    low = over <= over[-1] + TOUCHED
+    low = over <= over[-1] + CONTACT_HEIGHT_M
     return int(np.argmax(low)) if low.any() else None
 
 
@@ -196,8 +196,8 @@ def _final_clearance(requirements: RouteRequirements, position: Floats, terrain:
     """Return the least height above ground until flare or touch-down, m, as in `_Landing.room`."""
     up = float(approach.point[2])
     glide = requirements.setup.autopilot.landing_glide(approach.begin - up, approach.run, approach.tail_wind, up)
-    flares = glide.flare_distance + max(0.0, ABOVE_FLARE - glide.flare_height) / glide.slope
-    near = approach.place(position)[0] > -max(EARLY_TOUCH, flares)
+    flares = glide.flare_distance + max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
+    near = approach.place(position)[0] > -max(EARLY_TOUCHDOWN_DISTANCE_M, flares)
     until = int(np.argmax(near)) if near.any() else len(position)
     if until < 2:
         return math.inf
@@ -209,21 +209,21 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
     """Return faults: parts of the landing off the strip, or a point off the ground."""
     half, side = 0.5 * approach.strip.length, 0.5 * approach.strip.width
     # On a strip shorter than the error, only a distance beyond the strip by more than the error is known.
-    inside = half - TOUCH_ERROR if half > TOUCH_ERROR else half + TOUCH_ERROR
+    inside = half - TOUCHDOWN_ERROR_M if half > TOUCHDOWN_ERROR_M else half + TOUCHDOWN_ERROR_M
     touch, stop = landing.touch, landing.stop
     faults = []
-    if -landing.over > POINT_ERROR:
+    if -landing.over > LANDING_POINT_ERROR_M:
         brief = f"the landing point of {_place_of(approach)} is {-landing.over:.0f} m below the ground"
         faults.append(message(brief, ": the aircraft meets it before it flares"))
     if abs(touch[0]) > inside:
         where = "before" if touch[0] < 0.0 else "beyond"
         brief = f"touches down {abs(touch[0]):.0f} m {where} the strip's middle"
-        faults.append(message(brief, f"; {max(0.0, half - TOUCH_ERROR):.0f} m are allowed on this strip"))
+        faults.append(message(brief, f"; {max(0.0, half - TOUCHDOWN_ERROR_M):.0f} m are allowed on this strip"))
     if stop[0] > inside:
         brief = f"comes to rest {half - stop[0]:.0f} m before the strip's end"
         if stop[0] > half:
             brief = f"runs {stop[0] - half:.0f} m beyond the strip's end"
-        faults.append(message(brief, f"; {TOUCH_ERROR:.0f} m are to be left"))
+        faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m are to be left"))
     aside = max(abs(touch[1]), abs(stop[1]))
     if aside > side:
         faults.append(message(f"{aside:.0f} m beside the strip's middle", f"; it is {2.0 * side:.0f} m wide"))
@@ -232,28 +232,28 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
 
 def _too_short(approach: Approach) -> list[Message]:
     """Return a message if a strip is shorter than the error of the simulated law requires."""
-    if approach.strip.length > 2.0 * TOUCH_ERROR:
+    if approach.strip.length > 2.0 * TOUCHDOWN_ERROR_M:
         return []
     brief = f"the strip is {approach.strip.length:.0f} m long"
-    return [message(brief, f"; a touch-down is known within {TOUCH_ERROR:.0f} m either way, which takes more")]
+    return [message(brief, f"; a touch-down is known within {TOUCHDOWN_ERROR_M:.0f} m either way, which takes more")]
 
 
 def _undecided_messages(approach: Approach, landing: _Landing, *, gusts: bool) -> list[Message]:
     """Return the undecided parts of a landing, due to the limited accuracy of the simulated law."""
     found = _too_short(approach)
     left = 0.5 * approach.strip.length - max(landing.touch[0], landing.stop[0])
-    if gusts and left < GUST_TOUCH_ERROR and not found:
+    if gusts and left < GUST_TOUCHDOWN_ERROR_M and not found:
         brief = f"comes down or to rest {left:.0f} m before the strip's end"
-        found.append(message(brief, f"; in turbulence that is known within {GUST_TOUCH_ERROR:.0f} m"))
-    if landing.over > POINT_ERROR:
+        found.append(message(brief, f"; in turbulence that is known within {GUST_TOUCHDOWN_ERROR_M:.0f} m"))
+    if landing.over > LANDING_POINT_ERROR_M:
         brief = f"the landing point of {_place_of(approach)} is {landing.over:.0f} m above the ground"
         found.append(message(brief, ": it flares too early, and falls"))
-    if landing.room < FINAL_ROOM:
+    if landing.room < FINAL_APPROACH_CLEARANCE_M:
         brief = f"the final passes the ground by {landing.room:.1f} m"
-        found.append(message(brief, f", and may be flown {FINAL_ROOM:.0f} m lower than by the law"))
-    if landing.towards > TOUCH_SINK:
+        found.append(message(brief, f", and may be flown {FINAL_APPROACH_CLEARANCE_M:.0f} m lower than by the law"))
+    if landing.towards > MAX_TOUCHDOWN_SINK_MPS:
         brief = f"sinks at {landing.towards:.1f} m/s towards the ground at its touch-down"
-        found.append(message(brief, f"; up to {TOUCH_SINK:g} m/s are known of ArduPlane's landings"))
+        found.append(message(brief, f"; up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s are known of ArduPlane's landings"))
     return found
 
 
@@ -274,15 +274,15 @@ def _description(approach: Approach, landing: _Landing) -> list[str]:
 RULE = Rule(
     name="touchdown",
     tolerances=(
-        "GUST_TOUCH_ERROR",
-        "TOUCH_ERROR",
-        "TOUCHED",
-        "TOUCH_SINK",
-        "EARLY_TOUCH",
-        "FINAL_ROOM",
-        "ABOVE_FLARE",
-        "POINT_ERROR",
-        "ROUNDING",
+        "GUST_TOUCHDOWN_ERROR_M",
+        "TOUCHDOWN_ERROR_M",
+        "CONTACT_HEIGHT_M",
+        "MAX_TOUCHDOWN_SINK_MPS",
+        "EARLY_TOUCHDOWN_DISTANCE_M",
+        "FINAL_APPROACH_CLEARANCE_M",
+        "FLARE_HEIGHT_MARGIN_M",
+        "LANDING_POINT_ERROR_M",
+        "ROUNDING_M",
     ),
     judge=touchdown_findings,
 )

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from flight.guidance.navigation_error import ERRORS
-from flight.mission.route import SHARPEST_FLY_BY
+from flight.mission.route import SHARPEST_FLY_BY_RAD
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import negligible_kink, reach
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
@@ -14,17 +14,17 @@ from logs.verdict.measures.turns import TurnMeasure, measure_turns
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import ease_turn
 from logs.verdict.tolerances import (
-    BANK_TOLERANCE,
-    CLOSER,
-    CLOSER_SHARE,
-    GUST_OFFSET,
-    LARGEST_OFFSET,
+    BANK_TOLERANCE_RAD,
+    CORNER_CUT_FRACTION,
+    CORNER_CUT_TOLERANCE_M,
+    GUST_OFFSET_M,
+    MAX_FLY_BY_OFFSET_RADII,
+    MIN_LEG_LENGTH_M,
     NAVIGATION_SIGMAS,
-    ON_THE_SPOT,
-    OVERSHOOT,
-    PLAN_TOLERANCE,
-    SETTLED,
-    STRAIGHT,
+    OVERSHOOT_TOLERANCE_M,
+    PLAN_TOLERANCE_RAD,
+    SETTLED_CROSS_TRACK_M,
+    STRAIGHT_RADIUS_RATIO,
 )
 from logs.verdict.wording import place_text_within
 from world.geometry import fly_by_offset
@@ -51,23 +51,23 @@ def _judge(
     limit, source = turn_limit(requirements, i)
     # Neighbours that need more than the legs have are at fault themselves: going straight on takes no room.
     limit = max(limit, 0.0)
-    if requirements.runs[i - 1 : i + 1].min() < ON_THE_SPOT:
+    if requirements.runs[i - 1 : i + 1].min() < MIN_LEG_LENGTH_M:
         reason = "a leg beside it goes straight up or down, which has no course to turn from or to"
         return make_finding("turn", requirements.waypoint(i), ok=None, reason=reason, unit="deg")
     faults, facts = (
         [],
         [f"turns {math.degrees(planned):.1f}°" + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")],
     )
-    if planned > limit + PLAN_TOLERANCE:
+    if planned > limit + PLAN_TOLERANCE_RAD:
         lateral = negligible_kink(requirements, i)
         if lateral is None:
             faults.append(_too_sharp(requirements, i, planned, limit, source))
         else:
             facts.append(f"a negligible kink: the way without it passes it at {lateral:.1f} m and can be flown")
     facts += _flown_over(requirements, i, planned)
-    method, angle, tolerance = "route", None, PLAN_TOLERANCE
+    method, angle, tolerance = "route", None, PLAN_TOLERANCE_RAD
     if measure is not None:
-        angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE
+        angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE_RAD
         facts += _flown_facts(requirements, i, measure)
         shown = _flown_faults(requirements, i, measure, limit)
         # If the aircraft's limits apply, they judge; what the flight showed of them is only reported.
@@ -147,7 +147,7 @@ def _too_sharp(requirements: RouteRequirements, i: int, planned: float, limit: f
             " these courses in this wind",
         )
     takes = "no length of leg is enough"
-    if requirements.after[i] < LARGEST_OFFSET * radius:
+    if requirements.after[i] < MAX_FLY_BY_OFFSET_RADII * radius:
         takes = f"that takes {requirements.after[i]:.0f} m of each leg"
         if requirements.setup.route.fly_over[i]:
             takes = f"flying over it takes {requirements.after[i]:.0f} m of the next leg"
@@ -166,7 +166,7 @@ def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) 
         facts.append(f"flown {math.degrees(measure.angle):.2f}°")
     if measure.peak_bank is not None and measure.held_bank is not None:
         facts.append(f"bank up to {math.degrees(measure.peak_bank):.1f}°")
-    if measure.radius is not None and measure.radius < STRAIGHT * requirements.radius[i]:
+    if measure.radius is not None and measure.radius < STRAIGHT_RADIUS_RATIO * requirements.radius[i]:
         facts.append(f"radius {measure.radius:.0f} m")
     if measure.corner is not None:
         facts.append(f"nearest pass {measure.corner.nearest:.1f} m, at {measure.corner.time:.1f} s")
@@ -200,16 +200,18 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
         flown, most = math.degrees(measure.angle), math.degrees(limit)
         faults.append(message(f"flown course change {flown:.1f}° beyond {most:.1f}°"))
-    max_bank = requirements.limits.max_bank + BANK_TOLERANCE
+    max_bank = requirements.limits.max_bank + BANK_TOLERANCE_RAD
     # Roll in a gust, or into a turn, is not the bank of the turn: the mean over a second applies.
     if measure.held_bank is not None and measure.held_bank > max_bank:
         held, most = math.degrees(measure.held_bank), math.degrees(max_bank)
         faults.append(message(f"bank {held:.1f}° beyond {most:.1f}°"))
     faults += _too_tight(requirements, i, measure)
-    if measure.overshoot is not None and measure.overshoot > OVERSHOOT:
+    if measure.overshoot is not None and measure.overshoot > OVERSHOOT_TOLERANCE_M:
         past = "its arc" if measure.corner is None else "its next leg"
-        faults.append(message(f"overshoots {past} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT:.0f} m)"))
-    most = SETTLED + GUST_OFFSET[requirements.setup.scenario.wind.turbulence]
+        faults.append(
+            message(f"overshoots {past} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)")
+        )
+    most = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[requirements.setup.scenario.wind.turbulence]
     if measure.settled is not None and measure.over and measure.settled > most:
         off = f"still {measure.settled:.1f} m off the next leg at its end"
         faults.append(message(off, f" (at most {most:.1f} m)"))
@@ -227,12 +229,12 @@ def _too_tight(requirements: RouteRequirements, i: int, measure: TurnMeasure) ->
     turn, setup = abs(float(requirements.turns[i])), requirements.setup
     tightest = float(requirements.tightest[i])
     # Guidance's own limit: a sharper corner has no arc to follow if its legs are short.
-    least = fly_by_offset(turn, tightest) if turn < SHARPEST_FLY_BY else math.inf
+    least = fly_by_offset(turn, tightest) if turn < SHARPEST_FLY_BY_RAD else math.inf
     # An autopilot that does not follow the arc may pass the waypoint at any distance.
     followed = setup.autopilot.keeps_to_arcs and setup.source is None and not setup.route.fly_over[i]
     if measure.passed is None or not math.isfinite(least) or not followed:
         return []
-    tolerance = CLOSER_SHARE * least + CLOSER[setup.scenario.wind.turbulence]
+    tolerance = CORNER_CUT_FRACTION * least + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
     tolerance += NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
     if measure.passed >= least - tolerance:
         return []
@@ -249,9 +251,32 @@ def _too_tight(requirements: RouteRequirements, i: int, measure: TurnMeasure) ->
 RULE = Rule(
     name="turn",
     tolerances=(
-        *("PLAN_TOLERANCE", "ON_THE_SPOT", "U_TURN", "LARGEST_OFFSET", "BANK_TOLERANCE", "OVERSHOOT", "SETTLED"),
-        *("GUST_OFFSET", "CLOSER_SHARE", "CLOSER", "NAVIGATION_SIGMAS", "WATCHED", "STRAIGHT", "KINK_SHARE"),
-        *("KINK_WAYPOINTS", "CLEAR_OF_TURN", "SHORTEST_COURSE", "COURSE_FLOOR", "MAX_UNSTEADY", "ROUGH_COURSE"),
+        *(
+            "PLAN_TOLERANCE_RAD",
+            "MIN_LEG_LENGTH_M",
+            "U_TURN_RAD",
+            "MAX_FLY_BY_OFFSET_RADII",
+            "BANK_TOLERANCE_RAD",
+            "OVERSHOOT_TOLERANCE_M",
+            "SETTLED_CROSS_TRACK_M",
+        ),
+        *(
+            "GUST_OFFSET_M",
+            "CORNER_CUT_FRACTION",
+            "CORNER_CUT_TOLERANCE_M",
+            "NAVIGATION_SIGMAS",
+            "SETTLING_WATCH_TIME_S",
+            "STRAIGHT_RADIUS_RATIO",
+            "KINK_FRACTION",
+        ),
+        *(
+            "KINK_WAYPOINT_COUNT",
+            "TURN_EXCLUSION_M",
+            "MIN_COURSE_STRETCH_M",
+            "COURSE_ERROR_FLOOR_RAD",
+            "MAX_UNSTEADINESS_RAD",
+            "ROUGH_COURSE_ERROR_RAD",
+        ),
     ),
     judge=turn_findings,
     suggest=ease_turn,

@@ -15,7 +15,7 @@ from logs.verdict.measures.acceptance import Reach, reach
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
 from logs.verdict.rule import Rule
-from logs.verdict.tolerances import EQUALLY_CLOSE, ROUNDING
+from logs.verdict.tolerances import EQUAL_DISTANCE_TOLERANCE_M, ROUNDING_M
 from logs.verdict.wording import place_text, place_text_within
 
 Floats = NDArray[np.float64]
@@ -40,7 +40,7 @@ def _planned(requirements: RouteRequirements, i: int) -> Finding:
         fact = "flown over"
     elif not requirements.setup.autopilot.follows_path:
         fact = _turn_text(requirements, i, near)
-    elif offset > near.radius + ROUNDING:
+    elif offset > near.radius + ROUNDING_M:
         turn, radius = math.degrees(abs(float(requirements.turns[i]))), float(requirements.radius[i])
         faults.append(
             message(
@@ -57,7 +57,7 @@ def _planned(requirements: RouteRequirements, i: int) -> Finding:
         planned=offset,
         limit=near.radius,
         source=near.source,
-        tolerance=ROUNDING,
+        tolerance=ROUNDING_M,
         margin=near.radius - offset if requirements.setup.autopilot.follows_path else None,
         unit="m",
         method="the fly-by arc",
@@ -150,7 +150,7 @@ def _closest(requirements: RouteRequirements, aligned: AlignedTrack, i: int, lev
         off = aligned.track.position[-1] - requirements.points[i]
         return math.hypot(off[0], off[1]), float(off[2])
     # Among equally close rows take the one nearest in altitude.
-    near = np.flatnonzero(distance <= distance.min() + EQUALLY_CLOSE)
+    near = np.flatnonzero(distance <= distance.min() + EQUAL_DISTANCE_TOLERANCE_M)
     up = position[near, 2] + fraction[near] * (position[near + 1, 2] - position[near, 2]) - level
     return float(distance.min()), float(up[np.argmin(np.abs(up))])
 
@@ -158,14 +158,14 @@ def _closest(requirements: RouteRequirements, aligned: AlignedTrack, i: int, lev
 RULE = Rule(
     name="waypoint",
     tolerances=(
-        "ROUNDING",
-        "EQUALLY_CLOSE",
-        "PASS",
+        "ROUNDING_M",
+        "EQUAL_DISTANCE_TOLERANCE_M",
+        "WAYPOINT_PASS_MARGIN_M",
         "NAVIGATION_SIGMAS",
-        "CLOSER",
-        "ARRIVED",
-        "CAPTURE_RADIUS",
-        "CHORD_TIME",
+        "CORNER_CUT_TOLERANCE_M",
+        "FINAL_WAYPOINT_TOLERANCE_M",
+        "CAPTURE_RADIUS_M",
+        "CHORD_TIME_S",
     ),
     judge=waypoint_findings,
 )

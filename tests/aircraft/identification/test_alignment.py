@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from aircraft.identification.alignment import align, led
+from aircraft.identification.alignment import align, invert_first_order_lag
 from aircraft.identification.estimate import _log_unexplained, align_clocks
 from aircraft.identification.flight_record import GRID_HZ, lagged
 from aircraft.identification.regression import Fit
@@ -47,7 +47,7 @@ def test_what_a_lag_took_is_put_back() -> None:
     late = lagged(swing, 0.05)
     middle = slice(200, -200)
     assert np.abs(late[middle]).max() == pytest.approx(1.0 / np.hypot(1.0, 2.0 * np.pi * 0.05), rel=0.01)
-    assert led(late, 0.05, GRID_HZ)[middle] == pytest.approx(swing[middle], abs=0.02)
+    assert invert_first_order_lag(late, 0.05, GRID_HZ)[middle] == pytest.approx(swing[middle], abs=0.02)
 
 
 def test_what_a_lag_smooths_away_still_counts_as_unexplained() -> None:

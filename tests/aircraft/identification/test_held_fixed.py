@@ -9,7 +9,7 @@ import pytest
 from aircraft.catalog import load_aircraft
 from aircraft.identification.alignment import align
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.held_fixed import HELD_FIXED, NOISE, Held
+from aircraft.identification.held_fixed import HELD_FIXED, NOISE, FixedParameter
 from planfly.identification.base_numbers import base_model
 from tests.aircraft.identification.flown_truth import flown_truth
 from tests.aircraft.identification.made_signals import steady
@@ -68,7 +68,7 @@ def test_rising_air_tilts_a_slow_aircrafts_flow_more() -> None:
         assert np.degrees(held.tilt(at)) == pytest.approx(degrees, abs=1e-3)
 
 
-def titled(title: str) -> Held:
+def titled(title: str) -> FixedParameter:
     (held,) = (held for held in HELD_FIXED if held.name.startswith(title))
     return held
 

@@ -80,7 +80,7 @@ def test_what_a_scenario_asks_of_its_returns_and_a_file_denies_is_refused(tmp_pa
 @pytest.mark.parametrize(("lower", "file", "most"), [(3.5, "", -1.0), (2.5, "", 10.0), (3.5, "TECS_LAND_PMAX 7", 7.0)])
 def test_on_a_lower_field_the_nose_is_held_down_in_the_flare(lower: float, file: str, most: float) -> None:
     made = ArduPlane(ArduPilotParameters.of_text(f"RTL_AUTOLAND 2\n{file}\n", "mine.parm"))
-    asked = made.as_asked(None, None, lands=True, lower=lower)
+    asked = made.with_scenario_rtl_settings(None, None, lands=True, lower=lower)
     assert isinstance(asked, ArduPlane)
     assert asked.parameters.landing_pitch_max == pytest.approx(math.radians(most))
 

@@ -12,20 +12,20 @@ from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import MOTION
 from flight.guidance.path import NODE, PIECE, FlyByPath
 from flight.simulation.tick import (
-    BANKED,
     BLOCK_TICKS,
     COMPLETED,
-    EMPTY,
+    END_BATTERY_EMPTY,
+    END_MISSED_ROUTE,
+    END_OVERBANK,
+    END_TIPPED_OVER,
     ENDS,
-    FAR,
     GROUND,
-    MISSED,
+    MISSED_ROUTE_DISTANCE_M,
     NO_MOTOR,
     NOT_A_NUMBER,
     OUTPUT,
     READ_FIELDS,
     STALLED,
-    TIPPED,
     Workspace,
     end_around,
     end_return,
@@ -187,21 +187,21 @@ def test_a_reading_that_is_no_number_ends_the_flight(name: str, value: float) ->
         ({"up": GROUND_AMSL}, GROUND),
         ({"up": GROUND_AMSL - 0.01}, GROUND),
         ({"roll": math.radians(74.99)}, 0),
-        ({"roll": math.radians(75.01)}, BANKED),
+        ({"roll": math.radians(75.01)}, END_OVERBANK),
         ({"roll": -math.radians(74.99)}, 0),
-        ({"roll": -math.radians(75.01)}, BANKED),
+        ({"roll": -math.radians(75.01)}, END_OVERBANK),
         ({"airspeed": 14.0}, 0),
         ({"airspeed": 13.999}, STALLED),
         ({"north": LENGTH - 0.01}, 0),
         ({"north": LENGTH + 0.01}, COMPLETED),
         ({"north": LENGTH + 0.01, "east": 99.9}, COMPLETED),
-        ({"north": LENGTH + 0.01, "east": 100.1}, MISSED),
+        ({"north": LENGTH + 0.01, "east": 100.1}, END_MISSED_ROUTE),
         ({"north": LENGTH + 0.01, "east": -99.9}, COMPLETED),
-        ({"north": LENGTH + 0.01, "east": -100.1}, MISSED),
+        ({"north": LENGTH + 0.01, "east": -100.1}, END_MISSED_ROUTE),
         ({"north": LENGTH + 0.01, "up": HEIGHT + 99.9}, COMPLETED),
-        ({"north": LENGTH + 0.01, "up": HEIGHT + 100.1}, MISSED),
+        ({"north": LENGTH + 0.01, "up": HEIGHT + 100.1}, END_MISSED_ROUTE),
         ({"north": LENGTH + 0.01, "up": HEIGHT - 99.9}, COMPLETED),
-        ({"north": LENGTH + 0.01, "up": HEIGHT - 100.1}, MISSED),
+        ({"north": LENGTH + 0.01, "up": HEIGHT - 100.1}, END_MISSED_ROUTE),
         # Far from a path whose end is ahead, a flight goes on.
         ({"east": 300.0, "up": HEIGHT + 300.0}, 0),
     ],
@@ -283,7 +283,7 @@ def test_a_return_ends_no_sooner_than_it_was_all_around_its_circle() -> None:
 
 
 def test_a_return_does_not_miss_the_end_of_a_path_that_it_need_not_follow() -> None:
-    for returning, status in ((False, MISSED), (True, COMPLETED)):
+    for returning, status in ((False, END_MISSED_ROUTE), (True, COMPLETED)):
         space = make_workspace()
         space.record.memory.returning = returning
         read(space, north=LENGTH + 0.01, east=300.0, up=HEIGHT + 300.0)
@@ -291,10 +291,20 @@ def test_a_return_does_not_miss_the_end_of_a_path_that_it_need_not_follow() -> N
 
 
 def test_each_end_is_told_apart_by_people() -> None:
-    assert set(ENDS) == {COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED, EMPTY, NO_MOTOR, TIPPED}
+    assert set(ENDS) == {
+        COMPLETED,
+        NOT_A_NUMBER,
+        GROUND,
+        END_OVERBANK,
+        STALLED,
+        END_MISSED_ROUTE,
+        END_BATTERY_EMPTY,
+        NO_MOTOR,
+        END_TIPPED_OVER,
+    }
     assert len(set(ENDS.values())) == 9
-    assert "75 degrees" in ENDS[BANKED]
-    assert f"{FAR:.0f} m" in ENDS[MISSED]
+    assert "75 degrees" in ENDS[END_OVERBANK]
+    assert f"{MISSED_ROUTE_DISTANCE_M:.0f} m" in ENDS[END_MISSED_ROUTE]
 
 
 def test_unknown_ground_ends_nothing_and_the_last_known_one_stays() -> None:
@@ -345,7 +355,7 @@ def test_a_flight_ends_when_all_that_it_carries_is_used() -> None:
     for k in range(3):
         read(space, north=1000.0 + k, power=720.0)
         statuses.append(planfly_tick(space.block, level_ground()))
-    assert statuses == [0, 0, EMPTY]
+    assert statuses == [0, 0, END_BATTERY_EMPTY]
 
 
 def test_readings_come_to_si_by_their_factors() -> None:

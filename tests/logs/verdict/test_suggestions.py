@@ -8,7 +8,7 @@ import pytest
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import Disagreement, Place
-from logs.verdict.tolerances import BUFFER_LENGTH
+from logs.verdict.tolerances import SUGGESTION_LENGTH_MARGIN_M
 from logs.verdict.wording import suggestions_text
 from tests.logs.verdict.judging import judge, leg, missile, of, suggested, waypoint
 from tests.synthetic import bump, edited, fly_path, make_scenario, make_setup
@@ -130,7 +130,7 @@ def test_what_is_suggested_passes_and_less_does_not(zone: Zone, steps: dict[str,
     assert set(steps) <= set(changes)
     for what, step in steps.items():
         # A metre less than was asked for, but for its rounding up, is not enough; what was asked for is.
-        for wanted, passes in ((changes[what], True), (changes[what] - BUFFER_LENGTH - 1.05, False)):
+        for wanted, passes in ((changes[what], True), (changes[what] - SUGGESTION_LENGTH_MARGIN_M - 1.05, False)):
             line = (np.array(LINE) + wanted * step).tolist()
             assert of(judge_geometry(with_zone(zone, line)), "fence").ok is passes
 

@@ -37,7 +37,7 @@ def test_it_is_used_positive_and_finite(name: str) -> None:
 
 
 def test_more_turbulence_allows_no_less() -> None:
-    for table in (tolerances.GUST_OFFSET, tolerances.CLOSER):
+    for table in (tolerances.GUST_OFFSET_M, tolerances.CORNER_CUT_TOLERANCE_M):
         assert list(table) == ["none", "light", "moderate"]
         assert list(table.values()) == sorted(table.values())
 
@@ -45,6 +45,6 @@ def test_more_turbulence_allows_no_less() -> None:
 def test_px4s_defaults_are_those_of_its_parameters() -> None:
     """NAV_ACC_RAD, FW_LND_ANG and MIS_DIST_1WP as PX4's reference has them, MIS_TKO_LAND_REQ as its planes."""
     usual = MissionChecks()
-    assert (usual.acceptance, tolerances.PX4_FIRST_WAYPOINT, usual.requires) == (10.0, 10_000.0, 2)
-    assert math.degrees(usual.landing_angle + tolerances.PX4_LANDING_BUFFER) == pytest.approx(5.1)
+    assert (usual.acceptance, tolerances.PX4_FIRST_WAYPOINT_DISTANCE_M, usual.requires) == (10.0, 10_000.0, 2)
+    assert math.degrees(usual.landing_angle + tolerances.PX4_LANDING_BUFFER_RAD) == pytest.approx(5.1)
     assert Px4(Px4Parameters.defaults()).mission_checks == usual

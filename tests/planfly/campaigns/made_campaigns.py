@@ -10,7 +10,7 @@ from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, open_campaign
 from planfly.campaigns.dispersions import Dispersions, default_dispersions, draw_flight
 from planfly.campaigns.flight_row import FlightRow, LeastMargin
-from planfly.campaigns.tables import NOT_THE_SAME
+from planfly.campaigns.tables import RUN_DEPENDENT_COLUMNS
 
 SCENARIO = """\
 name = "short"
@@ -70,7 +70,7 @@ def table(path: Path) -> list[tuple[Any, ...]]:
     try:
         rows = connection.execute("SELECT * FROM flights ORDER BY flight")
         names = [column[0] for column in rows.description]
-        left_out = {names.index(name) for name in (*NOT_THE_SAME, "checksum")}
+        left_out = {names.index(name) for name in (*RUN_DEPENDENT_COLUMNS, "checksum")}
         return [tuple(value for k, value in enumerate(row) if k not in left_out) for row in rows]
     finally:
         connection.close()

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from planfly.campaigns.dispersions import default_dispersions
-from planfly.campaigns.find_winds import ASKED, WindsGoal, find_winds, open_winds_store
+from planfly.campaigns.find_winds import SEARCHED_QUANTITIES, WindsGoal, find_winds, open_winds_store
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.statistics.decision import Goal
 from planfly.campaigns.tables import LockedTable
@@ -41,7 +41,7 @@ def lead(kind: str, folder: Path, flights: int) -> None:
             say_what_is_written(store)
             fly_campaign(base, goal, Workers(2), store, fly=slow_flight)
     else:
-        base, asked = short_base(folder, default_dispersions().without(ASKED)), winds_goal(flights)
+        base, asked = short_base(folder, default_dispersions().without(SEARCHED_QUANTITIES)), winds_goal(flights)
         with open_winds_store(base, asked, folder, resume=(folder / "winds.sqlite").exists()) as table:
             say_what_is_written(table)
             find_winds(base, asked, Workers(2), table, fly=slow_flight)

@@ -16,7 +16,7 @@ from planfly.campaigns import find_winds as find_winds_module
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.find_winds import (
-    ASKED,
+    SEARCHED_QUANTITIES,
     WindsFound,
     WindsGoal,
     _Search,
@@ -48,7 +48,7 @@ FEWER = WindsGoal(0.9, 0.95, 4 if SOAK else 2, 20.0, scaled(200, 96))
 
 @pytest.fixture(scope="module")
 def wind_base(tmp_path_factory: pytest.TempPathFactory) -> CampaignBase:
-    return short_base(tmp_path_factory.mktemp("winds"), default_dispersions().without(ASKED))
+    return short_base(tmp_path_factory.mktemp("winds"), default_dispersions().without(SEARCHED_QUANTITIES))
 
 
 @pytest.fixture
@@ -265,7 +265,7 @@ def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
         written |= said
         assert written <= {row[0] for row in table(folder / WINDS_DATABASE)}
     assert not finish_client("winds", folder, count) & written
-    base, goal = short_base(folder, default_dispersions().without(ASKED)), winds_goal(count)
+    base, goal = short_base(folder, default_dispersions().without(SEARCHED_QUANTITIES)), winds_goal(count)
     want = searched(base, tmp_path / "one", goal)
     assert same((searched(base, folder, goal), folder), (want, tmp_path / "one"))
     note("winds: kill -9 of its client", kills=kills, flights=count, lost=0)
@@ -289,5 +289,5 @@ def test_a_killed_worker_loses_no_flight(wind_base: CampaignBase, tmp_path: Path
 
 
 def test_the_wind_that_is_asked_about_does_not_vary() -> None:
-    names = {one.quantity.name for one in default_dispersions().without(ASKED).varying}
+    names = {one.quantity.name for one in default_dispersions().without(SEARCHED_QUANTITIES).varying}
     assert not names & {"wind_speed", "wind_from"}

@@ -16,8 +16,8 @@ from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.statistics.decision import Tally
 from planfly.campaigns.tables import (
     CAMPAIGN_KIND,
-    NOT_THE_SAME,
     ROW_COLUMNS,
+    RUN_DEPENDENT_COLUMNS,
     WINDS_KIND,
     AskedFlight,
     Store,
@@ -41,7 +41,7 @@ def test_values_make_the_row_again(base: CampaignBase) -> None:
 
 def test_who_flew_and_how_long_makes_no_other_flight(base: CampaignBase, tmp_path: Path) -> None:
     row = made_flight(base, 1)
-    assert NOT_THE_SAME == ("seconds", "worker")
+    assert RUN_DEPENDENT_COLUMNS == ("seconds", "worker")
     assert same_flight(row, replace(row, worker="tcp://x", seconds=9.0))
     assert not same_flight(row, replace(row, ended="x"))
     assert not same_flight(row, replace(row, draw=replace(row.draw, index=2)))

@@ -17,7 +17,7 @@ from flight.mission_files.formats import read_mission
 from logs.recording.reader import read_log
 from logs.verdict.rules.registry import RULES
 from planfly.cli import main
-from planfly.returns_beside import returns_beside
+from planfly.returns_beside import return_summary
 from planfly.targets import RUN_FILES
 from tests.logs.verdict.judging import SILENT_ON_WAYPOINTS
 from tests.planfly.conftest import FIELD
@@ -103,7 +103,7 @@ def test_the_demo_is_flown_from_the_ground_to_the_ground_and_comes_home(demo: Pa
     assert re.search(r"^RTL_AUTOLAND[ ,\t]+3", parameters, re.MULTILINE)
     page = (demo / "report.html").read_text(encoding="utf-8")
     assert "launched from a catapult at home" in page
-    beside = returns_beside(log.setup, log.track)
+    beside = return_summary(log.setup, log.track)
     assert beside.line.startswith("all ")
     # An ordinary run's pictures are blank, captions and all.
     assert not SOAK or html.escape(beside.line[1:]) in page

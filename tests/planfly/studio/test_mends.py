@@ -182,7 +182,7 @@ def test_a_path_that_was_searched_for_an_older_sheet_is_not_taken(monkeypatch: p
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=5.0))
     answers = jobs.answered(LONG, Answer(asked[0].number, "done", [straight_plan(session.desk.scenario, 3)]), session)
     assert [one["kind"] for one in answers] == ["stopped", "fault"]
-    assert not jobs.chosen_at_once(session)
+    assert not jobs.take_initial_plan(session)
     # What was restored is flown, not planned anew.
     again = Jobs(lambda name, answer: None)
     again.start(session)

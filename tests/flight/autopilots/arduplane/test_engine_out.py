@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flight.autopilots.arduplane.swift_return import CIRCLED, HIT, SwiftReturns, fly_returns
+from flight.autopilots.arduplane.swift_return import RETURN_ARRIVED, RETURN_GROUND_IMPACT, SwiftReturns, fly_returns
 from flight.mission.return_path import LandingStart, ReturnCircle
 from tests.flight.autopilots.arduplane.kept_flights import FOLDER, HOME, WIND
 from tests.flight.autopilots.arduplane.test_swift_return import aerosonde, around, flat, parameters, start
@@ -70,9 +70,9 @@ def test_it_is_as_high_as_arduplane_was(flight: str) -> None:
 @pytest.mark.parametrize("flight", [name for name, row in GLIDES.items() if row["mode"] == "RTL"])
 def test_it_gets_home_where_arduplane_did(flight: str) -> None:
     real, flown = GLIDES[flight], glided(flight).flown[0]
-    arrives = bool(flown["ended"] == CIRCLED and flown["clearance_before"] >= MARGIN)
+    arrives = bool(flown["ended"] == RETURN_ARRIVED and flown["clearance_before"] >= MARGIN)
     assert arrives == (real["reaches_home"] == "1")
-    assert (flown["ended"] == HIT) == (real["reaches_home"] == "0")
+    assert (flown["ended"] == RETURN_GROUND_IMPACT) == (real["reaches_home"] == "0")
     if arrives:
         assert flown["to_circle"] == pytest.approx(float(real["ends_s"]), abs=10.0)
 

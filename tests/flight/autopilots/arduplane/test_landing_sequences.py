@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flight.autopilots.arduplane.swift_go_around import aborted_at, fly_go_arounds
-from flight.autopilots.arduplane.swift_return import HIT, RETURN_START
+from flight.autopilots.arduplane.swift_return import RETURN_GROUND_IMPACT, RETURN_START
 from flight.mission.ground_ways import Approach
 from flight.mission.placing import landing_sequence
 from logs.verdict.returns.judge_returns import return_world
@@ -111,7 +111,7 @@ def test_the_abort_flies_into_the_hill_as_arduplane_did() -> None:
     """It is so high already, turns at once, and meets the hillside: place within 10 m and height within 6 m."""
     real = kept_sequence("abort")
     flown, way = aborted()
-    assert flown["ended"] == HIT
+    assert flown["ended"] == RETURN_GROUND_IMPACT
     seconds = np.arange(10.0)
     for axis, name in enumerate(("east_m", "north_m", "amsl_m")):
         there = np.interp(seconds, real["time_s"], real[name])
@@ -120,7 +120,7 @@ def test_the_abort_flies_into_the_hill_as_arduplane_did() -> None:
 
 def test_an_abort_that_has_to_climb_holds_its_course_until_it_is_above_its_height() -> None:
     flown, way = aborted(height=120.0)
-    assert flown["ended"] != HIT
+    assert flown["ended"] != RETURN_GROUND_IMPACT
     top = kept_setup("abort").mission.home.alt + 120.0
     k = int(np.argmax(way[:, 2] > top))
     courses = np.degrees(np.arctan2(*np.diff(way[:k, :2], axis=0).T)) % 360.0

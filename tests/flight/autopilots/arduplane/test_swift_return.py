@@ -10,12 +10,12 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.point_mass import PointMass, point_mass
 from flight.autopilots.arduplane.swift_return import (
-    CIRCLED,
-    HIT,
-    NEVER,
-    OFF_GROUND,
+    RETURN_ARRIVED,
+    RETURN_GROUND_IMPACT,
+    RETURN_OFF_TERRAIN,
     RETURN_START,
-    Surroundings,
+    RETURN_TIMEOUT,
+    ReturnEnvironment,
     SwiftReturns,
     fly_returns,
     surroundings,
@@ -47,7 +47,7 @@ def aerosonde(wind: Wind = WIND) -> PointMass:
 
 
 @functools.cache
-def around() -> Surroundings:
+def around() -> ReturnEnvironment:
     return surroundings(jacksboro())
 
 
@@ -96,14 +96,14 @@ def test_it_ends_as_arduplane_did(flight: str) -> None:
     real, (target, made) = KEPT[flight], swift(flight)
     flown = made.flown[0]
     assert target == real["target"]
-    assert (flown["ended"] == HIT) == (real["hit"] == "1")
+    assert (flown["ended"] == RETURN_GROUND_IMPACT) == (real["hit"] == "1")
     assert (flown["outside_before"] < 0.0) == (float(real["outside_spheres_m"]) < 0.0)
     low, high = CLEARANCE[kind(flight)]
     assert low <= flown["clearance_before"] - float(real["least_clearance_m"]) <= high
     if real["hit"] == "1":
         assert abs(flown["seconds"] - kept_track(flight)[-1, 0]) < 20.0 + ARRIVAL
     else:
-        assert flown["ended"] == CIRCLED
+        assert flown["ended"] == RETURN_ARRIVED
         assert abs(flown["to_circle"] - float(real["to_circle_s"])) < ARRIVAL
 
 
@@ -129,16 +129,16 @@ def test_it_is_where_the_whole_law_is(flight: str) -> None:
 # By plain sums.
 
 
-def flat(height: float = 0.0, spheres: tuple[tuple[float, ...], ...] = ()) -> Surroundings:
+def flat(height: float = 0.0, spheres: tuple[tuple[float, ...], ...] = ()) -> ReturnEnvironment:
     """The demo's ground with one height everywhere."""
     real = around()
     level = np.full_like(real.heights, height)
     made = np.array(spheres).reshape(-1, 4)
     spheres, radii = np.ascontiguousarray(made[:, :3]), np.ascontiguousarray(made[:, 3])
-    return Surroundings(read_only(level), real.to_pixel, read_only(spheres), read_only(radii), True)
+    return ReturnEnvironment(read_only(level), real.to_pixel, read_only(spheres), read_only(radii), True)
 
 
-def returned(begin: Records, circle: ReturnCircle, world: Surroundings, **values: float) -> Records:
+def returned(begin: Records, circle: ReturnCircle, world: ReturnEnvironment, **values: float) -> Records:
     found: Records = fly_returns(begin, [circle], parameters(**values), aerosonde(Wind()), world).flown[0]
     return found
 
@@ -166,7 +166,12 @@ def test_it_is_mirrored_with_its_start() -> None:
 def test_a_wall_that_is_higher_is_never_safer() -> None:
     circle, begin = ReturnCircle(0.0, 6000.0, 300.0, 120.0), start(up=900.0, velocity_north=26.0)
     ends = [returned(begin, circle, flat(height)) for height in (100.0, 295.0, 310.0, 600.0)]
-    assert [int(end["ended"]) for end in ends] == [CIRCLED, CIRCLED, HIT, HIT]
+    assert [int(end["ended"]) for end in ends] == [
+        RETURN_ARRIVED,
+        RETURN_ARRIVED,
+        RETURN_GROUND_IMPACT,
+        RETURN_GROUND_IMPACT,
+    ]
     assert ends[0]["clearance"] - ends[1]["clearance"] == pytest.approx(195.0, abs=0.1)
     assert ends[2]["seconds"] > ends[3]["seconds"]
 
@@ -175,14 +180,14 @@ def test_what_cannot_end_is_told() -> None:
     begin = start(up=900.0, velocity_north=26.0)
     # Higher than the aircraft climbs, and beyond the elevation data.
     high = returned(begin, ReturnCircle(0.0, 1000.0, 8900.0, 120.0), flat(100.0), THR_MAX=78.0)
-    assert high["ended"] == NEVER
+    assert high["ended"] == RETURN_TIMEOUT
     off = returned(begin, ReturnCircle(0.0, 90_000.0, 900.0, 120.0), flat(100.0))
-    assert off["ended"] == OFF_GROUND
-    nowhere = Surroundings(
+    assert off["ended"] == RETURN_OFF_TERRAIN
+    nowhere = ReturnEnvironment(
         around().heights, around().to_pixel, read_only(np.zeros((0, 3))), read_only(np.zeros(0)), False
     )
     told = returned(begin, ReturnCircle(0.0, 2000.0, 900.0, 120.0), nowhere)
-    assert told["ended"] == CIRCLED
+    assert told["ended"] == RETURN_ARRIVED
     assert math.isnan(told["clearance"])
     assert told["threat"] == -1
 
@@ -196,7 +201,7 @@ def test_its_circle_is_flown_all_around(radius: float) -> None:
         flown = returned(begin, ReturnCircle(0.0, 5000.0, 900.0, radius), flat(100.0, ((*at, 900.0, 1.0),)))
         # True radii grow with height: 900 m are 9 % of it.
         assert flown["outside"] < 0.12 * away + 60.0
-        assert flown["ended"] == CIRCLED
+        assert flown["ended"] == RETURN_ARRIVED
     assert flown["to_circle"] == pytest.approx((5000.0 - max(200.0, 1.3 * 1.09 * abs(radius))) / 26.1, abs=4.0)
 
 
@@ -204,13 +209,13 @@ def test_one_that_grazes_the_ground_is_flown_on_and_its_depth_is_known() -> None
     circle, begin = ReturnCircle(0.0, 6000.0, 900.0, 120.0), start(up=900.0, velocity_north=26.0)
     safe = returned(begin, circle, flat(895.0))
     grazed = returned(begin, circle, flat(905.0))
-    assert (int(safe["ended"]), int(grazed["ended"])) == (CIRCLED, HIT)
+    assert (int(safe["ended"]), int(grazed["ended"])) == (RETURN_ARRIVED, RETURN_GROUND_IMPACT)
     assert grazed["clearance"] == pytest.approx(safe["clearance"] - 10.0, abs=0.1)
     # The whole way: its energy is that of the one that was not hit.  Where it hits is where it does so first.
     assert grazed["energy"] == pytest.approx(safe["energy"], rel=1e-6)
     assert grazed["clearance_time"] == 0.0
     deep = returned(begin, circle, flat(920.0))
-    assert (int(deep["ended"]), float(deep["seconds"])) == (HIT, 0.0)
+    assert (int(deep["ended"]), float(deep["seconds"])) == (RETURN_GROUND_IMPACT, 0.0)
     assert deep["clearance"] == pytest.approx(-20.0, abs=0.1)
 
 

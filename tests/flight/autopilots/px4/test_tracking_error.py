@@ -10,7 +10,7 @@ from aircraft.tracking import TURNS
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
-from flight.autopilots.px4.tracking_error import WIND_SPREAD, off_height_chance, tracking_error
+from flight.autopilots.px4.tracking_error import WIND_SPREAD, altitude_miss_probability, tracking_error
 from tests.flight.autopilots.px4.kept_flights import kept
 from world.scenario_tables import Px4Version
 
@@ -68,19 +68,23 @@ def test_slopes_are_those_of_the_reference_and_late_by_its_lag(
 def test_gusts_leave_a_waypoints_height_by_the_normal_distribution() -> None:
     """In moderate turbulence 4 m are one deviation of the height, and 1.54 m/s one of the gusts, 10 m in 6 s."""
     # Beyond 2.5 deviations lie 0.62097 % on either side; beyond 2 and 1.5 of them 2.27501 and 6.68072 %.
-    strong = off_height_chance(10.0, 100.0, 100.0, "moderate")
+    strong = altitude_miss_probability(10.0, 100.0, 100.0, "moderate")
     assert strong == pytest.approx(2.0 * 0.0062097, rel=1e-4)
-    assert off_height_chance(10.0, 2.0 * 1.54 - 10.0 / 6.0, 100.0, "moderate") == pytest.approx(strong + 0.0227501)
-    assert off_height_chance(10.0, 100.0, 1.5 * 1.54 - 10.0 / 6.0, "moderate") == pytest.approx(strong + 0.0668072)
-    assert off_height_chance(6.0, 100.0, 100.0, "moderate") == pytest.approx(2.0 * 0.0668072)
+    assert altitude_miss_probability(10.0, 2.0 * 1.54 - 10.0 / 6.0, 100.0, "moderate") == pytest.approx(
+        strong + 0.0227501
+    )
+    assert altitude_miss_probability(10.0, 100.0, 1.5 * 1.54 - 10.0 / 6.0, "moderate") == pytest.approx(
+        strong + 0.0668072
+    )
+    assert altitude_miss_probability(6.0, 100.0, 100.0, "moderate") == pytest.approx(2.0 * 0.0668072)
 
 
 def test_calmer_air_has_no_chance_of_it() -> None:
-    assert off_height_chance(0.1, -5.0, -5.0, "light") == 0.0
-    assert off_height_chance(0.1, -5.0, -5.0, "none") == 0.0
+    assert altitude_miss_probability(0.1, -5.0, -5.0, "light") == 0.0
+    assert altitude_miss_probability(0.1, -5.0, -5.0, "none") == 0.0
 
 
 def test_px4s_own_acceptance_counts() -> None:
     made = Px4(Px4Parameters.defaults().changed(NAV_FW_ALT_RAD=6.0))
-    assert made.off_height_chance(100.0, 100.0, "moderate") == pytest.approx(2.0 * 0.0668072)
-    assert PlanflyGuidance().off_height_chance(-5.0, -5.0, "moderate") == 0.0
+    assert made.altitude_miss_probability(100.0, 100.0, "moderate") == pytest.approx(2.0 * 0.0668072)
+    assert PlanflyGuidance().altitude_miss_probability(-5.0, -5.0, "moderate") == 0.0

@@ -8,7 +8,7 @@ from flight.mission.route import part_of_route
 from flight.simulation.setup import FlightSetup, ImportedLog, MissionStretch
 from logs.recording.example_log import example_log
 from logs.verdict.imported.flown_legs import flown_legs, plan_mismatch
-from logs.verdict.tolerances import ANOTHER_PLACE, PARTLY_FLOWN
+from logs.verdict.tolerances import PARTIAL_LEG_MIN_S, PLAN_MISMATCH_DISTANCE_M
 from tests.setups import route_along
 from tests.synthetic import fly_path, make_setup
 
@@ -27,8 +27,8 @@ def test_the_whole_route() -> None:
 
 
 def test_a_stretch_that_goes_on_has_flown_a_part_of_the_next_leg() -> None:
-    assert legs(0.0, TURN + PARTLY_FLOWN - 0.2) == (0, 1, False)
-    assert legs(0.0, TURN + PARTLY_FLOWN + 0.2) == (0, 2, True)
+    assert legs(0.0, TURN + PARTIAL_LEG_MIN_S - 0.2) == (0, 1, False)
+    assert legs(0.0, TURN + PARTIAL_LEG_MIN_S + 0.2) == (0, 2, True)
 
 
 def test_what_was_flown_to_the_first_waypoint_is_no_leg() -> None:
@@ -77,7 +77,7 @@ def test_its_own_plan_is_no_other() -> None:
 @pytest.mark.parametrize(("beside", "kind"), [(-1.0, None), (1.0, "place")])
 def test_another_place_is_farther_than_a_kilometre(beside: float, kind: str | None) -> None:
     # The flight's nearest is its first leg, on the line north = 0.
-    north = -(ANOTHER_PLACE + beside)
+    north = -(PLAN_MISMATCH_DISTANCE_M + beside)
     found = plan_mismatch(along([[-500.0, north, 200.0], [-200.0, north, 200.0], [0.0, north, 200.0]]), LOG.track)
     assert (None if found is None else found.kind) == kind
 

@@ -8,7 +8,7 @@ import pytest
 
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
-from logs.verdict.measures.circle_reach import _rings, beside_end, within_reach
+from logs.verdict.measures.circle_reach import _rings, end_loiter_hazards, hazards_within
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from tests.logs.verdict.rules.test_loiter_rule_own_radius import TIME, loiter, radius_at, sphere
 
@@ -18,7 +18,7 @@ REACH = 261.0
 def found(low: float, high: float, requirements: RouteRequirements | None = None, **tables: Any) -> list[str]:
     """Within 261 m of home, over flat ground at 0 m."""
     known = requirements or route_requirements(loiter(TIME, {}, **tables))
-    return within_reach(known, np.zeros(2), low, high, REACH)
+    return hazards_within(known, np.zeros(2), low, high, REACH)
 
 
 def with_ground(away: float, up: float) -> RouteRequirements:
@@ -40,8 +40,8 @@ def with_ground(away: float, up: float) -> RouteRequirements:
 def test_a_missions_end_has_circles_where_the_autopilot_flies_them() -> None:
     """After the last waypoint ArduPlane returns; PX4 circles, within 2.25 radii of 30 degrees of bank."""
     setup = loiter(TIME, {})
-    assert beside_end(route_requirements(setup)) is None
-    beside = beside_end(route_requirements(replace(setup, autopilot=Px4(Px4Parameters.defaults()))))
+    assert end_loiter_hazards(route_requirements(setup)) is None
+    beside = end_loiter_hazards(route_requirements(replace(setup, autopilot=Px4(Px4Parameters.defaults()))))
     assert beside is not None
     assert beside[0] == pytest.approx(2.25 * radius_at(30.0), rel=0.02)
     assert beside[1] == []

@@ -20,7 +20,7 @@ from logs.verdict.measures.slopes import (
     straight_span,
 )
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track
-from logs.verdict.tolerances import ROUGH_COURSE, SLOPE_FLOOR
+from logs.verdict.tolerances import ROUGH_COURSE_ERROR_RAD, SLOPE_ERROR_FLOOR_RAD
 from tests.synthetic import Profile, edited, fly_path, make_setup
 
 
@@ -47,7 +47,7 @@ def test_long_legs_have_the_planned_course_and_slope(setup: FlightSetup, track: 
         assert slope.fitted
         assert np.cos(course.value - requirements.courses[leg]) == pytest.approx(1.0, abs=1e-8)
         assert slope.value == pytest.approx(requirements.slopes[leg], abs=1e-3)
-        assert slope.tolerance >= SLOPE_FLOOR
+        assert slope.tolerance >= SLOPE_ERROR_FLOOR_RAD
 
 
 def test_a_short_leg_is_rough() -> None:
@@ -55,7 +55,7 @@ def test_a_short_leg_is_rough() -> None:
     course = leg_course(route_requirements(setup), aligned_with(setup, fly_path(setup)), 1)
     assert course is not None
     assert not course.fitted
-    assert course.tolerance == ROUGH_COURSE
+    assert course.tolerance == ROUGH_COURSE_ERROR_RAD
 
 
 def test_a_leg_that_was_not_flown_has_neither(setup: FlightSetup) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logs.verdict.returns.drawn_returns import DrawnReturns, least_heights, plainly_drawn, stretches
+from logs.verdict.returns.drawn_returns import DrawnReturns, draw_returns_without_glides, least_heights, stretches
 from logs.verdict.returns.judge_returns import judge_returns, return_world
 from logs.verdict.returns.return_starts import planned_starts
 from tests.logs.verdict.returns.hill import hill_drawn, hill_setup
@@ -39,7 +39,7 @@ def test_where_all_are_safe_the_lowest_is_drawn(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     world, starts = return_world(setup).with_parameters(RTL_ALTITUDE=600.0), planned_starts(setup, 20.0)
     returns = judge_returns(world, starts, 20.0)
-    (only,) = plainly_drawn(world, starts, returns).worst
+    (only,) = draw_returns_without_glides(world, starts, returns).worst
     assert only.one.safe
     assert only.one.clearance == min(one.clearance for one in returns.each)
 

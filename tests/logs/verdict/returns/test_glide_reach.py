@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from flight.autopilots.arduplane.swift_return import RETURN_START, Surroundings
+from flight.autopilots.arduplane.swift_return import RETURN_START, ReturnEnvironment
 from logs.verdict.returns.glide_map import glide_map, glide_slopes, least_heights
 from logs.verdict.returns.glide_reach import heights_left, place_of
 from tests.flight.autopilots.arduplane.kept_flights import FOLDER, HOME, WIND, jacksboro
@@ -49,7 +49,7 @@ def left_of(
     start["east"], start["north"], start["up"] = east, north, up
     start["velocity_east"] = speed * math.sin(math.radians(course)) + wind * math.sin(to)
     start["velocity_north"] = speed * math.cos(math.radians(course)) + wind * math.cos(to)
-    around = Surroundings(terrain.heights, terrain.to_pixel.record, spheres, radii, True)
+    around = ReturnEnvironment(terrain.heights, terrain.to_pixel.record, spheres, radii, True)
     left, reached = heights_left(start, needs, aircraft, around, AIRSPEED, bank)
     return float(left[0]), place_of(made, int(reached[0])) if reached[0] >= 0 else (math.nan,) * 3
 
@@ -201,7 +201,7 @@ def test_home_is_in_reach_from_where_arduplane_glided_to_it() -> None:
     aircraft, top = aerosonde(WIND), float(starts["up"].max())
     slopes = glide_slopes(aircraft, AIRSPEED, float(np.nanmin(made.ground)), top)
     needs = least_heights(made, np.array([made.cell_of(*HOME[:2])]), slopes, top)
-    around = Surroundings(terrain.heights, terrain.to_pixel.record, NO_SPHERES, NO_RADII, True)
+    around = ReturnEnvironment(terrain.heights, terrain.to_pixel.record, NO_SPHERES, NO_RADII, True)
     left, _ = heights_left(starts, needs, aircraft, around, AIRSPEED, BANK)
     assert (left >= 0.0).tolist() == [row["reaches_home"] == "1" for row in rows]
     # ArduPlane dives onto its slope, and comes over home lower than the best glide would, or as high.

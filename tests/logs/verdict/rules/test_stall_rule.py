@@ -15,7 +15,7 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT
 from logs.verdict.rules.stall_rule import level_stall, planned_bank, stall_findings
-from logs.verdict.tolerances import STALL_TOLERANCE
+from logs.verdict.tolerances import STALL_TOLERANCE_MPS
 from tests.logs.verdict.judging import failing, of, suggested
 from tests.synthetic import copied, envelope, fly_path, make_scenario, make_setup
 
@@ -118,7 +118,7 @@ def test_a_flown_airspeed_just_below_and_just_above_the_stall(
     assert item.ok is ok
     assert item.limit == pytest.approx(stall, abs=1e-3)
     assert item.flown == pytest.approx(stall - 0.2 + beyond, abs=1e-3)
-    assert STALL_TOLERANCE == 0.2
+    assert STALL_TOLERANCE_MPS == 0.2
 
 
 def test_a_gust_of_a_moment_is_no_stall_and_turbulence_has_its_own() -> None:
