@@ -30,9 +30,9 @@ from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
-from planfly.airframe import Airframe, load_airframe
-from planfly.make_plan import make_plan
-from planfly.open_flight import make_setup
+from planfly.workflow.airframe import Airframe, load_airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.open_flight import make_setup
 from planner.evaluation.problem import TURBULENCE_SHARE
 from world.errors import ScenarioError
 from world.scenario import Scenario, from_spec, load_scenario

@@ -24,10 +24,10 @@ from flight.simulation.simulate import Flight, fly_to_end, simulate
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.judge_flight import judge_flight
-from planfly.airframe import Airframe, load_airframe
-from planfly.make_plan import make_plan
-from planfly.open_flight import make_setup
-from planfly.pipeline import BATCH
+from planfly.workflow.airframe import Airframe, load_airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.open_flight import make_setup
+from planfly.workflow.pipeline import BATCH
 from world.scenario import load_scenario
 
 # Number of rounds.

@@ -25,7 +25,7 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import fastest, full_throttle, idle, straight
 from flight.simulation.simulate import Flight, fly_to_end
-from planfly.data_sheets import make_data_sheet_folder
+from planfly.workflow.data_sheets import make_data_sheet_folder
 from tests.setups import setup_maker
 from world.errors import FlightError
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from flight.mission.from_plan import plan_mission
-from planfly.airframe import load_airframe
 from planfly.arguments import CHOICES
 from planfly.flight_options import flight_entries
-from planfly.make_plan import make_plan
-from planfly.open_flight import make_setup
-from planfly.pipeline import fly_and_judge
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.open_flight import make_setup
+from planfly.workflow.pipeline import fly_and_judge
 from tests.autopilot_plans import CLEARANCE, Harm, harm_of, plan_scenario
 from world.scenario import with_flight
 

@@ -16,10 +16,10 @@ from statistics import median
 
 from flight.mission.from_plan import plan_mission
 from logs.verdict.judge_geometry import judge_geometry
-from planfly.airframe import load_airframe
-from planfly.make_plan import make_plan
-from planfly.open_flight import make_setup
-from planfly.pipeline import fly_and_judge
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.open_flight import make_setup
+from planfly.workflow.pipeline import fly_and_judge
 from planner.plan import Objective
 from tests.fresh_plans import fresh_scenario
 from world.errors import PlanflyError

@@ -27,9 +27,9 @@ COLD = {
 # Program of a first safe path; it exits at once, as the shutdown of the interpreter is not measured.
 FIRST_SAFE = """
 import os
-from planfly.process_setup import prepare_process
+from planfly.runtime.process_setup import prepare_process
 prepare_process()
-from planfly.airframe import load_airframe
+from planfly.workflow.airframe import load_airframe
 from planner.search.plan_path import plan_path
 from world.scenario import load_scenario
 scenario = load_scenario("jacksboro-air")

@@ -25,8 +25,8 @@ from websockets.sync.client import connect
 
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
 from flight.mission_files.formats import mission_text
-from planfly.airframe import load_airframe
-from planfly.make_plan import make_plan
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.make_plan import make_plan
 from planner.plan import plan_json
 from tests.browser import Browser
 from world.frames import to_geo

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.airframe import Airframe, load_airframe
+from planfly.workflow.airframe import Airframe, load_airframe
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import ENCODINGS, Encoding, rotated_frame, rotated_vectors
 from planner.evaluation.graded_scores import graded_scores

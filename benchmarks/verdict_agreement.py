@@ -19,11 +19,11 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
-from planfly.airframe import Airframe, load_airframe
 from planfly.arguments import CHOICES
 from planfly.flight_options import flight_entries
-from planfly.open_flight import make_setup
-from planfly.pipeline import fly_and_judge
+from planfly.workflow.airframe import Airframe, load_airframe
+from planfly.workflow.open_flight import make_setup
+from planfly.workflow.pipeline import fly_and_judge
 from tests.field_missions import GROUND, FieldMission, close_mission, ordinary_mission
 
 # Loss of clearance, or depth in a sphere, from which a violation is grave, m.

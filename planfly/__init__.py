@@ -40,7 +40,7 @@ from typing import TYPE_CHECKING, Any
 
 from planfly._version import __version__ as __version__
 from planfly.own_packages import refuse_hidden_packages
-from planfly.process_setup import prepare_child
+from planfly.runtime.process_setup import prepare_child
 
 refuse_hidden_packages()
 prepare_child()
@@ -109,12 +109,12 @@ if TYPE_CHECKING:
     from planfly.campaigns.dispersions import SpreadError as SpreadError
     from planfly.campaigns.find_winds import WindsFound as WindsFound
     from planfly.campaigns.worker_pool import SchedulerError as SchedulerError
-    from planfly.imported_flights import ImportedFlight as ImportedFlight
-    from planfly.paper import PaperTables as PaperTables
-    from planfly.paper import paper_tables as paper_tables
-    from planfly.pipeline import PlanThenFly as PlanThenFly
-    from planfly.stages import progress as progress
+    from planfly.planning.paper import PaperTables as PaperTables
+    from planfly.planning.paper import paper_tables as paper_tables
+    from planfly.runtime.stages import progress as progress
     from planfly.studio.open_studio import open_studio as open_studio
+    from planfly.workflow.imported_flights import ImportedFlight as ImportedFlight
+    from planfly.workflow.pipeline import PlanThenFly as PlanThenFly
     from planner.plan import Plan as Plan
     from planner.search.plan_front import Front as Front
     from planner.search.plan_front import FrontPlan as FrontPlan
@@ -225,13 +225,13 @@ _HOMES = {
         "planfly.campaigns.worker_pool": ("SchedulerError",),
         "planfly.campaigns.find_winds": ("WindsFound",),
         "planfly.campaigns.dispersions": ("SpreadError",),
-        "planfly.imported_flights": ("ImportedFlight",),
-        "planfly.paper": (
+        "planfly.workflow.imported_flights": ("ImportedFlight",),
+        "planfly.planning.paper": (
             "PaperTables",
             "paper_tables",
         ),
-        "planfly.pipeline": ("PlanThenFly",),
-        "planfly.stages": ("progress",),
+        "planfly.workflow.pipeline": ("PlanThenFly",),
+        "planfly.runtime.stages": ("progress",),
         "planner.plan": ("Plan",),
         "planner.search.plan_front": (
             "Front",

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from planfly.targets import MAX_BY_PROGRAM
+from planfly.workflow.output_paths import MAX_BY_PROGRAM
 from world.errors import ArgumentError
 
 

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from planfly.commands.registry import build_parser, find_command
-from planfly.process_setup import prepare_process, with_large_stack
+from planfly.runtime.process_setup import prepare_process, with_large_stack
 from planfly.terminal.arguments import ASKS_COMPLETION, answer_shell
 from planfly.terminal.command_parser import coloured, error_text
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, ParamSpec, TypedDict, TypeVar, cast, get_
 from flight.autopilots.catalog import program_autopilot
 from flight.simulation.setup import VerticalDatum
 from planfly.arguments import check_arguments, is_wind
-from planfly.file_autopilots import with_file_autopilot
+from planfly.workflow.file_autopilots import with_file_autopilot
 from world.errors import ArgumentError
 from world.files import did_you_mean, whole_path
 from world.scenario import Scenario, at_time, load_scenario, over_terrain, with_flight, with_wind

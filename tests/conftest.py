@@ -11,7 +11,7 @@ import pytest
 from hypothesis import settings
 
 from flight.dynamics import model_check
-from planfly.process_setup import prepare_process
+from planfly.runtime.process_setup import prepare_process
 from planfly.terminal import output
 from tests.shared import remove_made
 from tests.soak import CORE_SECONDS, SECONDS, SOAK, begin_file, end_file, note, passed_files, scaled

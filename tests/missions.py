@@ -19,8 +19,8 @@ from aircraft.path_limits import Limits
 from flight.dynamics.envelope_tables import load_envelope
 from flight.simulation.setup import FlightSetup
 from logs.verdict.places import Place
-from planfly.airframe import Airframe, load_airframe
-from planfly.open_flight import make_setup
+from planfly.workflow.airframe import Airframe, load_airframe
+from planfly.workflow.open_flight import make_setup
 from tests.mission_draft import Draft, draw_heights, draw_runs, draw_turns
 from tests.setups import spec_around, waypoint_mission
 from world.scenario import Scenario, from_spec

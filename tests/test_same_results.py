@@ -38,6 +38,6 @@ def test_plan_missions_track_and_verdict_of_a_run(name: str, tmp_path: Path) -> 
 )
 def test_tables_of_the_paper(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # The figures are no table, and take longer than they do.
-    monkeypatch.setattr("planfly.paper.write_figures", lambda *_: None)
+    monkeypatch.setattr("planfly.planning.paper.write_figures", lambda *_: None)
     assert main(["paper", "--problems", "7,60", "--runs", "3", "--out", str(tmp_path / "paper")]) == 0
     assert {name: digest((tmp_path / "paper" / name).read_bytes()) for name in PAPER_FILES} == KEPT["paper"]

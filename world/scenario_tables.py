@@ -410,7 +410,7 @@ class FlightTable(ScenarioTable):
     """[flight].  A None was not stated; `steering` replaces it with its default.
 
     autopilot: name of the autopilot; guidance alone means "ideal", params alone "ardupilot".
-    autopilot_from: file that the autopilot was inferred from, see `planfly.file_autopilots`.
+    autopilot_from: file that the autopilot was inferred from, see `planfly.workflow.file_autopilots`.
     params: file with the autopilot's parameters.
     px4_version: release of autopilot = "px4", as releases fly differently; None for the newest.
     guidance: guidance law of "ideal".

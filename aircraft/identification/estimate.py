@@ -5,7 +5,7 @@ curve's slope is the angle of attack, gusts included, and side force gives the s
 comes from frequencies at which the aircraft heaves with the gusts; drag and thrust come from the forward acceleration,
 the moments from the gyros' rates of change.
 
-Uncertain quantities that are held fixed (`aircraft.identification.held_fixed`) are changed by their standard deviation
+Uncertain quantities that are held fixed (`aircraft.identification.fixed_parameters`) are changed by their standard deviation
 one after the other, and the estimate is repeated: these shifts are part of the covariance.
 """
 
@@ -19,9 +19,9 @@ from aircraft.identification.airspeed import SCALE_SD, with_airspeed_scale
 from aircraft.identification.alignment import Clocks, Signals, align, find_clocks, invert_first_order_lag
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.drag import FORCE_THINNING, AlphaDoubt, fit_drag
+from aircraft.identification.fixed_parameters import HELD_FIXED, NOISE
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from aircraft.identification.flow import motor_of, vane
-from aircraft.identification.held_fixed import HELD_FIXED, NOISE
 from aircraft.identification.level import LEVEL_SD, levelled
 from aircraft.identification.lift import fit_lift
 from aircraft.identification.moments import AXES, MOMENT_THINNING, fit_moments

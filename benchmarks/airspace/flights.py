@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from benchmarks.airspace.scenarios import airspace_scenario, ring_distance
 from flight.mission.from_plan import plan_mission
-from planfly.airframe import load_airframe
-from planfly.make_plan import make_plan
-from planfly.open_flight import make_setup
-from planfly.pipeline import fly_and_judge
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.open_flight import make_setup
+from planfly.workflow.pipeline import fly_and_judge
 from world.scenario import Scenario
 from world.scenario_tables import ZoneTable
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.airspace.scenarios import HALF, SEED, star
-from planfly.airframe import load_airframe
-from planfly.make_plan import make_plan
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.make_plan import make_plan
 from world.scenario import Scenario, from_spec
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.airframe import load_airframe
+from planfly.workflow.airframe import load_airframe
 from world.scenario import Scenario, from_spec
 
 Floats = NDArray[np.float64]

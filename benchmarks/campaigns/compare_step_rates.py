@@ -17,8 +17,8 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
-from planfly.airframe import Airframe, load_airframe
-from planfly.open_flight import make_setup
+from planfly.workflow.airframe import Airframe, load_airframe
+from planfly.workflow.open_flight import make_setup
 from tests.field_missions import FieldMission, close_mission, ordinary_mission
 from world.scenario import Scenario
 from world.wind import Wind

@@ -14,7 +14,7 @@ from scipy.stats import qmc
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary
 from planfly.campaigns.dispersions import QUANTITIES, Dispersions, Draw
 from planfly.campaigns.flight_row import FlightRow
-from planfly.pipeline import fly_and_judge
+from planfly.workflow.pipeline import fly_and_judge
 
 # Flights of a set: a power of two, for which Sobol's points are balanced.
 SOBOL_FLIGHTS = 1024

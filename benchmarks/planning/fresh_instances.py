@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from benchmarks.planning.reference_search import reference_search
 from benchmarks.planning.wild_instances import wild_scenario
 from benchmarks.task import Task
-from planfly.airframe import load_airframe
+from planfly.workflow.airframe import load_airframe
 from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.problem import make_problem
 from planner.plan import Objective

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.planning.fresh_instances import random_task
-from planfly.airframe import load_airframe
+from planfly.workflow.airframe import load_airframe
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import ENCODINGS, Encoding
 from planner.optimisers.hypervolume import covering_order, hypervolume

@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, PerformanceTable, ground_speed_on
 from flight.mission.from_plan import plan_mission
-from planfly.airframe import load_airframe
-from planfly.make_plan import make_plan
-from planfly.open_flight import make_setup
-from planfly.pipeline import fly_and_judge
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.open_flight import make_setup
+from planfly.workflow.pipeline import fly_and_judge
 from planner.evaluation.travel_cost import energy_cost, path_cost, time_cost
 from tests.autopilot_plans import plan_scenario
 from world.scenario import Scenario, from_spec

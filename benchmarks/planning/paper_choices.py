@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.task import exact_airframe
-from planfly.paper import PROBLEMS, STRIP_ACROSS, problem_name
+from planfly.planning.paper import PROBLEMS, STRIP_ACROSS, problem_name
 from planner.evaluation.encoding import Encoding, Space, bearing, cartesian, polar, polar_45, rotated
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem

@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from aircraft.path_limits import Limits
-from planfly.airframe import load_airframe
+from planfly.workflow.airframe import load_airframe
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import make_problem
 from planner.search.plan_path import plan_path

@@ -13,7 +13,7 @@ from aircraft.model_writer import AeroCoefficients, ModelNumbers, model_xml
 from aircraft.propulsion import ActuatorDisc, ShaftPower
 from flight.dynamics.fdm import Fdm
 from flight.guidance.model_gains import gains_of_model, gains_text
-from planfly.data_sheets import arduplane_parameters, performance_of, servo_text
+from planfly.workflow.data_sheets import arduplane_parameters, performance_of, servo_text
 
 # Beard and McLain, first edition, appendix E.1.  The table's drag due to elevator is linear (0.30 a radian) and would
 # propel an aircraft that trims with its elevons up; it is left out, as is the table's drag due to angle of attack,

@@ -12,10 +12,10 @@ from aircraft.model_writer import Layout
 from flight.autopilots.catalog import AUTOPILOTS
 from flight.dynamics.characteristics import Mode, StepResponse, TrimRow, modes_at, step_responses, trim_table
 from flight.dynamics.envelope_tables import load_envelope
-from planfly.first_start import with_warm_up
 from planfly.flight_options import takes_options
-from planfly.stages import stage
-from planfly.targets import expand_path_pattern, prepare_folder, refuse_folder
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
+from planfly.workflow.output_paths import expand_path_pattern, prepare_folder, refuse_folder
 from world.errors import PlanflyError
 from world.files import whole_path, write_whole
 from world.scenario_tables import names_folder
@@ -124,7 +124,7 @@ def new_aircraft(
         raise PlanflyError.of_argument(
             "source", source, f"goes without {next(iter(stated))}: a copy has that aircraft's numbers"
         )
-    from planfly.data_sheets import make_data_sheet_folder, parse_sheet
+    from planfly.workflow.data_sheets import make_data_sheet_folder, parse_sheet
 
     params = given["params"]
     texts = ("battery", "prop", "layout", "params")

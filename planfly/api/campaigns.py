@@ -24,7 +24,6 @@ from planfly.campaigns.statistics.decision import Goal
 from planfly.campaigns.summary import summarise
 from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, read_table
 from planfly.campaigns.worker_pool import Workers, checked_address
-from planfly.first_start import with_warm_up
 from planfly.flight_options import (
     CampaignOptions,
     MissionOptions,
@@ -34,7 +33,8 @@ from planfly.flight_options import (
     takes_options,
 )
 from planfly.kernel_units.unit_kernels import BOTH
-from planfly.stages import stage
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
 from planner.plan import Plan
 from world.errors import PlanflyError
 from world.extras import need_extra, needs_extra

@@ -9,8 +9,8 @@ from platformdirs import user_cache_dir
 
 from flight.mission_files.formats import read_mission
 from planfly.arguments import check_arguments
-from planfly.stages import stage
-from planfly.targets import refuse_existing
+from planfly.runtime.stages import stage
+from planfly.workflow.output_paths import refuse_existing
 from world.errors import ArgumentError, PlanflyError
 from world.remote_files import is_address
 from world.terrain_cut import COPERNICUS, Box, CutTerrain, cut_from_files, cut_from_server

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from aircraft.catalog import find_aircraft
 from planfly.arguments import check_arguments, is_place
-from planfly.stages import stage
-from planfly.targets import refuse_existing
+from planfly.runtime.stages import stage
+from planfly.workflow.output_paths import refuse_existing
 from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, PlanflyError
 from world.files import whole_path, write_whole

@@ -25,15 +25,15 @@ from logs.views.exports.map_files import (
     track_line,
 )
 from planfly.api.flying import FlownMission
-from planfly.first_start import with_warm_up
 from planfly.flight_logs import is_log, loss_text
 from planfly.flight_options import FencePaths, MissionOptions
 from planfly.named_fences import read_named_fences
-from planfly.open_flight import open_flight
 from planfly.plan_fence import fence_of_plan
-from planfly.returns_beside import return_summary
-from planfly.stages import stage
-from planfly.targets import refuse_existing
+from planfly.returns.return_summary import return_summary
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
+from planfly.workflow.open_flight import open_flight
+from planfly.workflow.output_paths import refuse_existing
 from planner.plan import Plan, plan_json
 from world.errors import MissionError, PlanflyError
 from world.extras import need_extra

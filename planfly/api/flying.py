@@ -14,11 +14,7 @@ from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.verdict import Verdict
-from planfly import pipeline
-from planfly.airframe import airframe_of
 from planfly.arguments import check_arguments
-from planfly.crash_safe_log import FlightLimits, flight_kind, flight_text
-from planfly.first_start import with_warm_up
 from planfly.flight_logs import is_log, judge_log, loss_text
 from planfly.flight_options import (
     LOG_OPTIONS,
@@ -33,11 +29,15 @@ from planfly.flight_options import (
 )
 from planfly.kernel_units.unit_kernels import BOTH, FLYING
 from planfly.named_fences import NamedFences, read_named_fences
-from planfly.open_flight import open_flight
-from planfly.pipeline import PlanThenFly, autopilot_log, fly_and_judge
-from planfly.returns_beside import ReturnSummary, returns_line
-from planfly.stages import say_replaced, stage
-from planfly.targets import file_target, refuse_existing
+from planfly.returns.return_summary import ReturnSummary, returns_line
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import say_replaced, stage
+from planfly.workflow import pipeline
+from planfly.workflow.airframe import airframe_of
+from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
+from planfly.workflow.open_flight import open_flight
+from planfly.workflow.output_paths import file_target, refuse_existing
+from planfly.workflow.pipeline import PlanThenFly, autopilot_log, fly_and_judge
 from planner.plan import Plan
 from world.errors import ArgumentError, ScenarioError
 from world.extras import need_extra

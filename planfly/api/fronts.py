@@ -8,15 +8,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Unpack
 
-from planfly.airframe import choose_seed, load_airframe
 from planfly.api.planning import stop_condition
 from planfly.arguments import RANGES, check_arguments
-from planfly.choice_of_ways import make_pareto_plans
-from planfly.first_start import with_warm_up
 from planfly.flight_options import FlightOptions, named_scenario, takes_options
 from planfly.kernel_units.unit_kernels import CHOOSING
-from planfly.stages import stage
-from planfly.targets import RUN_FOLDER, clean_folder, expand_path_pattern
+from planfly.planning.pareto_plans import make_pareto_plans
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
+from planfly.workflow.airframe import choose_seed, load_airframe
+from planfly.workflow.output_paths import RUN_FOLDER, clean_folder, expand_path_pattern
 from planner.plan import plan_json
 from planner.search.plan_front import Front, FrontPlan
 from world.files import write_whole

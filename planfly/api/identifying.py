@@ -13,8 +13,6 @@ from aircraft.identification.estimate import Estimate, estimate_model
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
-from planfly.data_sheets import parse_sheet
-from planfly.first_start import with_warm_up
 from planfly.identification.base_numbers import base_model, scaled
 from planfly.identification.checks import check_estimate
 from planfly.identification.folder import Identified, folder_files, make_identified
@@ -31,7 +29,9 @@ from planfly.identification.records import (
 from planfly.identification.replay import QUANTITIES, UNITS, Replay, replay_log
 from planfly.identification.servos import ServoOutput, read_servos
 from planfly.identification.wide_numbers import WideNumber, wide_numbers
-from planfly.stages import stage
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
+from planfly.workflow.data_sheets import parse_sheet
 from world.errors import FlightError, LogError, PlanflyError
 from world.extras import needs_extra
 from world.files import whole_path, write_folder

@@ -12,12 +12,12 @@ from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
 from logs.views.report.text import left_lines, refly_lines
 from planfly.arguments import check_arguments
-from planfly.first_start import with_warm_up
 from planfly.flight_options import LogOptions, takes_options
-from planfly.imported_flights import ImportedFlight, fly_again, import_flight
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.stages import stage
-from planfly.targets import REFLOWN, REFLY_FILES, clean_folder, refuse_existing, refuse_folder
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
+from planfly.workflow.imported_flights import ImportedFlight, fly_again, import_flight
+from planfly.workflow.output_paths import REFLOWN, REFLY_FILES, clean_folder, refuse_existing, refuse_folder
 from world.errors import LogError, ScenarioError
 from world.files import write_whole
 

@@ -8,14 +8,14 @@ from typing import Unpack
 
 from flight.autopilots.catalog import load_autopilot
 from logs.verdict.conditions import Conditions, conditions_of
-from planfly.airframe import choose_seed, cruise_airspeed, find_airframe, load_airframe
 from planfly.arguments import check_arguments
-from planfly.first_start import with_warm_up
 from planfly.flight_options import PlanOptions, named_scenario, takes_options
 from planfly.kernel_units.unit_kernels import PLANNING
-from planfly.make_plan import make_plan
-from planfly.stages import stage
-from planfly.targets import file_target
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
+from planfly.workflow.airframe import choose_seed, cruise_airspeed, find_airframe, load_airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.output_paths import file_target
 from planner.plan import Plan, plan_json, read_plan
 from planner.search.explain_failure import explain_failure
 from planner.search.replan import same_mission

@@ -12,7 +12,7 @@ from logs.views.replay.timeline import TimelineEntry
 from logs.views.replay.timeline import timeline as list_timeline
 from planfly.api.serving import link_access
 from planfly.arguments import check_arguments
-from planfly.first_start import with_warm_up
+from planfly.runtime.first_start import with_warm_up
 from world.errors import LogError
 from world.extras import needs_extra
 from world.running_clock import RunningClock

@@ -12,12 +12,12 @@ from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.verdict import Verdict
 from logs.views.report.compare import Comparison, compare_logs, write_comparison
 from planfly.api.flying import FlownMission
-from planfly.first_start import with_warm_up
 from planfly.flight_logs import judge_log
-from planfly.open_flight import open_flight
-from planfly.returns_beside import return_summary
-from planfly.stages import stage
-from planfly.targets import COMPARE_FILES, LOG_FIGURES, clean_folder, refuse_existing
+from planfly.returns.return_summary import return_summary
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
+from planfly.workflow.open_flight import open_flight
+from planfly.workflow.output_paths import COMPARE_FILES, LOG_FIGURES, clean_folder, refuse_existing
 from planner.plan import Plan
 from world.files import write_whole
 from world.html_table import html_table

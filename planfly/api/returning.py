@@ -28,27 +28,27 @@ from logs.verdict.returns.returns_text import (
 )
 from logs.verdict.returns.suggest_returns import Remedy, helps, suggest_parameters, suggest_rally
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
-from planfly.airframe import airframe_of
 from planfly.api.flying import FlownMission, named_program, refuse
 from planfly.arguments import check_arguments
-from planfly.crash_safe_log import INTERRUPTED
-from planfly.first_start import with_warm_up
 from planfly.flight_logs import is_log
 from planfly.flight_options import LogOptions, mission_options, options_of_log, takes_options
 from planfly.kernel_units.unit_kernels import FLYING, GLIDING
-from planfly.open_flight import open_flight
-from planfly.pipeline import fly_and_judge
-from planfly.program_returns import ProgramReturns, fly_by_program, refuse_program
-from planfly.return_flights import fly_return
-from planfly.returns_beside import return_starts
-from planfly.stages import stage
-from planfly.targets import RETURN_FILES, clean_folder, refuse_folder
+from planfly.returns.jsbsim_returns import fly_return
+from planfly.returns.return_summary import return_starts
+from planfly.returns.sitl_returns import ProgramReturns, fly_by_program, refuse_program
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
+from planfly.workflow.airframe import airframe_of
+from planfly.workflow.crash_safe_log import INTERRUPTED
+from planfly.workflow.open_flight import open_flight
+from planfly.workflow.output_paths import RETURN_FILES, clean_folder, refuse_folder
+from planfly.workflow.pipeline import fly_and_judge
 from planner.plan import Plan
 from world.files import write_whole
 from world.scenario import over_terrain
 
 if TYPE_CHECKING:
-    from planfly.imported_flights import ImportedFlight
+    from planfly.workflow.imported_flights import ImportedFlight
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,22 +12,22 @@ from flight.mission_files.formats import mission_kind, mission_text
 from logs.recording.setup_attachments import package_versions
 from logs.verdict.judge_flight import judge_plan_only
 from logs.verdict.verdict import Verdict, verdict_json
-from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
 from planfly.api.exporting import judged_parameters
 from planfly.api.flying import named_program
 from planfly.arguments import check_arguments
-from planfly.crash_safe_log import FlightLimits, flight_kind, flight_text
-from planfly.first_start import with_warm_up
 from planfly.flight_options import RunOptions, named_scenario, option_defaults, takes_options
 from planfly.kernel_units.unit_kernels import BOTH, GLIDING
-from planfly.make_plan import make_plan, planned_for
-from planfly.open_flight import make_setup, mission_of_plan
-from planfly.pipeline import autopilot_log, fly_and_judge
-from planfly.reference_flights import FlyReference
-from planfly.refine import refine as refine_rounds
-from planfly.returns_beside import return_summary
-from planfly.stages import say_replaced, stage
-from planfly.targets import RUN_FILES, RUN_FOLDER, expand_path_pattern, prepare_folder, refuse_folder
+from planfly.returns.return_summary import return_summary
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import say_replaced, stage
+from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
+from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
+from planfly.workflow.make_plan import make_plan, planned_for
+from planfly.workflow.open_flight import make_setup, mission_of_plan
+from planfly.workflow.output_paths import RUN_FILES, RUN_FOLDER, expand_path_pattern, prepare_folder, refuse_folder
+from planfly.workflow.pipeline import autopilot_log, fly_and_judge
+from planfly.workflow.reference_flights import FlyReference
+from planfly.workflow.tighten_plan import refine as refine_rounds
 from planner.plan import Plan, plan_json
 from world.files import hold, write_whole
 from world.scenario import Scenario

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from planfly.arguments import check_arguments
-from planfly.first_start import with_warm_up
 from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
+from planfly.runtime.first_start import with_warm_up
 from world.errors import FlightError, PlanflyError
 from world.extras import needs_extra
 
@@ -53,8 +53,8 @@ def serve(
     Raises a `planfly.PlanflyError` for bad input.
     """
     # Imported here: nobody else needs MAVLink.
-    from planfly.served_flights import ServeOptions, open_served
-    from planfly.served_vehicle import serve_vehicle
+    from planfly.live.served_flights import ServeOptions, open_served
+    from planfly.live.served_vehicle import serve_vehicle
 
     access = link_access(to, bind, allow, sign_key)
     check_arguments(served_speed=speed)

@@ -17,19 +17,15 @@ from logs.verdict.measures.route_requirements import RouteRequirements, route_re
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
-from planfly.airframe import airframe_of
 from planfly.api.flying import FlownMission, refuse
 from planfly.arguments import CAMERA, check_arguments, is_camera
-from planfly.crash_safe_log import flight_text
-from planfly.first_start import with_warm_up
 from planfly.flight_logs import is_log
 from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.open_flight import open_flight
-from planfly.pipeline import fly_and_judge
-from planfly.stages import stage
-from planfly.survey_remedies import NearMiss, SurveyRemedy, survey_remedies
-from planfly.survey_text import (
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
+from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, survey_remedies
+from planfly.surveys.survey_text import (
     kept_overlap,
     line_text,
     lines_headline,
@@ -40,7 +36,11 @@ from planfly.survey_text import (
     survey_text,
     usable,
 )
-from planfly.targets import SURVEY_FILES, clean_folder, refuse_folder
+from planfly.workflow.airframe import airframe_of
+from planfly.workflow.crash_safe_log import flight_text
+from planfly.workflow.open_flight import open_flight
+from planfly.workflow.output_paths import SURVEY_FILES, clean_folder, refuse_folder
+from planfly.workflow.pipeline import fly_and_judge
 from world.errors import ArgumentError, LogError, MissionError
 from world.files import write_whole
 from world.scenario import Scenario

@@ -19,13 +19,13 @@ from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
 from logs.verdict.conditions import Conditions, setup_conditions
-from planfly.airframe import Airframe, airframe_of, bank_limit, choose_seed, load_airframe, with_tracking
 from planfly.campaigns.dispersions import DEFAULT, DRAWN, Dispersions, Draw, SpreadError
 from planfly.flight_options import MissionOptions, named_scenario
-from planfly.make_plan import Advance, make_plan
 from planfly.named_fences import NamedFences, read_named_fences
-from planfly.open_flight import make_setup, mission_of_plan, open_flight
-from planfly.pipeline import OffNominal
+from planfly.workflow.airframe import Airframe, airframe_of, bank_limit, choose_seed, load_airframe, with_tracking
+from planfly.workflow.make_plan import Advance, make_plan
+from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
+from planfly.workflow.pipeline import OffNominal
 from planner.plan import Plan, plan_json, read_plan
 from world.errors import FlightError, MissionError
 from world.files import write_whole

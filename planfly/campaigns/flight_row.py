@@ -23,7 +23,7 @@ from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary
 from planfly.campaigns.dispersions import Draw, draw_flight
-from planfly.pipeline import fly_and_judge
+from planfly.workflow.pipeline import fly_and_judge
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]

@@ -40,8 +40,8 @@ from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_b
 from planfly.campaigns.statistics.wind_boundary import needs_more
 from planfly.campaigns.summary import CampaignSummary, campaign_lines, closest_text, log_name, summarise, summary_json
 from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, Store, refuse_held, same_flight
-from planfly.make_plan import Advance
-from planfly.open_flight import make_setup
+from planfly.workflow.make_plan import Advance
+from planfly.workflow.open_flight import make_setup
 from planner.plan import plan_json
 from world.errors import ArgumentError, PlanflyError
 from world.files import write_whole

@@ -24,9 +24,9 @@ from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
 from planfly.campaigns.dispersions import NAMES, Draw
 from planfly.campaigns.flight_row import FIELDS, FlightRow, LeastMargin, NarrowPass, Outcome, failed_of
-from planfly.campaigns.mended_table import HELD, checksum, copy_whole, examine, stored
 from planfly.campaigns.statistics.decision import Tally
-from planfly.stages import say
+from planfly.campaigns.table_repair import HELD, checksum, copy_whole, examine, stored
+from planfly.runtime.stages import say
 from world.errors import PlanflyError
 
 # ----------------------------------------------------------------------

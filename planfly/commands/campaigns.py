@@ -8,12 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import planfly
-from planfly.targets import RESULTS
 from planfly.terminal.arguments import completed, files, mission_or_scenario_words, number
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.terminal.options import call, flown_by_options, result_options, steering_options, world_options
 from planfly.terminal.output import give_answer
+from planfly.workflow.output_paths import RESULTS
 from world.errors import PlanflyError
 from world.interruption import Interrupted
 

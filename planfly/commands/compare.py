@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.targets import COMPARE_FILES
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.options import log_argument, result_options
 from planfly.terminal.output import give_answer
 from planfly.terminal.results import warn_of_loss
+from planfly.workflow.output_paths import COMPARE_FILES
 
 if TYPE_CHECKING:
     from planfly import Comparison

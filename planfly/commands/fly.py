@@ -5,13 +5,13 @@ import shlex
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.targets import RUN_FOLDER
 from planfly.terminal.arguments import MISSIONS, completed, files, number
 from planfly.terminal.command_parser import LineParser, coloured
 from planfly.terminal.exit_codes import verdict_code
 from planfly.terminal.options import call, flight_options, log_rate_option, result_options, world_options
 from planfly.terminal.output import give_answer, give_junit
 from planfly.terminal.results import print_returns, print_verdict, print_warnings
+from planfly.workflow.output_paths import RUN_FOLDER
 
 if TYPE_CHECKING:
     from planfly import FlownMission

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import planfly
 from planfly.arguments import CHOICES
-from planfly.targets import RESULTS
 from planfly.terminal.arguments import number, problems
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import call, result_options
 from planfly.terminal.output import give_answer
+from planfly.workflow.output_paths import RESULTS
 
 
 def paper_options(line: LineParser) -> None:
@@ -38,7 +38,7 @@ def paper(args: argparse.Namespace) -> int:
     """Plan, write and print; 0 whatever the table holds: no path in it is an answer too."""
     folder = Path(args.out) if args.out else RESULTS / "paper"
     made = call(planfly.paper_tables, args, out=folder, overwrite=args.overwrite or args.out is None)
-    from planfly.paper import table_text
+    from planfly.planning.paper import table_text
 
     print(table_text(made.rows))
     print(f"results   {folder}/ (table.csv, runs.csv, runs.json, times.csv, paths-, encodings-, convergence.png)")

@@ -8,13 +8,13 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.targets import RUN_FOLDER, expand_path_pattern
 from planfly.terminal.arguments import budget, completed, files, number, threat
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.options import call, flown_by_options, pilot_options, result_options, scenario_argument
 from planfly.terminal.output import give_answer
 from planfly.terminal.results import print_warnings
+from planfly.workflow.output_paths import RUN_FOLDER, expand_path_pattern
 from world.errors import ScenarioError
 from world.interruption import interrupt
 

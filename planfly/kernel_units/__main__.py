@@ -11,7 +11,7 @@ import signal
 import sys
 import threading
 
-from planfly.process_setup import prepare_process, with_large_stack
+from planfly.runtime.process_setup import prepare_process, with_large_stack
 
 
 def answer_requests() -> int:

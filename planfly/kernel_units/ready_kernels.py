@@ -17,11 +17,11 @@ from flight.dynamics.envelope_tables import load_envelope
 from flight.mission_files.formats import parse_mission
 from flight.simulation.setup import make_limits
 from logs.recording.recorder import Recorder
-from planfly.airframe import Airframe, find_airframe, load_airframe
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
-from planfly.open_flight import make_setup
-from planfly.pipeline import fly_and_judge
-from planfly.returns_beside import return_summary, returns_line
+from planfly.returns.return_summary import return_summary, returns_line
+from planfly.workflow.airframe import Airframe, find_airframe, load_airframe
+from planfly.workflow.open_flight import make_setup
+from planfly.workflow.pipeline import fly_and_judge
 from planner.evaluation.problem import make_problem
 from planner.search.kernel_calls import FEW, FRONT, PARTS, call_kernels
 from planner.search.search_state import SCORE_COLUMNS, best_first

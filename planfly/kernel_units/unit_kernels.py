@@ -85,7 +85,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "aircraft.tracking.density_factor",
         "flight.autopilots.arduplane.law.arduplane_tick",
         "flight.autopilots.arduplane.navigator.turn_distance",
-        "flight.autopilots.arduplane.swift_return.fly_stages",
+        "flight.autopilots.arduplane.rtl_point_mass.fly_stages",
         "flight.autopilots.planfly.law.planfly_tick",
         "flight.guidance.equivalent_airspeed.true_by_equivalent",
         "flight.guidance.path.profile",
@@ -107,7 +107,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     "glides": (
         *_WORLD,
         "aircraft.envelope.ground_speed",
-        "flight.autopilots.arduplane.swift_return.fly_stages",
+        "flight.autopilots.arduplane.rtl_point_mass.fly_stages",
         _GLIDES + "glide_map._fill_slopes",
         _GLIDES + "glide_map._search",
         _GLIDES + "glide_reach._look_ahead",

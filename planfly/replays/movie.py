@@ -16,8 +16,8 @@ from PIL import Image, ImageColor
 from logs.recording.reader import FlightLog
 from logs.theme import drawn_colours
 from logs.views.replay.movie_frames import RATE, MovieFrames
-from planfly.stages import stage
-from planfly.targets import refuse_existing, refuse_folder
+from planfly.runtime.stages import stage
+from planfly.workflow.output_paths import refuse_existing, refuse_folder
 from world.errors import PlanflyError
 from world.extras import need_extra
 from world.files import temporary_folder, write_whole

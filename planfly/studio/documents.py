@@ -18,13 +18,13 @@ from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chun
 from logs.recording.reader import read_log
 from logs.recording.setup_attachments import PLAN_FILE, SCENARIO_FILE
 from logs.views.exports.map_files import kml_text, map_zones, plan_line
-from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.api.imported import read_imported
 from planfly.flight_logs import MCAP_MAGIC, is_log
 from planfly.flight_options import LogOptions, MissionOptions, apply_options, named_scenario
-from planfly.imported_flights import ImportedFlight
-from planfly.open_flight import make_setup, mission_of_plan, open_flight
-from planfly.studio.desk import EditContext, Judged
+from planfly.studio.edit_context import EditContext, Judged
+from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
+from planfly.workflow.imported_flights import ImportedFlight
+from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
 from planner.evaluation.certify import certify
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem

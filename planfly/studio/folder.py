@@ -4,7 +4,7 @@ from pathlib import Path
 
 from planfly.studio.documents import DROPPED
 from planfly.studio.settings import PARAMETER_FILES
-from planfly.studio.sheet import Json
+from planfly.studio.view_model import Json
 from world.errors import MissionError
 
 # Greatest number of files that are listed.

@@ -12,8 +12,8 @@ from planfly.studio import messages
 from planfly.studio.changes import Figures, changes
 from planfly.studio.pilot import Answer, Pilot, Work
 from planfly.studio.session import Session
-from planfly.studio.sheet import Json, rounded
-from planfly.studio.works import PlanAsked
+from planfly.studio.view_model import Json, rounded
+from planfly.studio.worker_tasks import PlanAsked
 from planner.search.algorithms import ALGORITHMS
 from planner.search.plan_front import FrontPlan
 from world.errors import MissionError, PlanflyError
@@ -60,7 +60,7 @@ class Jobs:
             self._send_work(
                 LONG,
                 "plan",
-                "planfly.studio.works.plan",
+                "planfly.studio.worker_tasks.plan",
                 self._plan_request(messages.Plan(kind="plan"), session),
                 session.rev,
             )
@@ -100,20 +100,22 @@ class Jobs:
         """Fly the present mission; a flight under way is cancelled."""
         if session.document.to_plan and not session.is_changed:
             return
-        self._send_work(PILOT, "fly", "planfly.studio.works.fly", (session.desk, session.mission), session.rev)
+        self._send_work(PILOT, "fly", "planfly.studio.worker_tasks.fly", (session.desk, session.mission), session.rev)
 
     def plan(self, message: messages.Plan, session: Session) -> None:
         """Plan one or several paths.  Raises PlanflyError for places between which nothing is planned."""
         asked = self._plan_request(message, session)
         self._at_once = False
-        self._send_work(LONG, "plan", "planfly.studio.works.plan", asked, session.rev)
+        self._send_work(LONG, "plan", "planfly.studio.worker_tasks.plan", asked, session.rev)
 
     def ask(self, kind: str, session: Session) -> None:
         """Fly, or begin a long task."""
         if kind == "fly":
             self.fly(session)
             return
-        self._send_work(LONG, kind, f"planfly.studio.long_works.{kind}", (session.desk, session.mission), session.rev)
+        self._send_work(
+            LONG, kind, f"planfly.studio.long_worker_tasks.{kind}", (session.desk, session.mission), session.rev
+        )
 
     def stop(self) -> None:
         """Cancel all tasks under way."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flight.mission.items import AMSL, OVER_HOME, OVER_TERRAIN, PLACES, Command, Mission, MissionItem
 from flight.mission.placing import HIGHEST, LOWEST
 from flight.mission.route import Route, fly_over_waypoints
-from planfly.airframe import Airframe
+from planfly.workflow.airframe import Airframe
 from world.frames import to_map
 from world.scenario import Scenario
 from world.scenario_tables import MAP_EXTENT

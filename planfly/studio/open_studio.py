@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from planfly.arguments import check_arguments
-from planfly.first_start import with_warm_up
 from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import BOTH
+from planfly.runtime.first_start import with_warm_up
 from planfly.studio.session import open_session
 from world.errors import PlanflyError
 from world.extras import needs_extra

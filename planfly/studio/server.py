@@ -32,7 +32,7 @@ from planfly.studio.messages import read_message
 from planfly.studio.pilot import INTERNAL, Answer, Work, internal_text
 from planfly.studio.session import Session, StaleEdit
 from planfly.studio.settings import PARAMETER_FILES
-from planfly.studio.sheet import Json
+from planfly.studio.view_model import Json
 from world.errors import MissionError, PlanflyError
 from world.files import read_small_file, utf8_text
 

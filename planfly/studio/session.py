@@ -13,15 +13,15 @@ from flight.mission.items import LANDINGS, Mission
 from planfly.flight_options import MissionOptions
 from planfly.named_fences import read_named_fences
 from planfly.studio import edits
-from planfly.studio.applied import apply_suggestion
-from planfly.studio.desk import EditContext, Judged
+from planfly.studio.apply_suggestion import apply_suggestion
+from planfly.studio.autosave import kept_beside, kept_text, read_kept
 from planfly.studio.documents import Document, Saved, open_document, planned_mission, save_document
+from planfly.studio.edit_context import EditContext, Judged
 from planfly.studio.history import History
-from planfly.studio.kept import kept_beside, kept_text, read_kept
+from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, Raise, Settings
 from planfly.studio.settings import changed_parameters, changed_world, settings_json
-from planfly.studio.sheet import Json, sheet_json, window_json, world_json
-from planfly.studio.windows import judge_windows
+from planfly.studio.view_model import Json, sheet_json, window_json, world_json
 from planner.plan import Plan
 from world.errors import MissionError, PlanflyError
 from world.files import write_whole

@@ -11,9 +11,9 @@ import numpy as np
 from flight.autopilots.autopilot import Parameters
 from flight.autopilots.catalog import load_autopilot
 from flight.autopilots.parameter_files import parameters_text, parse_parameters
-from planfly.airframe import Airframe, find_airframe, load_airframe
 from planfly.flight_options import FlightOptions, apply_options
 from planfly.studio.messages import LIMITS, Settings
+from planfly.workflow.airframe import Airframe, find_airframe, load_airframe
 from world.errors import PlanflyError
 from world.files import did_you_mean, temporary_folder
 from world.scenario import Scenario, from_spec, with_flight

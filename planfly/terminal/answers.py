@@ -413,7 +413,7 @@ class PaperRow:
 class PaperAnswer:
     """planfly paper: the table."""
 
-    schema: Literal["planfly.paper-answer/1"] = "planfly.paper-answer/1"
+    schema: Literal["planfly.planning.paper-answer/1"] = "planfly.planning.paper-answer/1"
     exit_code: int
     folder: str
     rows: list[PaperRow]

@@ -16,8 +16,8 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TextIO
 
-from planfly.stages import Advance, Receiver, received_by
-from planfly.targets import refuse_existing
+from planfly.runtime.stages import Advance, Receiver, received_by
+from planfly.workflow.output_paths import refuse_existing
 from world.errors import PlanflyError
 from world.files import read_at_most, write_whole
 
@@ -247,7 +247,7 @@ def _duration(seconds: float) -> str:
 def progress(title: str, kind: str = "") -> Iterator[Advance]:
     """Show a stage of work; the work reports how much of how much is done, and a remark.
 
-    kind: see `planfly.stages.stage`.
+    kind: see `planfly.runtime.stages.stage`.
     Beside the remark stands how long it will still take, where the remark does not say; at first, what such a stage
     took the last time on this machine, or that there is no estimate.  A total of 0 is one that nobody knows.
     """

@@ -9,7 +9,7 @@ from flight.mission.surveys import PhotoLine
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
-from planfly.survey_remedies import NearMiss, SurveyRemedy
+from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy
 from planfly.terminal.verdict_answers import STRICT
 
 

@@ -256,7 +256,7 @@ def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
     The paper counts points, six per leg, and has no zones; a path could pass through a zone between two points, so
     pieces are tested along their full length.
 
-    >>> from planfly.airframe import load_airframe
+    >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario
     >>> from world.scenario import with_zones

@@ -67,7 +67,7 @@ def make_travel_cost(objective: Objective, envelope: Envelope, table: Performanc
 
     Returns None for energy if the aircraft's power is unknown.
 
-    >>> from planfly.airframe import load_airframe
+    >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
     >>> limits = load_airframe(load_scenario("tight")).limits
     >>> make_travel_cost("time", limits.envelope, limits.performance()).time
@@ -224,7 +224,7 @@ def leg_cost(
 def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> float:  # pragma: no cover - compiled
     """Return the cost of a path (w, 3) world m, the sum over its legs; inf if a leg cannot be held.
 
-    >>> from planfly.airframe import load_airframe
+    >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
     >>> table = load_airframe(load_scenario("tight")).limits.performance()
     >>> path_cost(LENGTH, table, np.array([[0.0, 0.0, 9.0], [30.0, 0.0, 9.0], [30.0, 40.0, 9.0]]))

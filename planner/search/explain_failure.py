@@ -3,7 +3,7 @@
 `explain_failure` collects lines for the user. It searches for lines across the map where ground and clearance reach the
 ceiling, or missiles cover the remaining heights; for zones that separate the start from the destination on a coarse
 grid (connected components); for vertical bands that the required margins close; and for missiles that leave no path, as
-`planner.search.closed_ways` proves.
+`planner.search.infeasibility_proof` proves.
 """
 
 import itertools
@@ -20,7 +20,7 @@ from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import Problem, make_problem
 from planner.plan import Plan, Violation
 from planner.search.algorithms import ALGORITHMS, limits_for
-from planner.search.closed_ways import closing_missiles, highest_level_flight
+from planner.search.infeasibility_proof import closing_missiles, highest_level_flight
 from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
 from world.kernels import compiled
 from world.scenario import Scenario
@@ -151,7 +151,7 @@ def _close_cells(
 def closed_bands(problem: Problem) -> list[str]:
     """Return a line for each vertical band of the limits or of an inclusion that the required margins close.
 
-    >>> from planfly.airframe import load_airframe
+    >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
@@ -187,7 +187,7 @@ def closed_bands(problem: Problem) -> list[str]:
 def max_altitude(problem: Problem) -> tuple[float, str]:
     """Return the highest altitude of a plan, m AMSL, and the limit that sets it: the ceiling or an inclusion's ceiling.
 
-    >>> from planfly.airframe import load_airframe
+    >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")

@@ -21,7 +21,7 @@ def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
     The waypoints with the smallest detours are removed first. Distances to missiles stay at the distance that plans
     keep, or at the plan's own distance if that is smaller.
 
-    >>> from planfly.airframe import load_airframe
+    >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")

@@ -53,7 +53,7 @@ class _Task(NamedTuple):
 def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
     """Call the kernels of one part of planning, one of `PARTS` or `FRONT`, on a scenario that should be small.
 
-    >>> from planfly.airframe import load_airframe
+    >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
     >>> call_kernels("paper", scenario, load_airframe(scenario).limits)

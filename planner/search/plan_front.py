@@ -156,7 +156,7 @@ def plan_front(
     finish: completes a plan, for example with departure and approach; only plans that are safe afterwards are taken.
     The same scenario, limits, count and seed give the same front.
 
-    >>> from planfly.airframe import load_airframe
+    >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
     >>> front = plan_front(scenario, load_airframe(scenario).limits, 4, seed=1, generations=5)

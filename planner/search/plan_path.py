@@ -18,8 +18,8 @@ from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, make_problem
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
-from planner.search.closed_ways import is_closed
 from planner.search.generations import may_try_again, path_generations, waypoint_generations
+from planner.search.infeasibility_proof import is_closed
 from planner.search.search_cheapest import search_cheapest, wanted_cost
 from planner.search.search_state import (
     Archive,
@@ -80,7 +80,7 @@ def plan_path(
 ) -> Plan:
     """Plan a path. The same scenario, limits, algorithm and seed give the same plan.
 
-    >>> from planfly.airframe import load_airframe
+    >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
     >>> plan = plan_path(scenario, load_airframe(scenario).limits, seed=1)

@@ -51,7 +51,7 @@ def replan(
 
     settle: completes the path ahead in a scenario that begins with it, before the flown legs are prepended.
 
-    >>> from planfly.airframe import load_airframe
+    >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
     >>> from world.scenario import with_threats
     >>> scenario = load_scenario("hard-07")
@@ -96,7 +96,7 @@ def replan(
 def same_mission(scenario: Scenario, old: Plan) -> None:
     """Raise MissionError if the ends of a plan differ from the scenario's ends.
 
-    >>> from planfly.airframe import load_airframe
+    >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
     >>> plan = plan_path(scenario, load_airframe(scenario).limits, seed=1)

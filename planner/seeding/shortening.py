@@ -216,7 +216,7 @@ def shorten_path(
     milliseconds of work; an exception raised there stops it. Zones and the maximum height above ground are ignored.
     corners_too: True if corners as flown are held clear of the ground and below the steepest slopes, which is slower.
 
-    >>> from planfly.airframe import load_airframe
+    >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")

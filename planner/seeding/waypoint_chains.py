@@ -252,7 +252,7 @@ def _corner_cost(
 def free_points(data: ProblemArrays, points: Floats) -> Flags:  # pragma: no cover - compiled
     """Return True for points (n, 3), world m, on the map, above the clearance and outside all kill spheres.
 
-    >>> from planfly.airframe import load_airframe
+    >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")

@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.peers import Found, solve_with_cmaes, solve_with_ompl
 from benchmarks.planning.smooth_search import smooth_search
 from benchmarks.task import PROBLEMS, Task, is_safe, make_task, with_planner
-from planfly.make_plan import make_plan
+from planfly.workflow.make_plan import make_plan
 from planner.plan import Objective
 
 FILE = Path(__file__).with_name("best_known.json")

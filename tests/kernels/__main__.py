@@ -15,10 +15,10 @@ import tempfile
 from pathlib import Path
 
 from planfly.campaigns.flight_requests import code_hash
-from planfly.first_start import compile_units
 from planfly.kernel_units.ready_kernels import MISSION
 from planfly.kernel_units.unit_kernels import BOTH, GLIDING
-from planfly.process_setup import prepare_process, with_large_stack
+from planfly.runtime.first_start import compile_units
+from planfly.runtime.process_setup import prepare_process, with_large_stack
 from planner.search.kernel_calls import FRONT
 from world.kernel_cache import PACKAGES
 from world.kernels import cache_folder

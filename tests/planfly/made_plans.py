@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from planfly.cli import main
-from planfly.paper import SeededPlan
+from planfly.planning.paper import SeededPlan
 from tests.logs.blank_pictures import draw_nothing
 from tests.shared import made_once
 

@@ -28,14 +28,14 @@ from flight.live.flight_process import (
 from logs.views import drawing
 from planfly.cli import main
 from planfly.commands.registry import build_parser
-from planfly.served_flights import ServedFlights, ServeOptions
+from planfly.live.served_flights import ServedFlights, ServeOptions
 from tests.planfly.conftest import FIELD
 from tests.setups import waypoint_mission
 from tests.world.made.elevation_files import from_origin, write_raster
 from world.scenario import load_scenario
 
 STAGES = (
-    "planfly.airframe:load_airframe",
+    "planfly.workflow.airframe:load_airframe",
     "flight.dynamics.envelope_tables:load_envelope",
     "flight.simulation.setup:make_limits",
     "planner.search.plan_path:plan_path",
@@ -43,7 +43,7 @@ STAGES = (
     "flight.mission.itinerary:make_itinerary",
     "flight.mission.placing:place_stops",
     "flight.mission.route:lay_route",
-    "planfly.open_flight:make_setup",
+    "planfly.workflow.open_flight:make_setup",
     "flight.guidance.path:fly_by_path",
     "flight.simulation.local_map:LocalMap.around",
     "flight.simulation.simulate:simulate",

@@ -11,10 +11,10 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.verdict import Verdict
-from planfly.airframe import load_airframe
 from planfly.cli import main
-from planfly.open_flight import make_setup
-from planfly.pipeline import fly_and_judge
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.open_flight import make_setup
+from planfly.workflow.pipeline import fly_and_judge
 from tests.mission_lines import ORIGIN, mission, wp
 from tests.setups import spec_around
 from tests.soak import some

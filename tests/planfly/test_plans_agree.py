@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import planfly
-from planfly import choice_of_ways
-from planfly.airframe import load_airframe
-from planfly.gust_circles import MAX_EXPECTED_ORBITS, expected_circles, waypoints_in_gusts
-from planfly.make_plan import make_plan
-from planfly.studio import works
+from planfly.planning import pareto_plans as choice_of_ways
+from planfly.planning.gust_orbits import MAX_EXPECTED_ORBITS, expected_circles, waypoints_in_gusts
+from planfly.studio import worker_tasks as works
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.make_plan import make_plan
 from planner.plan import Plan
-from tests.planfly.test_gust_circles import SEED, scenario_of
+from tests.planfly.planning.test_gust_orbits import SEED, scenario_of
 from world.scenario import Scenario
 
 # Beside the destination at 8,000 m: the way to it stays 150 m outside, and a circle of PX4's about it does not.

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from planfly import first_start
-from planfly.first_start import compile_units
+from planfly.runtime import first_start
+from planfly.runtime.first_start import compile_units
 
 # Speaks as `planfly.kernel_units` does; a unit's name says what it does.
 HELPER = """

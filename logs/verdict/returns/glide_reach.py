@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.law import stall_bank
 from flight.autopilots.arduplane.point_mass import PointMass, excess_power
-from flight.autopilots.arduplane.swift_return import ENGINE_FAILURE_REACTION_S, ReturnEnvironment
+from flight.autopilots.arduplane.rtl_point_mass import ENGINE_FAILURE_REACTION_S, ReturnEnvironment
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from logs.verdict.returns.glide_map import GlideMap, Needs, steps
 from world.geometry import wrap
@@ -42,7 +42,7 @@ def heights_left(
 ) -> tuple[Floats, Codes]:
     """Return each start's altitude (n,) above the least from which a place is reached, m, and that place.
 
-    starts: (n,) of `flight.autopilots.arduplane.swift_return.RETURN_START`.  airspeed: of the glide, equivalent, m/s.
+    starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.  airspeed: of the glide, equivalent, m/s.
     bank: of the turn, rad; limited to the bank that the airspeed allows.  The altitude left is negative if the place is
     out of reach, -inf if no path leads there.  The place is a cell of the map, numbered through all rows, as in
     `logs.verdict.returns.glide_map.Needs`.

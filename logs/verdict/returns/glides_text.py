@@ -2,7 +2,7 @@
 
 import math
 
-from flight.autopilots.arduplane.swift_return import ENGINE_FAILURE_REACTION_S
+from flight.autopilots.arduplane.rtl_point_mass import ENGINE_FAILURE_REACTION_S
 from logs.verdict.returns.judge_glides import MARGIN, REACHES, Glide, GlideRange, Glides, GlideSite, NotJudged, Reach
 
 _NOT_JUDGED_TEXTS: dict[NotJudged, str] = {

@@ -1,7 +1,7 @@
 """Judge what is in reach after an engine failure: by ArduPlane's own return, and by the best path.
 
 ArduPlane does not know that its engine has stopped: its return to launch is simulated without thrust by its control law
-(`flight.autopilots.arduplane.swift_return`), straight at its target and onto its slope.  What can be reached at all
+(`flight.autopilots.arduplane.rtl_point_mass`), straight at its target and onto its slope.  What can be reached at all
 is found by backward searches from home, the rally points and the landing places of the mission, and from all ground
 that is flat by the elevation file (`logs.verdict.returns.glide_map`).  Both keep `MARGIN` above ground on the whole
 path, and stay out of kill spheres.
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.swift_return import RETURN_ARRIVED, RETURN_GROUND_IMPACT, fly_returns
+from flight.autopilots.arduplane.rtl_point_mass import RETURN_ARRIVED, RETURN_GROUND_IMPACT, fly_returns
 from flight.mission.placing import landing_places
 from flight.mission.return_path import ReturnCircle, ReturnTarget
 from logs.verdict.returns.glide_footprint import GlideFootprint

@@ -2,7 +2,7 @@
 
 If RTL_AUTOLAND, or a battery failsafe, leads to a landing sequence of the mission, the path to it is judged.
 
-A return is simulated with a point mass (`flight.autopilots.arduplane.swift_return`), in the mean wind.  Returns whose
+A return is simulated with a point mass (`flight.autopilots.arduplane.rtl_point_mass`), in the mean wind.  Returns whose
 simulation could be wrong are flown again in JSBSim if the caller provides that.  The result replaces the point mass for
 the return that was flown again, and if it is worse, for all similar returns.
 """
@@ -21,7 +21,7 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.failsafes import Cause, failsafe_causes
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.point_mass import PointMass, point_mass
-from flight.autopilots.arduplane.swift_return import (
+from flight.autopilots.arduplane.rtl_point_mass import (
     RETURN_ARRIVED,
     RETURN_GROUND_IMPACT,
     RETURN_OFF_TERRAIN,
@@ -487,7 +487,7 @@ def fly_home(
 
     The paths are returned if there are zones.
 
-    least: as in `flight.autopilots.arduplane.swift_return.fly_returns`.  keep: True to return all paths.
+    least: as in `flight.autopilots.arduplane.rtl_point_mass.fly_returns`.  keep: True to return all paths.
     """
     radius = ArduPlane(world.parameters).return_rules.radius
     circles = [None if end.straight else ReturnCircle(*end.position, radius, end.slope_base) for end in ends]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, ground_speed
-from flight.autopilots.arduplane.swift_return import RETURN_START
+from flight.autopilots.arduplane.rtl_point_mass import RETURN_START
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track
 from logs.verdict.measures.flown_phases import by_the_ground
@@ -27,7 +27,7 @@ SINKING = 10.0
 class ReturnStarts:
     """Places where returns begin.
 
-    time: (n,) s.  rows: (n,) of `flight.autopilots.arduplane.swift_return.RETURN_START`.
+    time: (n,) s.  rows: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
     used: (n,) energy used until then, Wh; NaN if unknown.
     flown: True for a flown track, False for the planned path.
     low: (n,) True for a place in a flown take-off or landing that is lower above ground than the required clearance

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.parameters import CLIMB_BEFORE_TURN
-from flight.autopilots.arduplane.swift_return import RETURN_ARRIVED
+from flight.autopilots.arduplane.rtl_point_mass import RETURN_ARRIVED
 from flight.mission.return_path import ReturnPlace, ReturnTarget
 from logs.verdict.returns.judge_returns import (
     KINDS,

@@ -2,7 +2,7 @@
 
 A go-around is no item of the mission: it can be commanded anywhere on the glide.  So it is simulated from several
 places of the glide that the autopilot lays out, by ArduPlane's law on a point mass
-(`flight.autopilots.arduplane.swift_go_around`), back to the last place before the glide, and judged as flown.  A
+(`flight.autopilots.arduplane.go_around_point_mass`), back to the last place before the glide, and judged as flown.  A
 go-around that never gets there fails, and one whose path is not fully known is undecided.  It climbs on the landing
 course to a height above home, whatever the altitude of the field, and only then turns: from a field higher than home it
 may turn into a hill at once.
@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.autopilots.arduplane.swift_go_around import aborted_at, climb_rows, fly_go_arounds
-from flight.autopilots.arduplane.swift_return import RETURN_GROUND_IMPACT, RETURN_OFF_TERRAIN, RETURN_TIMEOUT
+from flight.autopilots.arduplane.go_around_point_mass import aborted_at, climb_rows, fly_go_arounds
+from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT, RETURN_OFF_TERRAIN, RETURN_TIMEOUT
 from flight.autopilots.autopilot import LandingGlide
 from flight.mission.ground_ways import climb_pitch
 from flight.mission.items import Command, MissionItem, command_name
@@ -301,7 +301,7 @@ def _judge_go_around(
 ) -> _Aborted:
     """Judge a simulated go-around.
 
-    flown: of `flight.autopilots.arduplane.swift_return.RETURN_RESULT`.  positions: (n, 3) m, a second apart.
+    flown: of `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.  positions: (n, 3) m, a second apart.
     goal: its destination.  top: altitude above which its climb is over, m AMSL.
     """
     rows, ended = climb_rows(positions, top), int(flown["ended"])

@@ -4,9 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from logs.importers.raw_log import RawLog, example_raw_log
-from planfly import imported_flights
 from planfly.flight_options import LogOptions
-from planfly.imported_flights import ImportedFlight
+from planfly.workflow import imported_flights
+from planfly.workflow.imported_flights import ImportedFlight
 
 
 def judged(

@@ -7,9 +7,9 @@ import pytest
 from benchmarks.chain import in_child, long_flight, recording
 from flight.mission.from_plan import plan_mission
 from logs.recording.reader import read_log
-from planfly.airframe import load_airframe
-from planfly.make_plan import make_plan
-from planfly.open_flight import make_setup
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.open_flight import make_setup
 from tests.soak import SOAK
 from world.scenario import load_scenario
 

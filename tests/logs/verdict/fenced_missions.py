@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
 from flight.simulation.setup import FlightSetup
-from planfly.airframe import load_airframe
-from planfly.open_flight import make_setup
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.open_flight import make_setup
 from tests.setups import spec_around
 from tests.synthetic import bank_radius
 from world.frames import GeoOrigin, to_geo

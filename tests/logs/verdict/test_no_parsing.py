@@ -19,7 +19,7 @@ from logs.verdict.verdict import Verdict, verdict_json
 from logs.views.failures import failures
 from logs.views.report.text import badge_of, rule_rows
 from logs.views.turns import place_values
-from planfly.refine import tighten_limits
+from planfly.workflow.tighten_plan import tighten_limits
 from tests.mission_lines import setup_of, wp
 from tests.synthetic import bump, edited, fly_path, make_setup
 

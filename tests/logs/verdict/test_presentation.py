@@ -9,7 +9,7 @@ from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules.registry import RULES
 from logs.verdict.verdict import Verdict
 from logs.views.report.text import failed_groups, rule_rows
-from planfly.studio.sheet import findings_json
+from planfly.studio.view_model import findings_json
 from planfly.terminal.verdict_lines import verdict_lines
 
 

@@ -19,7 +19,7 @@ from planfly.campaigns.statistics.decision import Estimate, Goal
 from planfly.campaigns.statistics.wind_boundary import Direction
 from planfly.campaigns.tables import DATABASE, AskedFlight, Store, WindsStore
 from planfly.campaigns.worker_pool import Workers
-from planfly.stages import Advance
+from planfly.runtime.stages import Advance
 from tests.planfly.campaigns.made_campaigns import all_fly, short_base, table, write_short
 from tests.planfly.campaigns.statistics.made_directions import no_numbers
 from tests.planfly.conftest import FIELD

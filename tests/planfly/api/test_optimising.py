@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import planfly
-from planfly.airframe import load_airframe
 from planfly.api.optimising import Model
+from planfly.workflow.airframe import load_airframe
 from planner.plan import Violation
 from planner.search import generations as generations_module
 from planner.search.plan_path import plan_path

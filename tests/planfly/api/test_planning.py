@@ -9,9 +9,9 @@ import pytest
 
 import planfly
 from aircraft.catalog import aircraft_names, load_aircraft
-from planfly.airframe import load_airframe
 from planfly.cli import main
 from planfly.flight_options import FlightOptions, apply_options, named_scenario
+from planfly.workflow.airframe import load_airframe
 from planner.plan import plan_json, read_plan
 from planner.search.plan_path import plan_path
 from tests.planfly.conftest import FIELD

@@ -19,8 +19,8 @@ from planfly.campaigns.dispersions import (
     parse_dispersions,
     read_dispersions,
 )
-from planfly.data_sheets import make_data_sheet_folder
-from planfly.open_flight import open_flight
+from planfly.workflow.data_sheets import make_data_sheet_folder
+from planfly.workflow.open_flight import open_flight
 from tests.planfly.campaigns.made_campaigns import write_short
 from world.errors import MissionError
 

@@ -12,7 +12,6 @@ from flight.simulation.track import TRACK_ROW, as_track
 from logs.verdict.findings import GROUND_WAY, UNKNOWN_AIRCRAFT, Finding, make_finding
 from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
-from planfly.airframe import airframe_of
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import parse_dispersions
 from planfly.campaigns.flight_row import (
@@ -27,8 +26,9 @@ from planfly.campaigns.flight_row import (
     waypoint_crossings,
 )
 from planfly.campaigns.tables import same_flight
-from planfly.open_flight import open_flight
-from planfly.pipeline import fly_and_judge
+from planfly.workflow.airframe import airframe_of
+from planfly.workflow.open_flight import open_flight
+from planfly.workflow.pipeline import fly_and_judge
 from tests.planfly.campaigns.made_campaigns import write_short
 from tests.setups import route_along
 from tests.synthetic import fly_path, make_setup

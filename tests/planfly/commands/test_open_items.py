@@ -19,9 +19,9 @@ from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.mission.items import Mission
 from logs.verdict.judge_geometry import judge_geometry
-from planfly.airframe import load_airframe
 from planfly.cli import main
-from planfly.open_flight import make_setup
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.open_flight import make_setup
 from tests.mission_lines import mission, wp
 from world.scenario import from_spec
 

@@ -10,8 +10,8 @@ import pytest
 from logs.views import drawing
 from logs.views.drawing import write_png
 from planfly.cli import main
-from planfly.paper import file_names
-from planfly.targets import prepare_folder
+from planfly.planning.paper import file_names
+from planfly.workflow.output_paths import prepare_folder
 from tests.soak import SOAK
 
 ROWS = ["umda", "umda-strip", "umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing"]

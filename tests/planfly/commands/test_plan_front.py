@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from planfly import choice_of_ways
 from planfly.cli import main
+from planfly.planning import pareto_plans as choice_of_ways
 from planner.plan import read_plan
 from tests.soak import SOAK
 

@@ -10,9 +10,10 @@ import pytest
 import planfly
 from logs.verdict.returns.judge_returns import badness, judge_returns, return_world
 from logs.verdict.returns.return_starts import planned_starts
-from planfly import program_returns, return_flights
 from planfly.cli import main
-from planfly.program_returns import ProgramReturn, ProgramReturns, worst_apart
+from planfly.returns import jsbsim_returns as return_flights
+from planfly.returns import sitl_returns as program_returns
+from planfly.returns.sitl_returns import ProgramReturn, ProgramReturns, worst_apart
 from tests.autopilots import need_arduplane, shorten_run_in, write_fake, write_fake_px4
 from tests.logs.verdict.returns.hill import SCENARIO, hill_setup, mission_text
 from tests.soak import SOAK

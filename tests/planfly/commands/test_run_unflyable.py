@@ -6,10 +6,10 @@ import pytest
 
 from flight.mission.from_plan import plan_mission
 from logs.verdict.verdict import Verdict
-from planfly.airframe import Airframe, load_airframe
-from planfly.make_plan import make_plan
-from planfly.open_flight import make_setup
-from planfly.pipeline import fly_and_judge
+from planfly.workflow.airframe import Airframe, load_airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.open_flight import make_setup
+from planfly.workflow.pipeline import fly_and_judge
 from planner.plan import Plan
 from world.scenario import load_scenario
 

@@ -19,8 +19,8 @@ from flight.live.station_requests import FORCE
 from flight.live.telemetry import MODE_NAMES
 from flight.simulation.simulate import Flight, fly_to_end
 from logs.recording.reader import read_log
-from planfly.airframe import load_airframe
 from planfly.cli import main
+from planfly.workflow.airframe import load_airframe
 from tests.planfly.conftest import FIELD, Served
 from tests.planfly.misuse.test_listeners import listening, table
 from tests.soak import SOAK, scaled, tally, widen

@@ -10,11 +10,11 @@ import pytest
 import planfly
 from flight.simulation.setup import FlightSetup
 from logs.verdict.verdict import Verdict
-from planfly import survey_remedies
-from planfly.airframe import Airframe
 from planfly.api import surveying
 from planfly.cli import main
-from planfly.survey_remedies import SurveyRemedy, TriedRemedies
+from planfly.surveys import survey_remedies
+from planfly.surveys.survey_remedies import SurveyRemedy, TriedRemedies
+from planfly.workflow.airframe import Airframe
 from tests.soak import SOAK
 
 FIELD_SURVEY = Path(__file__).with_name("field.waypoints")

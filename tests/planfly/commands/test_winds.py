@@ -18,7 +18,7 @@ from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_winds import WindsGoal
 from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, WindsStore
 from planfly.cli import main
-from planfly.data_sheets import make_data_sheet_folder
+from planfly.workflow.data_sheets import make_data_sheet_folder
 from tests.planfly.campaigns.made_campaigns import made_flight, table, write_short
 from tests.planfly.terminal.answers.checked_answers import answered
 from world.interruption import Interrupted

@@ -11,7 +11,7 @@ from flight.mission_files.formats import read_mission
 from flight.mission_files.qgc_plan import parse_plan_file
 from flight.mission_files.wpl import HEADER, parse_waypoints
 from logs.recording.reader import read_log
-from planfly.airframe import load_airframe
+from planfly.workflow.airframe import load_airframe
 from planner.plan import read_plan
 from planner.search.algorithms import find_algorithm
 from tests.world.made.made_scenario import SMALL

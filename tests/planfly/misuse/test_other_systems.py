@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import planfly
-from planfly.paper import usable_cores
+from planfly.planning.paper import usable_cores
 from tests.soak import SOAK
 
 ROOT = Path(planfly.__file__).parents[1]
@@ -32,7 +32,7 @@ LINUX_ALONE = {
     "signal.SIGKILL": {"flight/autopilots/sitl/process.py"},
     "select.select": set(),
     "import fcntl": {"world/file_locks.py"},
-    "import resource": {"planfly/process_setup.py"},
+    "import resource": {"planfly/runtime/process_setup.py"},
     "import select": set(),
     "import pwd": set(),
     "import termios": set(),

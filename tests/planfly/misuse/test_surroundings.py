@@ -16,7 +16,7 @@ import pytest
 
 from logs.recording.example_log import example_log
 from planfly.cli import main
-from planfly.crash_safe_log import CrashSafeLog
+from planfly.workflow.crash_safe_log import CrashSafeLog
 from tests.planfly.conftest import FIELD
 from tests.soak import SOAK
 from tests.soak.test_hostile_files import WPL

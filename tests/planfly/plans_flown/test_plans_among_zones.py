@@ -12,8 +12,8 @@ import pytest
 from benchmarks.airspace.flights import fly, kept_by
 from benchmarks.airspace.many_zones import crowded_scenario
 from benchmarks.airspace.scenarios import draw_scenario, passable, ring_distance
-from planfly.airframe import load_airframe
-from planfly.make_plan import make_plan
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.make_plan import make_plan
 from tests.soak import SOAK, some
 
 # Of the bench's: the first draws of these numbers that the grid search passes.

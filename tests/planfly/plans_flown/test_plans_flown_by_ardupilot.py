@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from flight.mission.from_plan import plan_mission
-from planfly.airframe import load_airframe
-from planfly.make_plan import make_plan
-from planfly.open_flight import make_setup
-from planfly.pipeline import fly_and_judge
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.open_flight import make_setup
+from planfly.workflow.pipeline import fly_and_judge
 from tests.autopilot_plans import TERRAINS, harm_of, plan_scenario
 from tests.autopilots import need_arduplane
 from tests.soak import SOAK, scaled

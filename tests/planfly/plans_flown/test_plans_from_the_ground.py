@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import Command, Mission, MissionItem
 from logs.verdict.judge_geometry import judge_geometry
-from planfly.airframe import Airframe, load_airframe
-from planfly.make_plan import make_plan
-from planfly.open_flight import make_setup
-from planfly.pipeline import fly_and_judge
+from planfly.workflow.airframe import Airframe, load_airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.open_flight import make_setup
+from planfly.workflow.pipeline import fly_and_judge
 from tests.autopilots import need_arduplane
 from tests.ground_missions import draw_field
 from tests.soak import SOAK, note, scaled

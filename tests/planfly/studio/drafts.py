@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
-from planfly.airframe import Airframe, load_airframe
 from planfly.flight_options import MissionOptions
-from planfly.open_flight import make_setup
 from planfly.studio.documents import Document
 from planfly.studio.session import Session
+from planfly.workflow.airframe import Airframe, load_airframe
+from planfly.workflow.open_flight import make_setup
 from world.errors import MissionError
 from world.frames import to_geo
 from world.scenario import Scenario, load_scenario

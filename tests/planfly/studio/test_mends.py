@@ -178,7 +178,7 @@ def test_a_path_that_was_searched_for_an_older_sheet_is_not_taken(monkeypatch: p
     monkeypatch.setattr("planfly.studio.jobs.Pilot.start", lambda self: None)
     jobs = Jobs(lambda name, answer: None)
     jobs.start(session)
-    assert [work.function for work in asked] == ["planfly.studio.works.plan"]
+    assert [work.function for work in asked] == ["planfly.studio.worker_tasks.plan"]
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=5.0))
     answers = jobs.answered(LONG, Answer(asked[0].number, "done", [straight_plan(session.desk.scenario, 3)]), session)
     assert [one["kind"] for one in answers] == ["stopped", "fault"]
@@ -186,7 +186,7 @@ def test_a_path_that_was_searched_for_an_older_sheet_is_not_taken(monkeypatch: p
     # What was restored is flown, not planned anew.
     again = Jobs(lambda name, answer: None)
     again.start(session)
-    assert asked[-1].function == "planfly.studio.works.fly"
+    assert asked[-1].function == "planfly.studio.worker_tasks.fly"
 
 
 def test_a_certificate_does_not_outlive_settings() -> None:

@@ -16,7 +16,7 @@ import pytest
 
 from flight.mission.items import MissionItem
 from flight.mission_files.formats import mission_text, parse_mission
-from planfly.studio.kept import mission_from
+from planfly.studio.autosave import mission_from
 from tests.browser import Browser
 from tests.logs.views.report.page_in_browser import grave_findings, prefer
 from tests.planfly.studio.drafts import drawn_session

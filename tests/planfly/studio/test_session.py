@@ -12,8 +12,8 @@ from flight.mission_files.formats import mission_text, parse_mission
 from logs.verdict.verdict import verdict_json
 from planfly.flight_options import MissionOptions
 from planfly.studio import edits, messages
+from planfly.studio.autosave import mission_data, mission_from
 from planfly.studio.documents import open_document, open_dropped, straight_plan
-from planfly.studio.kept import mission_data, mission_from
 from planfly.studio.session import Session, StaleEdit, open_session
 from tests.planfly.studio.drafts import drawn_session, session_of, world_of
 from tests.soak import note, scaled

@@ -9,13 +9,13 @@ from planfly.studio.documents import open_document
 from planfly.studio.jobs import LONG, Jobs
 from planfly.studio.pilot import Answer, Work
 from planfly.studio.session import Session
-from planfly.studio.works import plan
+from planfly.studio.worker_tasks import plan
 from world.errors import PlanflyError
 
 
 def test_other_ways_are_of_one_search_and_none_is_better_than_another(monkeypatch: pytest.MonkeyPatch) -> None:
     # Kernels may have to be compiled first.
-    monkeypatch.setattr("planfly.studio.works.SECONDS_FOR_SEVERAL", 600.0)
+    monkeypatch.setattr("planfly.studio.worker_tasks.SECONDS_FOR_SEVERAL", 600.0)
     asked: list[Work] = []
     monkeypatch.setattr("planfly.studio.jobs.Pilot.ask", lambda self, work: asked.append(work))
     session, jobs = (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import PerformanceTable
-from planfly.airframe import load_airframe
+from planfly.workflow.airframe import load_airframe
 from planner.evaluation.travel_cost import LENGTH, TravelCost, make_travel_cost, path_cost
 from tests.setups import falling_envelope
 from world.scenario import load_scenario

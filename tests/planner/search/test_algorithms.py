@@ -2,7 +2,7 @@
 
 import pytest
 
-from planfly.airframe import load_airframe
+from planfly.workflow.airframe import load_airframe
 from planner.evaluation.encoding import ENCODINGS
 from planner.search.algorithms import ALGORITHMS, DEFAULT, algorithm_lines, find_algorithm, limits_for
 from world.errors import ScenarioError

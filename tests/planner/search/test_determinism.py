@@ -19,8 +19,8 @@ from tests.soak import SOAK
 ROOT = Path(__file__).parents[3]
 SCRIPT = """
 import hashlib
-from planfly.make_plan import make_plan
-from planfly.airframe import load_airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.airframe import load_airframe
 from planner.plan import plan_json
 from world.scenario import load_scenario
 for name in NAMES:

@@ -13,9 +13,9 @@ from planner.evaluation.problem import ProblemArrays, make_problem
 from planner.plan import Objective, Plan
 from planner.search import generations
 from planner.search.algorithms import ALGORITHMS
-from planner.search.closed_ways import is_closed
 from planner.search.explain_failure import explain_failure
 from planner.search.generations import MAX_GENERATIONS, path_generations, waypoint_generations
+from planner.search.infeasibility_proof import is_closed
 from planner.search.plan_path import plan_path
 from planner.search.search_state import Search, best_first
 from planner.seeding.waypoint_chains import WaypointChains, waypoint_chains

@@ -2,7 +2,7 @@
 
 import pytest
 
-from planfly.airframe import load_airframe
+from planfly.workflow.airframe import load_airframe
 from planner.search.kernel_calls import PARTS, call_kernels
 from planner.search.plan_path import plan_path
 from world.compile_events import tell_before_compiling

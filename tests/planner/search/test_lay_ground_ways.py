@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
-from planfly.airframe import load_airframe
+from planfly.workflow.airframe import load_airframe
 from planner.plan import Certificate, Plan
 from planner.search.lay_ground_ways import FinalLaw, with_ground_ways
 from tests.setups import spec_around

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planfly.airframe import load_airframe
+from planfly.workflow.airframe import load_airframe
 from planner.evaluation.travel_cost import LENGTH, energy_cost, path_cost
 from planner.plan import Plan
 from planner.search.plan_path import plan_path

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
-from planfly.airframe import load_airframe
+from planfly.workflow.airframe import load_airframe
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.problem import Problem, make_problem

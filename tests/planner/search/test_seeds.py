@@ -12,7 +12,7 @@ import planner.search.seeds as seeds_module
 import planner.seeding.lattice as lattice_module
 from aircraft.path_limits import Limits
 from benchmarks.planning.wild_instances import wild_scenario
-from planfly.airframe import load_airframe
+from planfly.workflow.airframe import load_airframe
 from planner.evaluation.encoding import ENCODINGS, RotatedFrame, rotated_frame
 from planner.evaluation.problem import ProblemArrays, make_problem
 from planner.plan import Certificate

@@ -19,8 +19,8 @@ from flight.mission.items import Command, Frame, Home, Mission, MissionItem
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from flight.simulation.track import Track
-from planfly.airframe import load_airframe
-from planfly.open_flight import make_setup
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.open_flight import make_setup
 from tests.setups import spec_around
 from world.airfield import LandingStrip, Launch
 from world.frames import to_geo

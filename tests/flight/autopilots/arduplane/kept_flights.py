@@ -16,8 +16,8 @@ from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
-from planfly.airframe import load_airframe
-from planfly.open_flight import make_setup
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.open_flight import make_setup
 from world.frames import to_geo
 from world.scenario import Scenario, load_scenario
 from world.wind import Wind

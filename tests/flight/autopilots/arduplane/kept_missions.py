@@ -16,8 +16,8 @@ from flight.mission.itinerary import loiter_of
 from flight.mission_files.formats import parse_mission
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
-from planfly.airframe import load_airframe
-from planfly.open_flight import make_setup
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.open_flight import make_setup
 from world.frames import GeoOrigin, to_map
 from world.scenario import from_spec
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flight.autopilots.arduplane.swift_return import RETURN_ARRIVED, RETURN_GROUND_IMPACT, SwiftReturns, fly_returns
+from flight.autopilots.arduplane.rtl_point_mass import RETURN_ARRIVED, RETURN_GROUND_IMPACT, SwiftReturns, fly_returns
 from flight.mission.return_path import LandingStart, ReturnCircle
 from tests.flight.autopilots.arduplane.kept_flights import FOLDER, HOME, WIND
-from tests.flight.autopilots.arduplane.test_swift_return import aerosonde, around, flat, parameters, start
+from tests.flight.autopilots.arduplane.test_rtl_point_mass import aerosonde, around, flat, parameters, start
 from tests.soak import some
 from world.wind import Wind
 

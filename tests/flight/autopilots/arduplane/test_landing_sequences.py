@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from flight.autopilots.arduplane.swift_go_around import aborted_at, fly_go_arounds
-from flight.autopilots.arduplane.swift_return import RETURN_GROUND_IMPACT, RETURN_START
+from flight.autopilots.arduplane.go_around_point_mass import aborted_at, fly_go_arounds
+from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT, RETURN_START
 from flight.mission.ground_ways import Approach
 from flight.mission.placing import landing_sequence
 from logs.verdict.returns.judge_returns import return_world

@@ -29,8 +29,8 @@ from flight.guidance.inner_loops import GUIDANCE_MEMORY, steer_elevator
 from flight.guidance.navigation_error import MOTION
 from flight.mission_files.formats import parse_mission
 from flight.simulation.simulate import Flight, fly_to_end
-from planfly.airframe import load_airframe
-from planfly.open_flight import make_setup as setup_of
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.open_flight import make_setup as setup_of
 from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, record, state, waypoints
 from tests.setups import MakeSetup
 from tests.soak import SOAK

@@ -10,8 +10,8 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from planfly.airframe import load_airframe
-from planfly.open_flight import make_setup
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.open_flight import make_setup
 from tests.flight.autopilots.arduplane.kept_missions import (
     CIRCLES,
     CORNERS,

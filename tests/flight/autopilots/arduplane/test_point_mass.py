@@ -8,7 +8,7 @@ import pytest
 
 from flight.autopilots.arduplane import point_mass as subject
 from flight.autopilots.arduplane.point_mass import PointMass, excess_power, filled_excess, point_mass
-from tests.flight.autopilots.arduplane.test_swift_return import airframe
+from tests.flight.autopilots.arduplane.test_rtl_point_mass import airframe
 from world.wind import Wind
 
 NONE = np.nan

@@ -14,8 +14,8 @@ from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import judge_returns, return_world
 from logs.verdict.returns.return_starts import planned_starts
-from planfly.airframe import load_airframe
-from planfly.open_flight import make_setup
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.open_flight import make_setup
 from world.scenario import load_scenario
 
 SCENARIO = """

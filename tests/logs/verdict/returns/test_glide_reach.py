@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 
-from flight.autopilots.arduplane.swift_return import RETURN_START, ReturnEnvironment
+from flight.autopilots.arduplane.rtl_point_mass import RETURN_START, ReturnEnvironment
 from logs.verdict.returns.glide_map import glide_map, glide_slopes, least_heights
 from logs.verdict.returns.glide_reach import heights_left, place_of
 from tests.flight.autopilots.arduplane.kept_flights import FOLDER, HOME, WIND, jacksboro
-from tests.flight.autopilots.arduplane.test_swift_return import aerosonde
+from tests.flight.autopilots.arduplane.test_rtl_point_mass import aerosonde
 from tests.logs.verdict.returns.gliders import (
     AIRSPEED,
     BANK,

@@ -17,8 +17,8 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.verdict import Verdict
-from planfly.airframe import bank_limit, load_airframe
-from planfly.open_flight import make_setup
+from planfly.workflow.airframe import bank_limit, load_airframe
+from planfly.workflow.open_flight import make_setup
 from tests.logs.verdict.judging import of
 from tests.mission_lines import ORIGIN, wp
 from tests.soak import some

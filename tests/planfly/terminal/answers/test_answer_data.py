@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-import planfly.paper
+import planfly.planning.paper
 from logs.recording.example_log import write_example_log
 from logs.recording.reader import read_log
 from planfly.cli import main
-from planfly.paper import SeededPlan
+from planfly.planning.paper import SeededPlan
 from tests.logs.importers.written_logs import dataflash
 from tests.planfly.commands.imported_log_files import example_plan
 from tests.planfly.conftest import FIELD
@@ -78,8 +78,8 @@ def test_the_papers_table(capsys: Output, monkeypatch: pytest.MonkeyPatch) -> No
     def planned(*_: object) -> list[SeededPlan]:
         return [made_plan("umda", seed, 1.2 + 0.1 * seed, 0.0) for seed in (1, 2)]
 
-    monkeypatch.setattr(planfly.paper, "plan_section", planned)
-    monkeypatch.setattr(planfly.paper, "write_figures", lambda *_: None)
+    monkeypatch.setattr(planfly.planning.paper, "plan_section", planned)
+    monkeypatch.setattr(planfly.planning.paper, "write_figures", lambda *_: None)
     (row,) = answered(capsys, 0, "paper", "--out", "out")["rows"]
     assert (row["algorithm"], row["runs"], row["safe"]) == ("umda", 2, 2)
     assert row["length_worst"] == pytest.approx(1.4)

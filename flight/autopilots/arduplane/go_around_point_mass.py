@@ -1,0 +1,160 @@
+"""Simulate an aborted landing with a point mass in a few milliseconds, back to the line-up.
+
+It follows `AP_Landing::type_slope_verify_abort_landing` and `restart_landing_sequence` (libraries/AP_Landing) and
+`Plane::takeoff_calc_pitch`, `takeoff_calc_throttle` (ArduPlane/takeoff.cpp) in ArduPlane 4.6.  The aircraft climbs with
+level wings at the pitch of the last take-off and open throttle until it is above the go-around altitude, which is
+relative to *home*; if the field lies higher than home, that may be at once.  Then it goes to the nearest landing
+sequence: from its position to the first place of the sequence, turning on the short side, on a straight slope from its
+altitude, and by the sequence's other places back to the line-up.
+
+The point mass and the law of each leg are the ones in `flight.autopilots.arduplane.rtl_point_mass`.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.arduplane.point_mass import PointMass
+from flight.autopilots.arduplane.rtl_point_mass import (
+    CLIMB,
+    RETURN_RESULT,
+    RETURN_START,
+    ReturnEnvironment,
+    fill_stage,
+    fly_stages,
+    most_seconds,
+    straight_on,
+    truncate_at_first_loiter,
+)
+from flight.guidance.lateral_reference_laws import WAYPOINT
+from flight.mission.return_path import LandingStart, nearest_landing
+from world.kernels import Record, Records
+from world.wind import mean_wind_speed
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class GoArounds:
+    """Simulated go-arounds.
+
+    flown: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.
+    ways: n arrays (t, 3) of positions at intervals of 1 s, m.
+    landings: n, the landing sequence that each go-around joins.
+    """
+
+    flown: Records
+    ways: tuple[Floats, ...]
+    landings: tuple[LandingStart, ...]
+
+
+def climb_rows(way: Floats, top: float) -> int:
+    """Return the number of positions (t, 3) of a go-around before its climb is over; t if it never is.
+
+    >>> climb_rows(np.array([[0.0, 0.0, 10.0], [0.0, 20.0, 14.0], [0.0, 40.0, 18.0]]), 13.0)
+    1
+    """
+    above = way[:, 2] > top
+    return int(np.argmax(above)) if above.any() else len(way)
+
+
+def aborted_at(place: Sequence[float], course: float, slope: float, airspeed: float, aircraft: PointMass) -> Records:
+    """Return (1,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`: the abort point on a glide.
+
+    place: east, north, up, m.  course: of the glide over the ground, rad.  slope: of the glide, m per m.
+    airspeed: true, m/s.  The wind is taken from the aircraft.
+    """
+    start: Records = np.zeros(1, RETURN_START)
+    made = aircraft.record
+    blows = mean_wind_speed(made.wind_speed, made.wind_gradient, made.wind_reference, float(place[2]))
+    east, north = blows * made.wind_east, blows * made.wind_north
+    sin, cos = math.sin(course), math.cos(course)
+    across = east * cos - north * sin
+    over = max(1.0, math.sqrt(max(1.0, airspeed * airspeed - across * across)) + east * sin + north * cos)
+    start["east"], start["north"], start["up"] = place
+    start["velocity_east"], start["velocity_north"], start["velocity_up"] = over * sin, over * cos, -over * slope
+    return start
+
+
+def fly_go_arounds(
+    starts: Records,
+    top: float,
+    pitch: float,
+    landings: Sequence[LandingStart],
+    parameters: ArduPilotParameters,
+    aircraft: PointMass,
+    around: ReturnEnvironment,
+) -> GoArounds:
+    """Simulate a go-around from each of n places on a glide to the end of a landing sequence.
+
+    starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
+    top: altitude above which the climb ends, m AMSL.  pitch: of the climb, rad.
+    landings: one or more landing sequences; each go-around joins the nearest one where its climb is over.  A loiter in
+        a sequence is the last place: the go-around is over once around it.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> from flight.autopilots.arduplane.point_mass import point_mass
+    >>> from flight.autopilots.arduplane.rtl_point_mass import surroundings
+    >>> from flight.dynamics.envelope_tables import load_envelope
+    >>> from world.scenario import load_scenario
+    >>> from world.wind import Wind
+    >>> aerosonde = load_aircraft("aerosonde")
+    >>> made = point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind())
+    >>> start = aborted_at((0.0, 0.0, 800.0), 0.0, 0.06, 20.0, made)
+    >>> behind = [LandingStart(3, (800.0, -400.0, 860.0), (800.0, -400.0, 860.0))]
+    >>> world, law = surroundings(load_scenario("jacksboro")), ArduPilotParameters.load(aerosonde)
+    >>> (way,) = fly_go_arounds(start, 840.0, 0.17, behind, law, made, world).ways
+    >>> k = climb_rows(way, 840.0)
+    >>> bool(abs(way[k, 0]) < 1.0), bool(abs(way[-1, 0] - 800.0) < 100.0), bool(way[:, 2].min() > 797.0)
+    (True, True, True)
+    """
+    flown = np.zeros(len(starts), RETURN_RESULT)
+    law, staged, climb = parameters.record(), _climb_parameters(parameters, pitch), np.zeros(1, CLIMB)[0]
+    climb.climbs, climb.top, climb.slew = True, top, parameters.throttle_slew or math.inf
+    climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
+
+    def fly(k: int, landing: LandingStart) -> Floats:
+        ends = np.concatenate([straight_on(starts[k]), _make_stages((landing, *landing.onward), parameters)])
+        ends["airspeed"] = aircraft.record.airspeed
+        most = most_seconds(starts[k], ends[1:], aircraft) + max(0.0, top - float(starts[k]["up"]))
+        way = np.zeros((int(most) + 2, 3))
+        fly_stages(
+            starts[k], ends, law, staged, climb, aircraft.record, aircraft.excess, aircraft.power, around.heights,
+            around.to_pixel, around.spheres, around.radii, around.known, most,
+            -math.inf, -math.inf, False, way, flown[k],
+        )  # fmt: skip
+        return way[: int(flown[k]["rows"])].copy()
+
+    found = []
+    for k in range(len(starts)):
+        way, landing = fly(k, landings[0]), landings[0]
+        # The climb does not depend on the sequence.
+        over = way[min(climb_rows(way, top), len(way) - 1)]
+        nearest = nearest_landing((float(over[0]), float(over[1]), float(over[2])), landings)
+        if nearest is not None and nearest != landing:
+            way, landing = fly(k, nearest), nearest
+        found.append((way, landing))
+    return GoArounds(flown, tuple(way for way, _ in found), tuple(landing for _, landing in found))
+
+
+def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
+    """Return the climb's parameters, as in a take-off: speed by pitch, and a fixed pitch."""
+    staged = parameters.record()
+    staged.tecs_speed_weight = 2.0
+    staged.tecs_pitch_min = 0.0
+    staged.pitch_limit_min = staged.pitch_limit_max = pitch
+    return staged
+
+
+def _make_stages(sequence: Sequence[LandingStart], parameters: ArduPilotParameters) -> Records:
+    """Return (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: the places up to the first loiter."""
+    flown = truncate_at_first_loiter(sequence)
+    stages: Records = np.zeros(len(flown), WAYPOINT)
+    for stage, one in zip(stages, flown, strict=True):
+        fill_stage(stage, one, parameters)
+    return stages

@@ -1,0 +1,324 @@
+"""The flight process of ``planfly serve``: scenario, verdicts as status texts, and logs."""
+
+import contextlib
+import math
+import signal
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft
+from flight.live.flight_process import (
+    DIVERTED_TEXT,
+    STILL_LOITERING_TEXT,
+    DivertFlight,
+    FlightJudged,
+    JudgeMission,
+    MissionJudged,
+    Place,
+    PreparedFlight,
+    ProcessReady,
+    send_event,
+    serve_flights,
+)
+from flight.live.telemetry import (
+    AUTO,
+    CRITICAL,
+    INFO,
+    MODE_NAMES,
+    NOTICE,
+    RTL,
+    WARNING,
+    SnapshotMaker,
+    StatusText,
+)
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from flight.simulation.local_map import LocalMap
+from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import Flight
+from flight.simulation.track import Track, as_track, join_tracks
+from logs.recording.recorder import Recorder
+from logs.verdict.findings import Finding
+from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.rule_words import rule_word
+from logs.verdict.verdict import Verdict
+from logs.verdict.wording import deciding_text, place_text
+from planfly.flight_options import MissionOptions, named_scenario
+from planfly.named_fences import read_named_fences
+from planfly.workflow.airframe import Airframe, airframe_of, choose_seed, load_airframe
+from planfly.workflow.open_flight import make_setup, open_flight
+from planfly.workflow.reference_flights import judge_with_reference_flights
+from world.errors import PlanflyError
+from world.frames import to_geo
+from world.interruption import end_with_parent
+from world.scenario import Scenario, in_the_air
+
+Floats = NDArray[np.float64]
+
+DEFAULT_SCENARIO = "jacksboro-air"
+# Duration of a loiter in LOITER and GUIDED in one log, s: each lap of a loiter is laid out, and judged, separately.
+HELD = 900.0
+# Greatest number of texts about one verdict; the log has the rest.
+_MAX_TEXTS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class ServeOptions:
+    """Options of the command line for serving; both processes load them for themselves.
+
+    mission: a file's path, "" for none.
+    speed: times real time.
+    logs: the folder of the flight logs.
+    flown: how it is flown.  A station that uploads another fence replaces the items of named fences, not their zones.
+    """
+
+    mission: str
+    speed: float
+    logs: Path
+    flown: MissionOptions = field(default_factory=MissionOptions)
+
+
+@dataclass(frozen=True, slots=True)
+class ServedScenario:
+    """The scenario, the aircraft in it, the seed, the mission to begin with, and the fence items that are named."""
+
+    scenario: Scenario
+    airframe: Airframe
+    seed: int
+    mission: Mission | None
+    fence: tuple[MissionItem, ...] = ()
+
+
+def open_served(options: ServeOptions) -> ServedScenario:
+    """Load what is served.  Raises PlanflyError."""
+    if options.mission:
+        setup = open_flight(options.mission, options.flown)
+        return ServedScenario(setup.scenario, airframe_of(setup), setup.seed, setup.mission)
+    fences = read_named_fences(options.flown.get("fence") or ())
+    scenario = named_scenario(options.flown.get("scenario") or DEFAULT_SCENARIO, options.flown)
+    scenario, seed = fences.on_scenario(scenario), options.flown.get("seed")
+    return ServedScenario(scenario, load_airframe(scenario), choose_seed(scenario, seed), None, fences.items)
+
+
+def flown_parameters(scenario: Scenario, stated: Mapping[str, float]) -> dict[str, float]:
+    """Return the parameters of the control law of a scenario by name, after stated values are applied.
+
+    The cruise airspeed is the one that is flown.  Raises PlanflyError for values that are not allowed.
+    """
+    airframe = load_airframe(scenario, stated)
+    parameters = airframe.autopilot.parameters
+    values = {} if parameters is None else {one.name: one.value for one in parameters.values}
+    cruise = airframe.autopilot.cruise_parameter
+    return values | {cruise: airframe.airspeed} if cruise in values else values
+
+
+def fly_process(connection: Connection, options: ServeOptions) -> None:
+    """Run the process that flies."""
+    in_service = threading.Event()
+    end_with_parent(in_service)
+    factory = ServedFlights(options)
+    factory.warm()
+    # A signal to the whole group reaches the link too, which orders this process to end: its log is closed first.
+    in_service.set()
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    send_event(connection, ProcessReady())
+    serve_flights(connection, factory)
+    # The link waits for this, not for the shutdown of the interpreter.
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    connection.close()
+
+
+class ServedFlights:
+    """Judges missions in the served scenario, and logs flights into the served folder."""
+
+    def __init__(self, options: ServeOptions) -> None:
+        self._served = open_served(options)
+        self._logs = options.logs
+        # Airframe with the parameters of the last judged mission.
+        self._airframe = self._served.airframe
+        self._parameters: tuple[tuple[str, float], ...] = ()
+        self.aircraft = self._airframe.aircraft
+        self.speed = options.speed
+
+    def warm(self) -> None:
+        """Fly half a second and judge it, so that no station has to wait for compilers later."""
+        scenario = self._served.scenario
+        points = np.linspace(scenario.start, scenario.destination, 3)
+        lats, lons = to_geo(scenario.origin, points[:, 0], points[:, 1])
+        none, amsl = (0.0, 0.0, 0.0, 0.0), float(points[0, 2])
+        items = tuple(
+            MissionItem(k, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), none, on_grid(lat), on_grid(lon), amsl)
+            for k, (lat, lon) in enumerate(zip(lats.tolist(), lons.tolist(), strict=True), 1)
+        )
+        with contextlib.suppress(PlanflyError):
+            setup = make_setup(scenario, self._airframe, Mission(None, items), self._served.seed)
+            judge_geometry(setup)
+            rows, _ = Flight(setup, self.aircraft).block(30)
+            judge_flight(setup, as_track(rows), "warm")
+
+    def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
+        """Judge the geometry of a mission, and check that the flight can be started."""
+        served = self._served
+        try:
+            if request.parameters != self._parameters:
+                self._airframe = load_airframe(served.scenario, dict(request.parameters))
+                self._parameters = request.parameters
+            setup = make_setup(served.scenario, self._airframe, request.mission, served.seed)
+            # The first tick shows whether it can start, and compiles the flight loop.
+            flight = Flight(setup, self.aircraft)
+            flight.block(1)
+        except PlanflyError as error:
+            text = StatusText(f"mission cannot be flown: {error}", CRITICAL)
+            return None, MissionJudged(request.number, False, False, (text,))
+        verdict = judge_geometry(setup)
+        home = request.mission.home
+        start = SnapshotMaker(setup, flight.map).before_start(setup)
+        if home is None:
+            home = Home(start.lat_deg, start.lon_deg, start.amsl - (0.0 if math.isnan(start.height) else start.height))
+        items = tuple(int(item) for item in setup.route.items)
+        texts = mission_texts(setup, verdict)
+        # A mission that is not judged in full is armed, with a warning: MAVSDK writes speeds over ground, for example.
+        arms = verdict.flies or verdict.undecided
+        judged = MissionJudged(request.number, True, arms, texts, home, items, start)
+        return PreparedFlight(setup, flight.map), judged
+
+    def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:
+        """Lay out the path that a station requests from the present position; a loiter lasts `HELD`."""
+        served = self._served
+        lat, lon = (on_grid(float(value)) for value in to_geo(served.scenario.origin, here[0], here[1]))
+        none = (0.0, 0.0, 0.0, 0.0)
+        begin = MissionItem(-1, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), none, lat, lon, float(here[2]))
+        if request.mode == AUTO:
+            items = request.mission.items
+        elif request.mode == RTL:
+            items = (MissionItem(0, int(Command.NAV_RETURN_TO_LAUNCH), int(Frame.MISSION), none, 0.0, 0.0, 0.0),)
+        else:
+            items = (_loiter_item(begin, request.place),)
+        mission = replace(request.mission, items=(begin, *items), source=MODE_NAMES[request.mode])
+        # The aircraft is in the air: there is no take-off, and it does not land.
+        setup = make_setup(in_the_air(served.scenario), self._airframe, mission, served.seed)
+        return PreparedFlight(setup, LocalMap.around(setup))
+
+    def open_log(self, setup: FlightSetup, mode: int) -> "ServedLog":
+        """Open the next free ``flight-NNN.mcap``."""
+        self._logs.mkdir(parents=True, exist_ok=True)
+        number = 1
+        while True:
+            path = self._logs / f"flight-{number:03d}.mcap"
+            try:
+                path.touch(exist_ok=False)
+                break
+            except FileExistsError:
+                number += 1
+        return ServedLog(path, setup, self.aircraft, mode)
+
+
+def _loiter_item(here: MissionItem, place: Place) -> MissionItem:
+    """Return a loiter about a place; values that the place does not state are taken from `here`."""
+    located = math.isfinite(place.lat_deg) and math.isfinite(place.lon_deg)
+    height = replace(here, frame=place.frame, alt=place.alt) if math.isfinite(place.alt) else here
+    return replace(
+        height,
+        seq=0,
+        command=int(Command.NAV_LOITER_TIME),
+        params=(HELD, 0.0, place.radius, 0.0),
+        lat_deg=on_grid(place.lat_deg) if located else here.lat_deg,
+        lon_deg=on_grid(place.lon_deg) if located else here.lon_deg,
+    )
+
+
+class ServedLog:
+    """The log of one served flight."""
+
+    def __init__(self, path: Path, setup: FlightSetup, aircraft: Aircraft, mode: int) -> None:
+        self._path, self._setup, self._aircraft = path, setup, aircraft
+        self._level = "flown" if mode == AUTO else f"flown in {MODE_NAMES[mode]}"
+        self._recorder = Recorder(path, setup)
+        self._blocks: list[Track] = []
+
+    def write(self, block: Track) -> None:
+        """Append rows and flush them to the file."""
+        self._blocks.append(block)
+        self._recorder.write(block)
+        self._recorder.flush()
+
+    def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
+        """Judge the flight and close the log.
+
+        hurry: see `planfly.workflow.reference_flights.judge_with_reference_flights`.  In a hurry, a path that was abandoned is
+        not judged: `planfly check` does it.  A path abandoned within a second leaves no log.
+        """
+        track = join_tracks(self._blocks)
+        left = ended.startswith((DIVERTED_TEXT, STILL_LOITERING_TEXT))
+        end = float(track.time[-1]) if len(track) else 0.0
+        if left and end < 1.0:
+            self._recorder.abandon()
+            self._path.unlink()
+            return FlightJudged(False, ())
+        self._recorder.event(end, f"flight ended: {ended}", "info" if left or ended == "completed" else "error")
+        if left and hurry():
+            self._recorder.finish(ended)
+            return FlightJudged(False, (StatusText(f"log {self._path}, not judged yet", INFO),))
+        if ended == "completed":
+            requirements = route_requirements(self._setup)
+            verdict, reference = judge_with_reference_flights(requirements, self._aircraft, track, ended, hurry=hurry)
+        else:
+            verdict, reference = judge_flight(self._setup, track, ended), None
+        self._recorder.finish(ended, verdict, reference)
+        texts = left_texts(self._level, ended, verdict) if left else verdict_texts(self._level, verdict)
+        return FlightJudged(verdict.flyable, (*texts, StatusText(f"log {self._path}", INFO)))
+
+    def abandon(self) -> None:
+        """Close the log as it is."""
+        self._recorder.abandon()
+
+
+def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...]:
+    """Return texts about a mission for stations: verdict, size, and items that are not flown as written."""
+    route = setup.route
+    length = float(np.linalg.norm(np.diff(route.waypoints[:, :2], axis=0), axis=1).sum()) / 1000.0
+    size = StatusText(f"mission: {len(route.waypoints)} waypoints, {length:.1f} km; {route.started}", INFO)
+    notes = tuple(StatusText(f"note: {note}", NOTICE) for note in route.notes[:_MAX_TEXTS])
+    return (size, *verdict_texts("geometry", verdict), *notes)
+
+
+# Rules that fail on a path only because the aircraft left it before its end.
+_RULES_OF_UNFINISHED_PATHS = ("completion", "loiter", "waypoint", "turn", "survey")
+
+
+def left_texts(level: str, ended: str, verdict: Verdict) -> tuple[StatusText, ...]:
+    """Return the verdict on the flown part of a path that the aircraft left early."""
+    failed = [item for item in verdict.findings if item.ok is False and item.rule not in _RULES_OF_UNFINISHED_PATHS]
+    found = "1 finding" if len(failed) == 1 else f"{len(failed) or 'no'} findings"
+    first = StatusText(f"verdict ({level}): {ended}; {found} failed until then", INFO)
+    return (first, *_failed_texts(failed))
+
+
+def verdict_texts(level: str, verdict: Verdict) -> tuple[StatusText, ...]:
+    """Describe a verdict in a few lines, the worst finding first."""
+    failed = [finding for finding in verdict.findings if finding.ok is False]
+    if verdict.flyable:
+        return (StatusText(f"verdict ({level}): FLYABLE", INFO),)
+    if verdict.undecided:
+        return (StatusText(f"verdict ({level}): NOT JUDGED IN FULL: {verdict.unjudged}", WARNING),)
+    deciding = () if verdict.deciding is None else (StatusText(deciding_text(verdict.deciding), WARNING),)
+    return (StatusText(f"verdict ({level}): NOT FLYABLE", WARNING), *deciding, *_failed_texts(failed))
+
+
+def _failed_texts(failed: list[Finding]) -> list[StatusText]:
+    lines = [StatusText(f"{_heading(item)}: {item.reason}", WARNING) for item in failed[:_MAX_TEXTS]]
+    if len(failed) > _MAX_TEXTS:
+        lines.append(StatusText(f"and {len(failed) - _MAX_TEXTS} more findings", WARNING))
+    return lines
+
+
+def _heading(item: Finding) -> str:
+    """Return the rule and the place, without repeating the place."""
+    word = rule_word(item.rule)
+    return word if item.placed else f"{word} at {place_text(item.place)}"

@@ -1,0 +1,111 @@
+"""The vehicle that ``planfly serve`` presents to ground stations: its link and its flight processes."""
+
+import contextlib
+import math
+import multiprocessing
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import partial
+from multiprocessing.connection import Connection
+
+from flight.live.link import SYSTEM, Access, Link
+from flight.live.station_requests import vehicle_parameters
+from flight.live.telemetry import Snapshot
+from flight.live.vehicle import Standby, Vehicle
+from flight.mission.items import Home
+from planfly.live.served_flights import ServedScenario, ServeOptions, flown_parameters, fly_process
+from world.frames import to_geo
+from world.interruption import children_ignore_sigint, end_children, uninterrupted
+from world.scenario import Scenario
+
+# Time that a process has to end when asked to, before it is killed, s.
+_CHILD_END_TIMEOUT_S = 0.3
+
+
+def serve_vehicle(
+    access: Access,
+    options: ServeOptions,
+    served: ServedScenario,
+    stop: Callable[[], bool],
+    on_message: Callable[[str], None],
+) -> None:
+    """Serve as the vehicle until ``stop`` is true.  on_message: called with each message in a line."""
+    with contextlib.ExitStack() as opened:
+        link = Link(access)
+        opened.callback(link.close)
+        pool = _FlightPool(options)
+        opened.callback(pool.end)
+        vehicle = _make_vehicle(link, pool, served, options.speed, on_message)
+        host, port = link.address
+        targets = ", ".join(f"{station}:{number}" for station, number in access.to)
+        on_message(f"vehicle {SYSTEM} at {host}:{port}, calling {targets}; scenario {served.scenario.name}")
+        on_message(f"flight logs go to {options.logs}/; Ctrl-C ends")
+        if served.mission is not None:
+            vehicle.load(served.mission)
+        elif served.fence:
+            vehicle.load_fence(served.fence)
+        opened.callback(vehicle.close)
+        vehicle.run(stop)
+    dropped = ", ".join(f"{count:,} {reason}" for reason, count in asdict(link.dropped).items() if count)
+    if dropped:
+        on_message(f"frames dropped: {dropped}")
+
+
+def _make_vehicle(
+    link: Link, pool: "_FlightPool", served: ServedScenario, speed: float, on_message: Callable[[str], None]
+) -> Vehicle:
+    airframe = served.airframe
+    law = airframe.autopilot.parameters
+    parameters = vehicle_parameters(
+        flown=partial(flown_parameters, served.scenario),
+        not_flown=() if law is None else law.not_flown,
+        airspeed=airframe.airspeed,
+        slowest=airframe.aircraft.airspeed_min,
+        fastest=airframe.aircraft.airspeed_max,
+        max_bank_deg=math.degrees(airframe.max_bank),
+        system=SYSTEM,
+        speed=speed,
+    )
+    standby = standby_at_start(served.scenario)
+    return Vehicle(
+        link, pool.spawn, parameters, standby, airframe.battery,
+        lambda text: on_message(f"{time.strftime('%H:%M:%S')} {text}"),
+    )  # fmt: skip
+
+
+class _FlightPool:
+    """Flight processes; the vehicle requests another when one has died."""
+
+    def __init__(self, options: ServeOptions) -> None:
+        self._options = options
+        self._context = multiprocessing.get_context("spawn")
+        self._children: list[multiprocessing.process.BaseProcess] = []
+
+    def spawn(self) -> Connection:
+        """Start a process, and return the link's end of its pipe."""
+        for child in self._children:
+            child.join(timeout=0.0)
+        self._children = [child for child in self._children if child.is_alive()]
+        ours, theirs = self._context.Pipe()
+        child = self._context.Process(target=fly_process, args=(theirs, self._options), daemon=True)
+        with children_ignore_sigint(), uninterrupted():
+            child.start()
+        theirs.close()
+        self._children.append(child)
+        return ours
+
+    def end(self) -> None:
+        """End the processes that are still alive."""
+        end_children([child for child in self._children if child.is_alive()], _CHILD_END_TIMEOUT_S)
+
+
+def standby_at_start(scenario: Scenario) -> Standby:
+    """Return state and home without a mission: at the scenario's start, on a course to its destination."""
+    east, north, amsl = (float(value) for value in scenario.start)
+    lat, lon = (float(value) for value in to_geo(scenario.origin, east, north))
+    ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(east, north))
+    step = scenario.destination - scenario.start
+    course = math.atan2(float(step[0]), float(step[1]))
+    snapshot = Snapshot(time=0.0, lat_deg=lat, lon_deg=lon, amsl=amsl, height=amsl - ground, yaw=course)
+    return Standby(snapshot, Home(lat, lon, amsl if math.isnan(ground) else ground))

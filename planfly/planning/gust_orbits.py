@@ -1,0 +1,157 @@
+"""Limit on the number of waypoints, because gusts can make an autopilot orbit a waypoint.
+
+PX4 flies on at a waypoint only within NAV_FW_ALT_RAD of its altitude; otherwise it orbits the waypoint.  Moderate
+turbulence displaces light aircraft further than that now and then, and an orbit leaves the airspace that the plan was
+checked for.  Therefore a plan may have only as many waypoints as give less than `MAX_EXPECTED_ORBITS` expected orbits a
+flight. A plan that needs more is refused with the reason.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from aircraft.path_limits import Limits
+from aircraft.tracking import corridor_half_width
+from flight.autopilots.autopilot import Autopilot
+from flight.mission.from_plan import corner_speeds
+from planfly.workflow.airframe import Airframe
+from planner.plan import Plan
+from planner.search.fewer_waypoints import drop_waypoints
+from world.geometry import turning_angles
+from world.scenario import Scenario
+
+# Expected orbits in a flight that are accepted; about every second one leaves the corridor (of 186 flights, with 58
+# waypoints passed too high or too low, 30 failed).
+MAX_EXPECTED_ORBITS = 0.03
+# Growth of the excursion at a corner in gusts, m: of 28 m they made 36 at the most in 8 flights.
+GUST_CORNER_MARGIN_M = 8.0
+# Values of the autopilot's altitude parameter that are tried as a remedy, m.
+_TRIED_ALTITUDE_RADII_M = range(5, 105, 5)
+
+
+def limit_waypoint_orbits(
+    plan: Plan,
+    airframe: Airframe,
+    search: Callable[[Scenario], Plan] | None = None,
+    within: Limits | None = None,
+) -> Plan:
+    """Return the plan if it has few enough waypoints for its turbulence; otherwise a plan with fewer.
+
+    If no plan with fewer is found, the plan is returned with the reason in its certificate, and is not safe.
+
+    search: plans a scenario as the plan was planned; None to search for no other path.
+    within: limits that the plan was made in; None for the limits of the aircraft.
+
+    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planner.search.plan_path import plan_path
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("tight")
+    >>> airframe = load_airframe(scenario)
+    >>> plan = plan_path(scenario, airframe.limits, seed=1)
+    >>> limit_waypoint_orbits(plan, airframe) is plan
+    True
+    """
+    autopilot, limits = airframe.autopilot, airframe.limits.surely()
+    expected = expected_circles(plan, autopilot, limits)
+    if not plan.safe or expected == 0.0:
+        return plan
+    if expected <= MAX_EXPECTED_ORBITS:
+        # With as many waypoints as plans have without orbits, no corner is too sharp.
+        has_all = len(plan.waypoints) >= plan.scenario.planner.waypoints
+        return plan if has_all or _is_accepted(plan, airframe) else _refused(plan, _corridor_problem(plan, airframe))
+    fewer = drop_waypoints(plan, limits if within is None else within)
+    if _is_accepted(fewer, airframe):
+        return fewer
+    circles, count = expected_circles(fewer, autopilot, limits), len(fewer.waypoints) - 2
+    if search is not None:
+        # Assume the orbit probability per waypoint of this path: on another path it may be lower.
+        allowed, scenario = max(1, int(MAX_EXPECTED_ORBITS * count / circles)), plan.scenario
+        table = scenario.planner.model_copy(update={"waypoints": allowed + 2})
+        other = replace(search(replace(scenario, planner=table)), scenario=scenario)
+        if other.safe and _is_accepted(other, airframe):
+            return other
+    return _refused(plan, _orbit_problem(plan, autopilot, limits))
+
+
+def _refused(plan: Plan, problem: str) -> Plan:
+    certificate = plan.certificate
+    return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, problem)))
+
+
+def _is_accepted(plan: Plan, airframe: Airframe) -> bool:
+    """Return True if a plan expects few enough orbits and no corner leaves the corridor."""
+    if expected_circles(plan, airframe.autopilot, airframe.limits.surely()) > MAX_EXPECTED_ORBITS:
+        return False
+    return max(_excursions(plan, airframe), default=0.0) <= _half_width(plan, airframe)
+
+
+def _half_width(plan: Plan, airframe: Airframe) -> float:
+    """Return the largest distance from its legs that a flight of the plan may have, m."""
+    return corridor_half_width(plan.scenario.limits.corridor_m, airframe.autopilot.acceptance_radius)
+
+
+def _excursions(plan: Plan, airframe: Airframe) -> list[float]:
+    """Return the distance from the legs at each corner in gusts, m; an empty list if not known."""
+    limits = airframe.limits
+    if (tracking := limits.tracking) is None:
+        return []
+    turns, speeds = turning_angles(plan.waypoints), corner_speeds(plan.scenario, plan.waypoints, limits.airspeed)
+    return [
+        tracking.corner_excursion(float(one), v) + GUST_CORNER_MARGIN_M for one, v in zip(turns, speeds, strict=True)
+    ]
+
+
+def _corridor_problem(plan: Plan, airframe: Airframe) -> str:
+    """Describe in a line the corner that leaves the corridor."""
+    excursions = _excursions(plan, airframe)
+    aside = max(excursions)
+    return (
+        f"in {plan.scenario.wind.turbulence} turbulence {airframe.autopilot.title} is {aside:.0f} m off the legs at the"
+        f" corner of waypoint {1 + excursions.index(aside)}; the corridor is {_half_width(plan, airframe):.0f} m"
+    )
+
+
+def expected_circles(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
+    """Return the expected number of orbits at the inner waypoints of a plan in one flight.
+
+    A leg that climbs or sinks leaves less of the climb or sink rate of the aircraft to act against the gusts.
+    """
+    turbulence, expected = plan.scenario.wind.turbulence, 0.0
+    for rate, waypoint in zip(limits.climb_rates(plan.waypoints)[:-1, 1].tolist(), plan.waypoints[1:-1], strict=True):
+        climb, sink = limits.rates(float(waypoint[2]))
+        expected += autopilot.altitude_miss_probability(climb - max(0.0, rate), sink - max(0.0, -rate), turbulence)
+    return expected
+
+
+def waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
+    """Return the most waypoints, ends included, that level flight allows in alternatives to a safe plan.
+
+    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planner.search.plan_path import plan_path
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("tight")
+    >>> airframe = load_airframe(scenario)
+    >>> waypoints_in_gusts(plan_path(scenario, airframe.limits, seed=1), airframe)
+    22
+    """
+    scenario, count = plan.scenario, len(plan.waypoints)
+    climb, sink = airframe.limits.surely().rates(float(plan.waypoints[:, 2].max()))
+    chance = airframe.autopilot.altitude_miss_probability(climb, sink, scenario.wind.turbulence)
+    if chance == 0.0:
+        return count
+    return max(count, min(scenario.planner.waypoints, 2 + int(MAX_EXPECTED_ORBITS / chance)))
+
+
+def _orbit_problem(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
+    """Explain in a line why a plan is not safe in its turbulence, and what would help."""
+    count, name = len(plan.waypoints) - 2, autopilot.height_parameter
+    circles = expected_circles(plan, autopilot, limits)
+    helps = "Less turbulence"
+    for value in _TRIED_ALTITUDE_RADII_M:
+        if expected_circles(plan, autopilot.with_parameters(**{name: float(value)}), limits) <= MAX_EXPECTED_ORBITS:
+            helps = f"{name} of {value} m"
+            break
+    return (
+        f"in {plan.scenario.wind.turbulence} turbulence {autopilot.title} circles where gusts have it off a waypoint's"
+        f" height, at one of {count} in {min(circles, 1.0):.0%} of flights; up to {MAX_EXPECTED_ORBITS:.0%} are taken for"
+        f" safe. {helps} would help"
+    )

@@ -1,0 +1,417 @@
+"""Section V of the paper: seeded plans of each problem in each encoding, and their table."""
+
+import csv
+import io
+import itertools
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, fields
+from multiprocessing import active_children, get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planfly.arguments import check_arguments
+from planfly.runtime.stages import stage
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.make_plan import Advance, make_plan
+from planfly.workflow.output_paths import prepare_folder, refuse_folder
+from planner.plan import Objective, Violation
+from planner.search.algorithms import find_algorithm
+from world.files import hold, write_whole
+from world.interruption import children_ignore_sigint, end_children, end_with_parent, uninterrupted
+from world.scenario import Scenario, load_scenario, with_planner
+
+Floats = NDArray[np.float64]
+
+
+# Numbers of threats in the problems of the paper.
+PROBLEMS = (7, 15, 30, 60)
+# Planner of the paper.
+PAPER = "umda"
+# Planners of comparison: the baselines of Figs. 9-12, polar with two ranges of its angle, as the paper states none, and
+# a polar encoding of planfly.
+BASELINES = ("umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing")
+# The planner of the paper in a strip along the straight line, which no other encoding gets; an addition of planfly.
+STRIP = "umda-strip"
+# Half width of the strip by the number of threats, m.
+STRIP_ACROSS = {7: 2500.0, 15: 2500.0, 30: 2500.0, 60: 1500.0}
+
+
+@dataclass(frozen=True, slots=True)
+class SeededPlan:
+    """Values of one plan for tables and figures.
+
+    threats: number in the problem.
+    waypoints: (w, 3) world m.
+    violations, objectives: (4,) counts and values, on the paper's points.
+    certified: the continuous check passes and no missile reaches the path.
+    kill_probability, detection_probability: of `exposure_probability`.
+    history: (g, 3) length ratio, kill exposure and violations of the best path after each generation.
+    seconds: CPU time of the search.
+    """
+
+    threats: int
+    algorithm: str
+    seed: int
+    waypoints: Floats
+    violations: tuple[int, ...]
+    objectives: tuple[float, ...]
+    certified: bool
+    kill_probability: float
+    detection_probability: float
+    evaluations: int
+    history: Floats
+    seconds: float
+
+    @property
+    def safe(self) -> bool:
+        """True if safe by the paper: no violation and no kill exposure on its six points a leg."""
+        return not any(self.violations) and self.objectives[Objective.KILL_EXPOSURE] == 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class TableRow:
+    """One line of the table: the plans of one algorithm for one problem.
+
+    The columns of table.csv have these names.
+    runs: number of seeds.
+    safe: number of plans that are safe on the points of the paper.
+    certified: number of plans that pass the continuous check.
+    length_median, length_worst: path length ratio of the safe plans, None without any.
+    kill_median, kill_worst, detection_median: the sums of the paper, of all plans.
+    kill_probability_worst: of all plans.
+    seconds_median: CPU time of a search.
+    """
+
+    threats: int
+    algorithm: str
+    runs: int
+    safe: int
+    certified: int
+    length_median: float | None
+    length_worst: float | None
+    kill_median: float
+    kill_worst: float
+    kill_probability_worst: float
+    detection_median: float
+    seconds_median: float
+
+
+def problem_name(threats: int) -> str:
+    """Return the name of the embedded scenario of a problem."""
+    return f"paper-{threats:02d}"
+
+
+def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> float:
+    """Return 1 minus the product of (1 - p) over points and units in reach; p = (scale / d)^4, at most 1.
+
+    The points are the dividing points of the legs.
+    waypoints: (w, 3).  kind: "kill" or "detection".  The sums of the paper (eq. 9, 10) have no upper bound; this has.
+    """
+    share = np.arange(6)[:, None] / 6.0
+    points = np.concatenate([a + share * (b - a) for a, b in itertools.pairwise(waypoints)])
+    points = np.vstack([points, waypoints[-1:]])
+    threats = scenario.threats
+    radius, scale = getattr(threats, f"{kind}_radius"), getattr(threats, f"{kind}_scale")
+    distance = np.sqrt(((points[:, None, :] - threats.position[None]) ** 2).sum(axis=-1))
+    chance = np.minimum(1.0, (scale / np.maximum(distance, 1.0)) ** 4)
+    chance[(distance > radius) | (radius <= 0.0)] = 0.0
+    return float(1.0 - np.prod(1.0 - chance))
+
+
+def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
+    """Plan once and keep the values for tables and figures; algorithm: name of a planner, or `STRIP`."""
+    scenario = load_scenario(problem_name(threats))
+    searched = algorithm
+    if algorithm == STRIP:
+        scenario, searched = with_planner(scenario, STRIP, across_m=STRIP_ACROSS[threats]), PAPER
+    airframe = load_airframe(scenario)
+    began = time.process_time()
+    plan = make_plan(scenario, airframe, seed, searched)
+    seconds = time.process_time() - began
+    return SeededPlan(
+        threats=threats,
+        algorithm=algorithm,
+        seed=seed,
+        waypoints=plan.waypoints,
+        violations=tuple(int(value) for value in plan.violations),
+        objectives=tuple(float(value) for value in plan.objectives),
+        certified=plan.safe,
+        kill_probability=exposure_probability(scenario, plan.waypoints, "kill"),
+        detection_probability=exposure_probability(scenario, plan.waypoints, "detection"),
+        evaluations=plan.evaluations,
+        history=plan.history,
+        seconds=seconds,
+    )
+
+
+def plan_section(
+    problems: Sequence[int], seeds: int, algorithm: str, jobs: int | None = None, advance: Advance | None = None
+) -> list[SeededPlan]:
+    """Make all plans, ordered by problem, algorithm and seed 1..seeds for any number of processes.
+
+    algorithm: listed in place of the paper's planner; the strip and the baselines are always planned, too.
+    jobs: processes, by default one for each core that this process may use.  Raises ScenarioError for an unknown
+    algorithm.
+    """
+    names = [find_algorithm(algorithm, "algorithm").name]
+    names += [name for name in (STRIP, *BASELINES) if name not in names]
+    tasks = [(threats, name, seed) for threats in problems for name in names for seed in range(1, seeds + 1)]
+    count = min(len(tasks), jobs or usable_cores())
+    done: list[SeededPlan] = []
+    if advance is not None:
+        advance(0, len(tasks), f"0 of {len(tasks)} plans")
+    for item in _results(tasks, count):
+        done.append(item)
+        if advance is not None:
+            remark = f"{item.threats} threats, {item.algorithm}, seed {item.seed}"
+            advance(len(done), len(tasks), remark)
+    return done
+
+
+def usable_cores() -> int:
+    """Return the number of cores that this process may use, or all cores if the system does not say.
+
+    >>> usable_cores() >= 1
+    True
+    """
+    may_use = getattr(os, "sched_getaffinity", None)
+    return len(may_use(0)) if may_use is not None else os.cpu_count() or 1
+
+
+def _results(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPlan]:
+    """Yield results in the order of the tasks; the first runs here and compiles kernels for the others."""
+    yield plan_once(*tasks[0])
+    if count == 1:
+        yield from (plan_once(*task) for task in tasks[1:])
+        return
+    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=end_with_parent)
+    try:
+        # All processes are started here.
+        with children_ignore_sigint(), uninterrupted():
+            results = pool.map(_plan_task, tasks[1:])
+        yield from results
+    except BaseException:
+        # End the processes: their results are no longer needed.
+        pool.shutdown(wait=False, cancel_futures=True)
+        end_children(active_children())
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+        # The semaphores of the pool are released with its last reference.
+        del pool
+
+
+def _plan_task(task: tuple[int, str, int]) -> SeededPlan:
+    return plan_once(*task)
+
+
+def table(plans: Sequence[SeededPlan]) -> list[TableRow]:
+    """One row for each problem and algorithm, in the order they were planned."""
+    groups: dict[tuple[int, str], list[SeededPlan]] = {}
+    for item in plans:
+        groups.setdefault((item.threats, item.algorithm), []).append(item)
+    return [_row(group) for group in groups.values()]
+
+
+def _row(group: list[SeededPlan]) -> TableRow:
+    lengths = [item.objectives[Objective.LENGTH_RATIO] for item in group if item.safe]
+    kills = _column(group, lambda item: item.objectives[Objective.KILL_EXPOSURE])
+    return TableRow(
+        threats=group[0].threats,
+        algorithm=group[0].algorithm,
+        runs=len(group),
+        safe=sum(item.safe for item in group),
+        certified=sum(item.certified for item in group),
+        length_median=float(np.median(lengths)) if lengths else None,
+        length_worst=max(lengths) if lengths else None,
+        kill_median=float(np.median(kills)),
+        kill_worst=float(kills.max()),
+        kill_probability_worst=float(_column(group, lambda item: item.kill_probability).max()),
+        detection_median=float(np.median(_column(group, lambda item: item.objectives[Objective.DETECTION_EXPOSURE]))),
+        seconds_median=float(np.median(_column(group, lambda item: item.seconds))),
+    )
+
+
+def _column(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Floats:
+    return np.array([value(item) for item in group])
+
+
+# ----------------------------------------------------------------------
+# ----------------------------------------------------------------------
+# Output: the table on the terminal, and JSON, CSV and figures in a folder.
+
+PAPER_SCHEMA = "planfly.planning.paper/1"
+# Files that any command may write; older files of these names are cleared first.
+FILES = ("table.csv", "runs.csv", "runs.json", "times.csv", "convergence.png")
+
+
+def file_names(problems: Sequence[int]) -> list[str]:
+    """Return the names of all files in a folder for these problems."""
+    pictures = [f"{kind}-{threats:02d}.png" for threats in problems for kind in ("paths", "encodings")]
+    return [*FILES, *pictures]
+
+
+def table_text(rows: Sequence[TableRow]) -> str:
+    """Format the table for a terminal."""
+    head = (
+        f"{'threats':>7}  {'algorithm':<15}{'safe':>7}{'certified':>11}  {'PLR median':>10}  {'worst':>6}"
+        f"  {'PKill median':>12}  {'worst':>6}  {'PRD median':>10}  {'CPU s':>6}"
+    )
+    lines = [head]
+    for row in rows:
+        safe, certified = f"{row.safe}/{row.runs}", f"{row.certified}/{row.runs}"
+        lines.append(
+            f"{row.threats:>7}  {row.algorithm:<15}{safe:>7}{certified:>11}  {_number(row.length_median, 4):>10}  "
+            f"{_number(row.length_worst, 4):>6}  {row.kill_median:>12.3g}  {row.kill_worst:>6.3g}  "
+            f"{row.detection_median:>10.3g}  {row.seconds_median:>6.2f}"
+        )
+    lines += [
+        "safe: no violation and no kill exposure on the paper's six points a leg; certified: so along the whole path.",
+        "PLR: of the safe runs; PKill and PRD: the paper's sums, of all runs; CPU s: median of one run.",
+    ]
+    return "\n".join(lines)
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededPlan]) -> None:
+    """Write table.csv, runs.csv and runs.json, reproducible for a seed, and times.csv, which is not."""
+    columns = [item.name for item in fields(TableRow) if item.name != "seconds_median"]
+    write_whole(folder / "table.csv", _csv(columns, ([getattr(row, name) for name in columns] for row in rows)))
+    write_whole(folder / "runs.csv", _csv(_PLAN_COLUMNS, (list(_plan_row(item).values()) for item in plans)))
+    times = ([item.threats, item.algorithm, item.seed, f"{item.seconds:.3f}"] for item in plans)
+    write_whole(folder / "times.csv", _csv(["threats", "algorithm", "seed", "cpu_s"], times))
+    kept = [{key: value for key, value in asdict(row).items() if key != "seconds_median"} for row in rows]
+    runs = [
+        _plan_row(item)
+        | {
+            "waypoints_east_north_amsl_m": item.waypoints.tolist(),
+            "history_length_kill_violations": item.history.tolist(),
+        }
+        for item in plans
+    ]
+    text = json.dumps({"schema": PAPER_SCHEMA, "table": kept, "runs": runs}, allow_nan=False, indent=1)
+    write_whole(folder / "runs.json", text + "\n")
+
+
+def _plan_row(item: SeededPlan) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "threats": item.threats,
+        "algorithm": item.algorithm,
+        "seed": item.seed,
+        "safe": item.safe,
+        "certified": item.certified,
+    }
+    row |= {f"violations_{kind.name.lower()}": item.violations[kind] for kind in Violation}
+    row |= {kind.name.lower(): item.objectives[kind] for kind in Objective}
+    return row | {
+        "kill_probability": item.kill_probability,
+        "detection_probability": item.detection_probability,
+        "evaluations": item.evaluations,
+    }
+
+
+_PLAN_COLUMNS = [
+    "threats",
+    "algorithm",
+    "seed",
+    "safe",
+    "certified",
+    *(f"violations_{kind.name.lower()}" for kind in Violation),
+    *(kind.name.lower() for kind in Objective),
+    "kill_probability",
+    "detection_probability",
+    "evaluations",
+]
+
+
+def _csv(columns: Sequence[str], rows: Any) -> str:
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(rows)
+    return buffer.getvalue()
+
+
+def write_figures(folder: Path, plans: Sequence[SeededPlan]) -> None:
+    """Draw the figures of the paper: 5-8 (paths), 9-12 (encodings) and the convergence over generations."""
+    from logs.views.drawing import write_png
+    from logs.views.paper import PaperPath, draw_convergence, draw_encodings, draw_paths
+
+    by_problem: dict[int, dict[str, list[SeededPlan]]] = {}
+    for item in plans:
+        by_problem.setdefault(item.threats, {}).setdefault(item.algorithm, []).append(item)
+    for threats, groups in by_problem.items():
+        scenario = load_scenario(problem_name(threats))
+        first = next(iter(groups))
+        lines = {
+            name: [PaperPath(item.waypoints, item.objectives[Objective.LENGTH_RATIO], item.safe) for item in group]
+            for name, group in groups.items()
+        }
+        write_png(draw_paths(scenario, first, lines[first]), folder / f"paths-{threats:02d}.png")
+        chosen = {name: group[0] for name, group in lines.items()}
+        write_png(draw_encodings(scenario, chosen, seed=1), folder / f"encodings-{threats:02d}.png")
+    histories = {
+        threats: {name: [item.history for item in group] for name, group in groups.items()}
+        for threats, groups in by_problem.items()
+    }
+    write_png(draw_convergence(histories), folder / "convergence.png")
+
+
+# ----------------------------------------------------------------------
+# All of it in one call.
+
+
+@dataclass(frozen=True, slots=True)
+class PaperTables:
+    """Result of `planfly.paper_tables`.
+
+    rows: the table, a row for each problem and algorithm.  plans: the plans in it.
+    """
+
+    rows: tuple[TableRow, ...]
+    plans: tuple[SeededPlan, ...]
+
+
+def paper_tables(
+    problems: Sequence[int] = PROBLEMS,
+    *,
+    runs: int = 15,
+    algorithm: str = PAPER,
+    jobs: int | None = None,
+    out: str | Path | None = None,
+    overwrite: bool = False,
+) -> PaperTables:
+    """Plan section V of the paper again: seeded plans of its problems in three encodings.
+
+    problems: numbers of threats, out of 7, 15, 30 and 60.  runs: seeds 1..runs of each.
+    algorithm: planned in addition to the baselines.  jobs: processes; None for one a core.
+    out: folder for tables and figures; None writes none.  overwrite: true to replace existing results.
+
+    A script must call it under ``if __name__ == "__main__":``, because its processes import the script.
+    Raises a `planfly.PlanflyError` for bad input.
+    """
+    check_arguments(problems=tuple(problems), runs=runs, jobs=jobs)
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        refuse_folder(folder, overwrite)
+    with stage("planning", "planning the paper's problems") as advance:
+        plans = plan_section(problems, runs, algorithm, jobs, advance)
+    rows = table(plans)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        with hold(folder):
+            prepare_folder(folder, tuple(file_names(PROBLEMS)))
+            write_tables(folder, rows, plans)
+            with stage("drawing", "drawing the paper's figures"):
+                write_figures(folder, plans)
+    return PaperTables(tuple(rows), tuple(plans))

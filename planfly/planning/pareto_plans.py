@@ -1,0 +1,45 @@
+"""Pareto front of plans for a scenario: the default plan of every command, and alternatives."""
+
+from planfly.planning.gust_altitude_margin import limits_of_others
+from planfly.planning.gust_orbits import waypoints_in_gusts
+from planfly.workflow.airframe import Airframe
+from planfly.workflow.make_plan import Advance, finish_plan, make_plan
+from planner.plan import Plan
+from planner.search.plan_front import Front, plan_front
+from planner.search.search_state import StopCondition
+from world.scenario import Scenario
+
+
+def make_pareto_plans(
+    scenario: Scenario,
+    airframe: Airframe,
+    seed: int,
+    count: int,
+    advance: Advance | None = None,
+    *,
+    stop: StopCondition | None = None,
+    onward: bool = False,
+) -> Front:
+    """Return up to `count` plans of a front, each safe by all checks of `planfly.workflow.make_plan.make_plan`.
+
+    The default plan is made by `make_plan`, and if it is not safe there is no front. Alternatives that are not safe
+    once they are finished are left out; if gusts make the autopilot orbit, they have no more waypoints than gusts
+    allow.
+    stop, onward: as for `make_plan`.
+    """
+    default = make_plan(scenario, airframe, seed, advance=advance, stop=stop, onward=onward)
+
+    def finish(plan: Plan) -> Plan:
+        return finish_plan(plan, airframe, onward=onward)
+
+    return plan_front(
+        scenario,
+        limits_of_others(default, airframe),
+        count,
+        seed=seed,
+        progress=advance,
+        stop=stop,
+        default=default,
+        waypoints=waypoints_in_gusts(default, airframe),
+        finish=finish,
+    )

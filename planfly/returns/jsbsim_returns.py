@@ -1,0 +1,138 @@
+"""A return to launch flown in JSBSim, by the full control law or by the ArduPlane program."""
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.mission.items import LANDINGS, Command, Frame, Mission, MissionItem
+from flight.mission.return_path import LandingStart
+from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import Flight, fly_to_end
+from flight.simulation.track import Track
+from logs.verdict.returns.judge_returns import ReturnWorld
+from planfly.workflow.airframe import Airframe, load_airframe
+from planfly.workflow.open_flight import make_setup
+from world.errors import PlanflyError
+from world.frames import to_geo
+from world.kernels import Record
+
+Floats = NDArray[np.float64]
+
+# Length of the lead-in, m, so that the flight is steady at the start of the return.
+LEAD = 500.0
+# A flight that passes the start at a larger horizontal distance has not begun there, m.
+_MAX_START_DISTANCE_M = 60.0
+# The same for the vertical distance, m.
+_MAX_START_HEIGHT_ERROR_M = 15.0
+# Delay of the control law in following a slope after a waypoint, s; the start waypoint is set ahead in altitude by it.
+_SLOPE_DELAY_S = 3.0
+
+
+class Met(NamedTuple):
+    """Nearest approaches of a path to ground and missiles.
+
+    clearance: least height above ground, m, NaN if not known; at: (3,) its place, m.
+    outside: least distance outside a kill sphere, m, inf without any; threat: index of the threat, -1 without any.
+    """
+
+    clearance: float
+    at: tuple[float, float, float]
+    outside: float
+    threat: int
+
+
+def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
+    """Return least height above ground and least distance outside a kill sphere of a flight in JSBSim, m.
+
+    The flight has exact navigation and the mean wind alone, as with the point mass.  start: a record of
+    `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.  None for a return that cannot be flown.
+    """
+    try:
+        setup, airframe = return_setup(world, start)
+        flown = fly_to_end(Flight(setup, airframe.aircraft))
+    except PlanflyError:
+        return None
+    position = from_start(flown.track, start)
+    if position is None:
+        return None
+    met = met_on_way(world, position)
+    return (min(0.0, met.clearance) if flown.ended == "ground contact" else met.clearance), met.outside
+
+
+def return_setup(
+    world: ReturnWorld, start: Record, landing: LandingStart | None = None
+) -> tuple[FlightSetup, Airframe]:
+    """Make the setup of a return by the control law, in the mean wind alone, with a lead-in to its start.
+
+    landing: the landing sequence that it leads to, None for none.
+    Raises MissionError for a return that cannot be laid out, and ScenarioError or ParameterError as `load_airframe`.
+    """
+    scenario = replace(world.scenario, wind=replace(world.scenario.wind, turbulence="none"))
+    airframe = replace(load_airframe(scenario), autopilot=ArduPlane(world.parameters))
+    return replace(make_setup(scenario, airframe, _return_mission(world, start, landing), 1), nav="perfect"), airframe
+
+
+def from_start(track: Track, start: Record) -> Floats | None:
+    """Return positions (t, 3) from the start of the return on; None if the flight does not reach it."""
+    begin = np.array([float(start["east"]), float(start["north"])])
+    near = np.hypot(*(track.position[: round(2.0 * LEAD / 10.0 * 60.0), :2] - begin).T)
+    if not near.size or float(near.min()) > _MAX_START_DISTANCE_M:
+        return None
+    position: Floats = track.position[int(np.argmin(near)) :]
+    return None if abs(float(position[0, 2]) - float(start["up"])) > _MAX_START_HEIGHT_ERROR_M else position
+
+
+def met_on_way(world: ReturnWorld, position: Floats) -> Met:
+    """Find the nearest approaches of a path (t, 3) to ground and missiles."""
+    low, at = math.nan, (math.nan, math.nan, math.nan)
+    if world.scenario.terrain is not None:
+        above = position[:, 2] - world.scenario.terrain.height(position[:, 0], position[:, 1])
+        lowest = int(np.argmin(above))
+        low, (east, north, up) = float(above[lowest]), position[lowest].tolist()
+        at = east, north, up
+    outside, threat = math.inf, -1
+    threats = world.scenario.threats
+    for k in np.flatnonzero(threats.kill_radius > 0.0):
+        away = float((np.linalg.norm(position - threats.position[k], axis=1) - threats.kill_radius[k]).min())
+        if away < outside:
+            outside, threat = away, int(k)
+    return Met(low, at, outside, threat)
+
+
+def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | None) -> Mission:
+    """Make a mission that passes a start on its course and slope, and returns from there."""
+    east, north, up = (float(start[name]) for name in ("east", "north", "up"))
+    ve, vn, vu = (float(start[f"velocity_{name}"]) for name in ("east", "north", "up"))
+    over = max(1.0, math.hypot(ve, vn))
+    up += _SLOPE_DELAY_S * vu
+    places = [(east - LEAD * ve / over, north - LEAD * vn / over, up - LEAD * vu / over), (east, north, up)]
+    origin, mission = world.scenario.origin, world.setup.mission
+    items = []
+    for number, place in enumerate(places, 1):
+        lat, lon = (float(value) for value in to_geo(origin, place[0], place[1]))
+        params = (0.0, float(number - 1), 0.0, 0.0)
+        items.append(MissionItem(number, Command.NAV_WAYPOINT, Frame.GLOBAL, params, lat, lon, place[2]))
+    back = int(Command.NAV_RETURN_TO_LAUNCH)
+    items.append(MissionItem(3, back, int(Frame.MISSION), (0.0,) * 4, 0.0, 0.0, 0.0))
+    if landing is not None:
+        items += _landing_items(mission.items, landing)
+    rally = []
+    for number, point in enumerate(world.rally):
+        lat, lon = (float(value) for value in to_geo(origin, point.east, point.north))
+        frame = Frame.GLOBAL_RELATIVE_ALT if point.base else Frame.GLOBAL
+        place_up = point.up - point.base
+        rally.append(MissionItem(number, Command.NAV_RALLY_POINT, frame, (0.0,) * 4, lat, lon, place_up))
+    home = None if mission.home is None else replace(mission.home, alt=world.home.up)
+    return Mission(home, tuple(items), rally=tuple(rally), source=mission.source)
+
+
+def _landing_items(items: tuple[MissionItem, ...], landing: LandingStart) -> list[MissionItem]:
+    """Return the items of a landing sequence, from its DO_LAND_START to the landing, numbered from 4."""
+    first = next(k for k, item in enumerate(items) if item.seq == landing.item)
+    begin = max(k for k in range(first) if items[k].command == Command.DO_LAND_START)
+    end = next(k for k in range(first, len(items)) if items[k].command in LANDINGS)
+    return [replace(item, seq=number) for number, item in enumerate(items[begin : end + 1], 4)]

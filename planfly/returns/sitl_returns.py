@@ -1,0 +1,291 @@
+"""Worst returns to launch, flown again by the ArduPlane program to check planfly's control law.
+
+Each is a separate flight, on the mission by which `planfly.returns.jsbsim_returns` flies a return by the control law.  The
+result of the program replaces the result of the law only if it is worse; it never improves a judgement.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.rtl_point_mass import (
+    RETURN_ARRIVED,
+    RETURN_GROUND_IMPACT,
+    RETURN_OFF_TERRAIN,
+    RETURN_RESULT,
+    RETURN_TIMEOUT,
+)
+from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
+from flight.autopilots.catalog import program_autopilot
+from flight.mission.return_path import ReturnTarget
+from flight.simulation.track import Track
+from logs.verdict.returns.judge_returns import (
+    KINDS,
+    ReturnFlown,
+    Returns,
+    ReturnWorld,
+    badness,
+    doubt,
+    is_steady,
+    kind_of,
+    zone_met,
+)
+from logs.verdict.returns.return_starts import ReturnStarts
+from logs.verdict.returns.returns_text import measured_text
+from planfly.returns.jsbsim_returns import LEAD, from_start, met_on_way, return_setup
+from planfly.runtime.stages import stage
+from planfly.workflow.pipeline import fly_and_judge
+from world.errors import ArgumentError, MissionError
+from world.kernels import Record
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+# Least height above ground of the lead-in to the start of a return, m; a return with a lower lead-in is not flown.
+_MIN_LEAD_IN_HEIGHT_M = 20.0
+# A return that ends within this distance of a place has arrived there, m.
+_ARRIVAL_DISTANCE_M = 500.0
+# A return that heads for a place within this angle is on its path there, rad.
+_ARRIVAL_HEADING_TOLERANCE_RAD = math.radians(10.0)
+# Rows of a track in a second.
+_ROWS_PER_SECOND = 60
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramReturn:
+    """One return as flown by the control law and by the program.
+
+    law: the return as it was judged.  flown: the return by the program, or None if it could not be flown.
+    reason: why the program could not fly it; "" if it did.  log: the log of the flight, or None if it was not kept.
+    """
+
+    law: ReturnFlown
+    flown: ReturnFlown | None = None
+    reason: str = ""
+    log: Path | None = None
+
+    @property
+    def agrees(self) -> bool:
+        """True if both go to the same place with the same kind of outcome."""
+        return self.flown is not None and (self.flown.kind, self.flown.target.name) == (
+            self.law.kind,
+            self.law.target.name,
+        )
+
+    @property
+    def worse(self) -> bool:
+        """True if the program does harm that the control law does not."""
+        return self.flown is not None and KINDS.index(self.flown.kind) < KINDS.index(self.law.kind)
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramReturns:
+    """Returns that the program flew.
+
+    program: its name and version; "" if it flew none.  each: the returns, the worst first.
+    """
+
+    program: str
+    each: tuple[ProgramReturn, ...]
+
+    @property
+    def flown(self) -> tuple[ProgramReturn, ...]:
+        """The returns that the program could fly."""
+        return tuple(one for one in self.each if one.flown is not None)
+
+    def headline(self) -> str:
+        """Return a one-line summary.
+
+        >>> ProgramReturns("", ()).headline()
+        'by the program: no return could be flown'
+        """
+        if not self.flown:
+            return "by the program: no return could be flown"
+        same = sum(one.agrees for one in self.flown)
+        worse = sum(one.worse for one in self.flown)
+        compared = "all of them as by the law" if same == len(self.flown) else f"{same} of them as by the law"
+        compared += f"; {worse} worse than by the law, which errs there" if worse else ""
+        return f"by {self.program} itself: {len(self.flown)} of the worst flown, {compared}"
+
+    def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
+        """Describe each return in a line: start, outcome by the law and by the program, agreement."""
+        out = []
+        for one in self.each:
+            east, north, _ = one.law.start
+            begins = f"{one.law.time:.0f} s, from {east:.0f} m east, {north:.0f} m north"
+            law = measured_text(one.law, returns.limit, scenario)
+            if one.flown is None:
+                out.append(f"{begins}: by the law {law}; not flown by the program: {one.reason}")
+                continue
+            agree = (
+                "they agree" if one.agrees else "the program's counts" if one.worse else "the law's, the worse, counts"
+            )
+            flown = measured_text(one.flown, returns.limit, scenario)
+            out.append(f"{begins}: by the law {law}; by the program {flown}: {agree}")
+        return out
+
+    def put_right(self, returns: Returns) -> Returns:
+        """Return the returns, with the result of the program wherever it is worse than the result of the law."""
+        worse = {id(one.law): one.flown for one in self.each if one.worse}
+        return replace(returns, each=tuple(worse.get(id(one)) or one for one in returns.each))
+
+
+def refuse_program(program: Path) -> None:
+    """Raise ArgumentError for a program whose returns planfly cannot compare, as it has no model of them."""
+    kind = program_autopilot(program)
+    if not issubclass(kind, ArduPlaneSitl):
+        allowed = f"ArduPlane's program is expected: how {kind.title} returns is not flown here"
+        raise ArgumentError.of_argument("autopilot", str(program), allowed)
+
+
+def worst_apart(
+    world: ReturnWorld, starts: ReturnStarts, returns: Returns, points: int
+) -> list[tuple[ReturnFlown, int]]:
+    """Choose at most `points` of the worst returns that can be flown, each with the number of its start.
+
+    The worst comes first.  Starts closer together than half of their share of the path are skipped: neighbouring
+    seconds show the same.
+    """
+    rows = starts.rows
+    place = np.column_stack([rows["east"], rows["north"]])
+    apart = 0.5 * float(np.hypot(*np.diff(place, axis=0).T).sum()) / points if len(starts) > 1 else 0.0
+    number = {float(time): k for k, time in enumerate(starts.time)}
+    chosen: list[tuple[ReturnFlown, int]] = []
+    for one in sorted(returns.each, key=_worst_first):
+        k = number[one.time]
+        near = any(np.hypot(*(place[k] - place[other])) < apart for _, other in chosen)
+        if near or starts.low[k] or not is_steady(world, rows[k]) or not _is_clear(world, rows[k]):
+            continue
+        chosen.append((one, k))
+        if len(chosen) == points:
+            break
+    return chosen
+
+
+def _worst_first(one: ReturnFlown) -> tuple[int, float]:
+    """Return the sort key of a return: `badness`, and for safe returns the one nearest to a limit first."""
+    return (KINDS.index("safe"), doubt(one)) if one.safe else badness(one)
+
+
+def _is_clear(world: ReturnWorld, row: Record) -> bool:
+    """Return True if the straight lead-in to a start stays above the ground."""
+    if world.scenario.terrain is None:
+        return True
+    velocity = np.array([float(row[f"velocity_{name}"]) for name in ("east", "north", "up")])
+    begin = np.array([float(row[name]) for name in ("east", "north", "up")])
+    back = np.linspace(0.0, LEAD / max(1.0, math.hypot(*velocity[:2])), 26)
+    path = begin - back[:, None] * velocity
+    return bool((path[:, 2] - world.scenario.terrain.height(path[:, 0], path[:, 1])).min() > _MIN_LEAD_IN_HEIGHT_M)
+
+
+def fly_by_program(
+    world: ReturnWorld, starts: ReturnStarts, returns: Returns, program: Path, points: int, folder: Path | None
+) -> ProgramReturns:
+    """Fly at most `points` of the worst returns by ArduPlane, in the mean wind, with exact navigation.
+
+    folder: target of the flight logs, both planfly's and the program's; None writes none.
+    Raises FlightError if the program does not start or breaks off.
+    """
+    flown, version = [], ""
+    for number, (one, k) in enumerate(worst_apart(world, starts, returns, points), 1):
+        log = None if folder is None else folder / f"worst-return-{number}.mcap"
+        with stage(f"flying return {number} of {points} by the program", "flying a return by a program") as advance:
+            try:
+                setup, airframe = return_setup(world, starts.rows[k], one.target.landing)
+            except MissionError as error:
+                flown.append(ProgramReturn(one, reason=str(error)))
+                continue
+            judged = fly_and_judge(setup, airframe, log, advance, autopilot=program, reference="never")
+        version = judged.setup.autopilot.version
+        found = _as_flown(world, one, starts.rows[k], judged.track, judged.ended)
+        reason = "" if found else f"it does not come to where the return begins ({judged.ended})"
+        flown.append(ProgramReturn(one, found, reason, log))
+    return ProgramReturns(version, tuple(flown))
+
+
+def _as_flown(world: ReturnWorld, law: ReturnFlown, start: Record, track: Track, ended: str) -> ReturnFlown | None:
+    """Judge a return flown by the program; None if the flight did not reach the start of the return."""
+    whole = from_start(track, start)
+    if whole is None:
+        return None
+    begin = len(track) - len(whole)
+    position = _until_landing(law.target, whole)
+    target = _flown_target(world, law.target, position)
+    closest = met_on_way(world, position)
+    hits = ended == "ground contact" and len(position) == len(whole)
+    arrives = hits or bool(np.hypot(*(position[-1, :2] - np.array(_end_position(target)[:2]))) < _ARRIVAL_DISTANCE_M)
+    record: Record = np.zeros(1, RETURN_RESULT)[0]
+    clearance = min(0.0, closest.clearance) if hits else closest.clearance
+    record["ended"] = (
+        RETURN_GROUND_IMPACT if hits or clearance <= 0.0 else RETURN_ARRIVED if arrives else RETURN_TIMEOUT
+    )
+    if math.isnan(clearance):
+        record["ended"] = RETURN_OFF_TERRAIN
+    record["clearance"], record["outside"], record["threat"] = clearance, closest.outside, closest.threat
+    used = float(track.energy[begin + len(position) - 1] - track.energy[begin])
+    left = law.left + law.energy - used
+    zone = zone_met(world, position[::_ROWS_PER_SECOND]) if world.airspace.zones else -1
+    return replace(
+        law,
+        target=target,
+        kind=kind_of(world, record, zone, left, law.floor),
+        clearance=clearance,
+        clearance_at=closest.at,
+        outside=closest.outside,
+        threat=closest.threat,
+        zone=zone,
+        energy=used,
+        left=left,
+    )
+
+
+def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
+    """Return the place where judgement ends: the loiter center, or the last place before the landing."""
+    if target.landing is None:
+        return target.position
+    return (target.landing, *target.landing.onward)[-1].place
+
+
+def _until_landing(target: ReturnTarget, position: Floats) -> Floats:
+    """Cut a path (t, 3) to a landing sequence at the last place before the landing."""
+    if target.landing is None:
+        return position
+    return position[: int(np.argmin(np.linalg.norm(position - np.array(_end_position(target)), axis=1))) + 1]
+
+
+def _flown_target(world: ReturnWorld, law: ReturnTarget, position: Floats) -> ReturnTarget:
+    """Identify the target of a path (t, 3): the place where it ends, or else the place that it heads for.
+
+    All places that a return may go to are tried.  Falls back to the target of the law.
+    """
+    last, before = position[-1, :2], position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
+    course = math.atan2(*(last - before))
+    best, least = law, math.inf
+    for target in (law, *_other_targets(world, law)):
+        off = np.array(_end_position(target)[:2]) - last
+        away = math.hypot(*off)
+        turned = abs(math.remainder(math.atan2(*off) - course, math.tau))
+        # A place at which the path ends ranks before any that it heads for.
+        rank = (
+            away / _ARRIVAL_DISTANCE_M if away < _ARRIVAL_DISTANCE_M else 1.0 + turned / _ARRIVAL_HEADING_TOLERANCE_RAD
+        )
+        if rank < min(least, 2.0):
+            best, least = target, rank
+    return best
+
+
+def _other_targets(world: ReturnWorld, law: ReturnTarget) -> Iterator[ReturnTarget]:
+    """Yield home and all rally points, except the target of the law."""
+    home = ArduPlane(world.parameters).return_rules.height + world.home.up
+    places = [
+        ("home", (world.home.east, world.home.north, home)),
+        *((f"rally point {one.number or k}", (one.east, one.north, one.up)) for k, one in enumerate(world.rally, 1)),
+    ]
+    for name, place in places:
+        if name != law.name:
+            yield ReturnTarget(place, name, "", math.nan)

@@ -1,0 +1,1 @@
+"""Processes, first compilation, progress and the checks made before any work."""

@@ -1,0 +1,257 @@
+"""Application of a suggestion of a failed finding to the items of the mission.
+
+A suggestion states a change of the path; this module decides which items move for it: the fewest, by the least distance
+that the finding requires.  Suggestions about the aircraft, such as a larger battery, change no mission.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.items import LANDINGS, Mission
+from flight.mission.route import Route
+from logs.verdict.findings import Finding
+from logs.verdict.places import Change, Suggestion
+from planfly.studio.edit_context import EditContext, Judged
+from planfly.studio.edits import at_height, at_speed, moved, places
+from planfly.studio.states import violated_legs
+from world.errors import MissionError
+from world.geometry import leg_courses, signed_turns
+
+Floats = NDArray[np.float64]
+
+_PATH_CHANGES = (
+    "length",
+    "rise",
+    "airspeed",
+    "turn",
+    "height",
+    "descent",
+    "inset",
+    "distance",
+    "north",
+    "east",
+    "south",
+    "west",
+)
+_SIDES = {"north": (0.0, 1.0), "east": (1.0, 0.0), "south": (0.0, -1.0), "west": (-1.0, 0.0)}
+# Steps in which a turn is made gentler, as fractions of the distance to the straight line.
+_TURN_STEPS = 40
+# Changes by a step, m, which are repeated while the finding fails.
+_STEPS = frozenset(("height", "descent", "inset", "distance", *_SIDES))
+# Greatest number of repetitions of a step.
+_MAX_REPETITIONS = 10
+# Factor on the suggested distance in a repetition.
+_REPETITION_FACTOR = 1.5
+# Added to the suggested distance in a repetition, m.
+_REPETITION_ADDITION_M = 2.0
+# Distance beyond a sphere's edge at which a step aims, m, as in the planner: the navigation error may be a third of it.
+_SPHERE_MARGIN_M = 15.0
+
+
+def can_apply(suggestion: Suggestion) -> bool:
+    """Return True if all of a suggestion is a change of the items of a mission.
+
+    >>> from logs.verdict.places import FLIGHT, Place
+    >>> can_apply((Change("length", Place("leg", 1), 300.0, 400.0, "m"),))
+    True
+    >>> can_apply((Change("battery", FLIGHT, None, 1.2, "1"),))
+    False
+    """
+    return bool(suggestion) and all(change.what in _PATH_CHANGES for change in suggestion)
+
+
+def apply_suggestion(desk: EditContext, judged: Judged, item: Finding, which: int) -> Mission:
+    """Apply a suggestion of a finding to the mission until the finding passes.
+
+    The suggested step is a minimum: if an item moves by it, the path moves by less.  The rest is done in further steps.
+    Raises MissionError if no item can be moved for it.
+    """
+    if not 0 <= which < len(item.suggestions) or not can_apply(item.suggestions[which]):
+        raise MissionError(f"{judged.mission.source}: this suggestion is no change of its items", field="suggestion")
+    suggestion = item.suggestions[which]
+    # Try to move a single waypoint first: each one that moves may fail elsewhere.
+    counts = (1, None) if any(change.what == "distance" for change in suggestion) else (None,)
+    made = [_apply_until_passed(desk, judged, item, suggestion, most) for most in counts]
+    return min(made, key=lambda one: len(one.verdict.failed)).mission
+
+
+def _apply_until_passed(
+    desk: EditContext, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None
+) -> Judged:
+    """Repeat a suggestion until its finding passes, and judge.  most: number of waypoints to move."""
+    kinds = [change.what for change in suggestion]
+    judged = desk.judge(_apply_once(desk, judged, item, suggestion, most))
+    for _ in range(_MAX_REPETITIONS if set(kinds) <= _STEPS else 0):
+        left = [one for one in judged.verdict.failed if (one.rule, one.place) == (item.rule, item.place)]
+        alike = [(one, more) for one in left for more in one.suggestions if [change.what for change in more] == kinds]
+        if not alike:
+            break
+        one, more = alike[0]
+        further = tuple(
+            replace(change, wanted=_REPETITION_FACTOR * change.wanted + _REPETITION_ADDITION_M) for change in more
+        )
+        judged = desk.judge(_apply_once(desk, judged, one, further, most))
+    return judged
+
+
+def _apply_once(desk: EditContext, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None) -> Mission:
+    """Make each change of a suggestion once.  Raises MissionError if no item moves."""
+    sheet = _MovableMission(desk, judged, most)
+    for change in suggestion:
+        _CHANGES[change.what](sheet, change, item)
+    if not sheet.changed:
+        raise MissionError(
+            f"{judged.mission.source}: no item of the mission lies there: move one by hand", field="suggestion"
+        )
+    return sheet.mission
+
+
+class _MovableMission:
+    """Mission whose items are moved one after the other."""
+
+    def __init__(self, desk: EditContext, judged: Judged, most: int | None) -> None:
+        self.desk, self.mission, self.route = desk, judged.mission, judged.setup.route
+        self.requirements, self.most, self.changed = judged.requirements, most, False
+
+    def index_of(self, waypoint: int) -> int | None:
+        """Return the index in the mission's list of the item of a waypoint; None if there is none."""
+        seq = int(self.route.items[waypoint])
+        own = [k for k in places(self.mission) if self.mission.items[k].seq == seq]
+        return own[0] if own else None
+
+    def points(self) -> Floats:
+        """Return the waypoints of the route, (w, 3) m, before the change."""
+        return np.asarray(self.route.waypoints)
+
+    def shift(self, waypoints: Sequence[int], by: Floats) -> None:
+        """Move the items of waypoints, each once, by metres east, north and up; landings stay."""
+        for index in dict.fromkeys(self.index_of(one) for one in waypoints):
+            if index is None or self.mission.items[index].command in LANDINGS:
+                continue
+            here = self.desk.points(self.mission)[places(self.mission).index(index)]
+            if by[0] or by[1]:
+                self.mission = moved(self.mission, index, *self.desk.geographic(*(here[:2] + by[:2]).tolist()))
+            if by[2] and math.isfinite(here[2]):
+                self.mission = at_height(self.mission, index, float(here[2] + by[2]), float(here[2]))
+            self.mission, self.changed = self.desk.retuned(self.mission, index), True
+
+    def ends_of(self, legs: Sequence[int]) -> list[int]:
+        """Return the waypoints at the ends of legs; the ends of the route only if there are no others."""
+        ends = sorted({end for leg in legs for end in (leg, leg + 1)})
+        inner = [end for end in ends if 0 < end < self.route.legs]
+        return inner or ends
+
+
+def _leg_of_change(change: Change, route: Route) -> int:
+    if change.place.kind != "leg" or change.place.index is None or change.place.index >= route.legs:
+        raise MissionError("this suggestion names no leg of the route", field="suggestion")
+    return change.place.index
+
+
+def _lengthen_leg(sheet: _MovableMission, change: Change, _item: Finding) -> None:
+    """Lengthen a leg: the rest of the route moves along its course, so that no other leg changes."""
+    leg = _leg_of_change(change, sheet.route)
+    course = float(leg_courses(sheet.points())[leg])
+    grow = change.wanted - (change.current or 0.0)
+    onward = range(leg + 1, len(sheet.points()))
+    sheet.shift(list(onward), grow * np.array([math.sin(course), math.cos(course), 0.0]))
+
+
+def _reduce_rise(sheet: _MovableMission, change: Change, _item: Finding) -> None:
+    """Reduce the climb or descent of a leg: an inner end moves, or both ends by half."""
+    leg, points = _leg_of_change(change, sheet.route), sheet.points()
+    excess = float(points[leg + 1, 2] - points[leg, 2]) - change.wanted
+    first, last = leg == 0, leg + 1 == sheet.route.legs
+    share = 0.0 if last and not first else 1.0 if first and not last else 0.5
+    sheet.shift([leg], np.array([0.0, 0.0, (1.0 - share) * excess]))
+    sheet.shift([leg + 1], np.array([0.0, 0.0, -share * excess]))
+
+
+def _set_airspeed(sheet: _MovableMission, change: Change, _item: Finding) -> None:
+    """Change the airspeed on a leg, on both legs of a waypoint, or on the whole route."""
+    place, route = change.place, sheet.route
+    wanted = change.wanted if change.most is None else 0.5 * (change.wanted + change.most)
+    legs = range(route.legs)
+    if place.kind == "leg":
+        legs = range(_leg_of_change(change, route), _leg_of_change(change, route) + 1)
+    elif place.kind == "waypoint" and place.index is not None:
+        legs = range(max(0, place.index - 1), min(route.legs, place.index + 1))
+    for leg in reversed(legs):
+        index = sheet.index_of(leg + 1)
+        if index is not None:
+            sheet.mission = at_speed(sheet.mission, index, wanted, float(route.airspeed[leg]))
+            sheet.changed = True
+
+
+def _make_turn_gentler(sheet: _MovableMission, change: Change, _item: Finding) -> None:
+    """Make a turn gentler: the waypoint moves towards the line between its neighbours."""
+    points, i = sheet.points(), change.place.index
+    if i is None or not 0 < i < sheet.route.legs:
+        return
+    before, here, after = points[i - 1], points[i], points[i + 1]
+    way = after[:2] - before[:2]
+    share = float(np.clip((here[:2] - before[:2]) @ way / max(float(way @ way), 1.0), 0.1, 0.9))
+    foot = before[:2] + share * way
+    for step in range(1, _TURN_STEPS + 1):
+        bent = here[:2] + step / _TURN_STEPS * (foot - here[:2])
+        corner = np.array([before, [*bent, here[2]], after])
+        if math.degrees(abs(float(signed_turns(corner)[0]))) <= change.wanted - 0.1:
+            sheet.shift([i], np.array([*(bent - here[:2]), 0.0]))
+            return
+
+
+def _change_altitude(sheet: _MovableMission, change: Change, item: Finding) -> None:
+    """Raise or lower a leg, or the path at a zone, by a step."""
+    up = change.wanted if change.what == "height" else -change.wanted
+    legs = (
+        [_leg_of_change(change, sheet.route)] if change.place.kind == "leg" else violated_legs(sheet.requirements, item)
+    )
+    ends = sorted({end for leg in legs for end in (leg, leg + 1)})
+    sheet.shift(ends, np.array([0.0, 0.0, up]))
+
+
+def _move_inside_area(sheet: _MovableMission, change: Change, _item: Finding) -> None:
+    """Move waypoints inside that are too near to the edges, floor or ceiling of the area."""
+    scenario, points = sheet.desk.scenario, sheet.points()
+    (west, east), (south, north) = scenario.bounds.tolist()
+    low = np.array([west, south, scenario.floor]) + change.wanted
+    high = np.array([east, north, scenario.ceiling]) - change.wanted
+    inside = np.clip(points, low, high)
+    outside = ((points < low - change.wanted) | (points > high + change.wanted)).any(axis=1)
+    for k in np.flatnonzero(outside).tolist():
+        sheet.shift([k], inside[k] - points[k])
+
+
+def _move_away_from_missile(sheet: _MovableMission, change: Change, item: Finding) -> None:
+    """Move the waypoints near the sphere of a missile away from it."""
+    centre = sheet.desk.scenario.threats.position[change.place.index or 0]
+    legs, points = violated_legs(sheet.requirements, item), sheet.points()
+    away = points[:, :2] - centre[:2]
+    length = np.hypot(away[:, 0], away[:, 1])
+    for k in sorted(sheet.ends_of(legs), key=lambda end: float(length[end]))[: sheet.most]:
+        if length[k] > 1.0:
+            sheet.shift([k], np.array([*((change.wanted + _SPHERE_MARGIN_M) * away[k] / length[k]), 0.0]))
+
+
+def _move_sideways(sheet: _MovableMission, change: Change, item: Finding) -> None:
+    """Move the legs on which a zone is violated to one side."""
+    east, north = _SIDES[change.what]
+    legs = violated_legs(sheet.requirements, item)
+    sheet.shift(sheet.ends_of(legs), change.wanted * np.array([east, north, 0.0]))
+
+
+_CHANGES: dict[str, Callable[[_MovableMission, Change, Finding], None]] = {
+    "length": _lengthen_leg,
+    "rise": _reduce_rise,
+    "airspeed": _set_airspeed,
+    "turn": _make_turn_gentler,
+    "height": _change_altitude,
+    "descent": _change_altitude,
+    "inset": _move_inside_area,
+    "distance": _move_away_from_missile,
+    **dict.fromkeys(_SIDES, _move_sideways),
+}

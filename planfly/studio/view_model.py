@@ -1,0 +1,280 @@
+"""Data that the page draws: the world, the mission with its states, and its profile; lengths in m."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.items import AMSL, OVER_HOME, Mission, command_name
+from flight.mission.route import Route
+from flight.simulation.setup import FlightSetup
+from logs.verdict.findings import Finding
+from logs.verdict.measures.route_requirements import airspace_of
+from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.verdict import Verdict
+from logs.verdict.wording import suggestion_text
+from logs.views.failures import route_distance, route_samples
+from logs.views.map import map_extent
+from logs.views.profile import ground_under
+from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_cuts, zone_label
+from planfly.studio.apply_suggestion import can_apply
+from planfly.studio.edit_context import EditContext, Judged
+from planfly.studio.edits import places
+from planfly.studio.incremental_verdict import Window
+from planfly.studio.states import PlaceStates, State, place_states
+from world.airspace.zones_on_map import zone_rings
+from world.scenario import Scenario
+from world.threats import Threats
+
+Floats = NDArray[np.float64]
+Json = dict[str, Any]
+
+# Samples of the profile.
+_PROFILE_SAMPLES = 500
+# Greatest number of findings that are listed.
+_MAX_LISTED_FINDINGS = 60
+# Greatest number of zones and threats that are cut for the profile.
+_MAX_CUTS = 120
+_OK_STATE = State("ok")
+# Ratio of the drawn ground to the area, along each side.
+_GROUND_RATIO = 1.2
+# Least ratio of the width of the drawn ground to the longer side of the area.
+_MIN_WIDTH_RATIO = 1.5
+# Least ratio of the height of the drawn ground to the longer side of the area.
+_MIN_HEIGHT_RATIO = 0.9
+
+
+def rounded(values: Any, digits: int = 1) -> Any:
+    """Return an array as lists of rounded numbers; numbers that are not finite become null."""
+    array = np.round(np.asarray(values, dtype=np.float64), digits)
+    if np.isfinite(array).all():
+        return array.tolist()
+    return np.where(np.isfinite(array), array.astype(object), np.array(None, dtype=object)).tolist()
+
+
+# ----------------------------------------------------------------------
+# The world.
+
+
+def world_json(desk: EditContext, setup: FlightSetup) -> Json:
+    """Describe the world of a mission: area, threats, zones, ends, limits."""
+    scenario, mission = desk.scenario, setup.mission
+    extent = scenario.bounds if scenario.external else map_extent(scenario, desk.points(mission), [])
+    return {
+        "name": scenario.name,
+        "origin": [scenario.origin.lat_deg, scenario.origin.lon_deg],
+        "extent": rounded(extent),
+        "shown": rounded(_with_surroundings(np.asarray(extent, dtype=np.float64))),
+        "bounds": None if scenario.external else rounded(scenario.bounds),
+        "floor": None if scenario.external else float(scenario.floor),
+        "ceiling": None if scenario.external else float(scenario.ceiling),
+        "clearance": float(scenario.limits.min_clearance_m),
+        "ends": None if scenario.external else rounded(np.stack([scenario.start, scenario.destination])),
+        "ground": scenario.terrain is not None,
+        "threats": _threats_json(scenario.threats),
+        "zones": _zones_json(scenario, mission, setup),
+    }
+
+
+def _with_surroundings(extent: Floats) -> Floats:
+    """Extend a range, (2, 2) m, so that a window of another shape is filled with ground."""
+    middle, size = extent.mean(axis=1), np.diff(extent, axis=1)[:, 0]
+    longest = float(size.max())
+    half = 0.5 * np.maximum(_GROUND_RATIO * size, np.array([_MIN_WIDTH_RATIO * longest, _MIN_HEIGHT_RATIO * longest]))
+    return np.stack([middle - half, middle + half], axis=1)
+
+
+def _threats_json(threats: Threats) -> list[Json]:
+    rows = zip(
+        threats.names, threats.position.tolist(), threats.kill_radius.tolist(), threats.detection_radius.tolist(),
+        strict=True,
+    )  # fmt: skip
+    return [
+        {"name": name, "at": rounded(at), "kill": round(kill, 1), "detection": round(detection, 1)}
+        for name, at, kill, detection in rows
+    ]
+
+
+def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> list[Json]:
+    """Describe the scenario's zones, then the zones of the mission's own fence, as findings number them."""
+    zones = airspace_of(setup).zones if mission.fences else scenario.zones
+    return [
+        {
+            "name": zone_label(zone),
+            "kind": zone.kind,
+            "rings": [rounded(ring) for ring in zone_rings(zone)],
+        }
+        for zone in zones
+    ]
+
+
+# ----------------------------------------------------------------------
+# The mission.
+
+
+def sheet_json(desk: EditContext, judged: Judged) -> Json:
+    """Describe a mission with its whole geometric verdict: items, route, path, states, findings, profile."""
+    verdict, setup = judged.verdict, judged.setup
+    states = place_states(judged.requirements, verdict.findings)
+    path = judged.requirements.path
+    return {
+        "items": items_json(desk, judged.mission),
+        **route_json(judged.mission, setup.route, 0, setup.route.legs),
+        "path": _legs_of(path.points, path.legs, 0, setup.route.legs),
+        "states": states_json(states, 0, setup.route.legs),
+        "violated": {"threats": sorted(states.threats), "zones": sorted(states.zones)},
+        "verdict": verdict_json(verdict),
+        "findings": findings_json(verdict),
+        "profile": profile_json(desk.scenario, setup),
+        "total": {
+            "km": round(float(route_distance(setup.route.waypoints)[-1]) / 1000.0, 2),
+            "s": round(path.times[-1]),
+        },
+    }
+
+
+def window_json(mission: Mission, route: Route, windows: Sequence[Window]) -> Json:
+    """Describe the legs and corners that were judged near a moved item."""
+    return {"total_legs": route.legs, "windows": [_window(mission, route, one) for one in windows]}
+
+
+def _window(mission: Mission, route: Route, window: Window) -> Json:
+    first, last = window.first, window.last
+    path = window.requirements.path
+    states = place_states(window.requirements, window.findings, shift=window.begin)
+    return {
+        "first": first,
+        "last": last,
+        **route_json(mission, route, first, last),
+        "path": _legs_of(path.points, path.legs + window.begin, first, last),
+        "states": states_json(states, first, last),
+    }
+
+
+def items_json(desk: EditContext, mission: Mission) -> list[Json]:
+    """Describe the items that can be moved: their places, and how the mission states them."""
+    points, flown = desk.points(mission), desk.flown(mission)
+    found = []
+    for k, (east, north, up) in zip(places(mission), points.tolist(), strict=True):
+        item = mission.items[k]
+        found.append(
+            {
+                "k": k,
+                "seq": item.seq,
+                "what": command_name(item.command).removeprefix("NAV_").replace("_", " ").lower(),
+                "at": rounded([east, north, up]),
+                "alt": None if np.isnan(item.alt) else round(item.alt, 1),
+                "frame": "AMSL" if item.frame in AMSL else "over home" if item.frame in OVER_HOME else "over ground",
+                "lat": item.lat_deg,
+                "lon": item.lon_deg,
+                "state": "" if item.seq in flown else "not flown",
+            }
+        )
+    return found
+
+
+def route_json(mission: Mission, route: Route, first: int, last: int) -> Json:
+    """Describe the waypoints of a route from first to last, with the index of each item, -1 for none."""
+    numbers = {item.seq: k for k, item in enumerate(mission.items)}
+    items = [numbers.get(seq, -1) for seq in route.items[first : last + 1].tolist()]
+    return {"route": rounded(route.waypoints[first : last + 1]), "of": items}
+
+
+def _legs_of(points: Floats, legs: NDArray[np.int64], first: int, last: int) -> list[list[float]]:
+    """Return the path of each leg as east, north, up, east, north, up, ..."""
+    edges = np.searchsorted(legs, np.arange(first, last + 1))
+    flat = np.round(points, 1)
+    return [flat[begin : end + 1].ravel().tolist() for begin, end in pairwise(edges.tolist())]
+
+
+def states_json(states: PlaceStates, first: int, last: int) -> Json:
+    """Return states of legs and corners as rows of state and words, in order."""
+    return {
+        "legs": [_state(states.legs.get(k, _OK_STATE)) for k in range(first, last)],
+        "corners": [_state(states.corners.get(k, _OK_STATE)) for k in range(first, last + 1)],
+    }
+
+
+def _state(state: State) -> list[str]:
+    return [state.state, state.text]
+
+
+# ----------------------------------------------------------------------
+# The verdict.
+
+
+def verdict_json(verdict: Verdict) -> Json:
+    """Return the answer and its lines."""
+    shown = verdict.present()
+    return {
+        "state": shown.state,
+        "answer": verdict.answer,
+        "headline": shown.headline,
+        "lines": list(shown.details),
+        "level": verdict.level,
+        "failed": len(verdict.failed),
+    }
+
+
+def findings_json(verdict: Verdict) -> list[Json]:
+    """List the findings that failed or are left open, then the finding closest to its limit of each rule."""
+    return [_finding(number, item) for number, item in verdict.present().worth_listing(_MAX_LISTED_FINDINGS)]
+
+
+def _finding(number: int, item: Finding) -> Json:
+    return {
+        "number": number,
+        "rule": RULE_WORDS[item.rule].title,
+        "ok": item.ok,
+        "where": item.where,
+        "kind": item.place.kind,
+        "index": item.place.index,
+        "text": item.reason,
+        "suggestions": [{"text": suggestion_text(one), "apply": can_apply(one)} for one in item.suggestions],
+    }
+
+
+# ----------------------------------------------------------------------
+# The profile.
+
+
+def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
+    """Return the ground under the route, distances of its waypoints, and threats and zones over it."""
+    route = setup.route.waypoints
+    at = route_distance(route)
+    distance, points = route_samples(route, max(float(at[-1]) / _PROFILE_SAMPLES, 1.0))
+    ground = ground_under(scenario, points)
+    low = float(min(points[:, 2].min(), np.nanmin(ground) if ground is not None else np.inf)) - 50.0
+    high = float(points[:, 2].max()) + 300.0
+    plane = PathPlane(distance, points, ground, low, high)
+    cuts: list[Json] = []
+    if len(scenario.threats) <= _MAX_CUTS:
+        cuts += [
+            {
+                "role": layer.role,
+                "name": layer.name,
+                "x": rounded(layer.x),
+                "top": rounded(layer.y),
+                "low": rounded(layer.low),
+            }
+            for layer in threat_cuts(scenario.threats, plane, frozenset())[0]
+        ]
+    if len(scenario.zones) <= _MAX_CUTS:
+        cuts += [
+            {
+                "role": "zone",
+                "name": cut.zone.name,
+                "x": rounded(distance),
+                "top": rounded(np.where(cut.where, cut.top, np.nan)),
+                "low": rounded(cut.bottom),
+            }
+            for cut in zone_cuts(scenario.zones, plane)
+        ]
+    return {
+        "at": rounded(at),
+        "x": rounded(distance),
+        "ground": None if ground is None else rounded(ground),
+        "cuts": cuts,
+    }

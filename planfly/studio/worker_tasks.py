@@ -1,0 +1,124 @@
+"""Tasks of the studio's processes: fly a mission, plan a path.
+
+Arguments are pickled, results are data.  Returns and campaigns, which take longer, are in `planfly.studio.long_worker_tasks`.
+"""
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.items import Mission
+from flight.simulation.track import Track
+from logs.views.failures import track_distance
+from planfly.planning.pareto_plans import make_pareto_plans
+from planfly.studio.changes import flight_figures
+from planfly.studio.edit_context import EditContext
+from planfly.studio.pilot import Advance
+from planfly.studio.states import place_states
+from planfly.studio.view_model import findings_json, rounded, states_json, verdict_json
+from planfly.workflow.airframe import Airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.pipeline import fly_and_judge
+from planner.search.plan_front import FrontPlan
+from world.scenario import Scenario, from_spec
+
+Floats = NDArray[np.float64]
+# Longest search for one path, s: a user waits for it.
+SECONDS = 25.0
+# Longest search for several paths, s.
+SECONDS_FOR_SEVERAL = 60.0
+# Greatest number of rows of a flown track that the page draws.
+_MAX_DRAWN_ROWS = 1_500
+
+
+def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
+    """Fly a mission with the control law of its autopilot, and judge the flight."""
+    desk, mission = payload
+    setup = desk.setup(mission)
+    flown = fly_and_judge(setup, desk.airframe, None, advance, reference="never")
+    states = place_states(flown.requirements, flown.verdict.findings)
+    seconds = round(float(flown.track.time[-1]), 1) if len(flown.track) else 0.0
+    return {
+        "verdict": verdict_json(flown.verdict),
+        "findings": findings_json(flown.verdict),
+        "states": states_json(states, 0, setup.route.legs),
+        "violated": {"threats": sorted(states.threats), "zones": sorted(states.zones)},
+        "ended": flown.ended,
+        "autopilot": setup.autopilot.title,
+        "seconds": seconds,
+        "figures": flight_figures(mission, setup.route, flown.verdict.findings, seconds),
+        **_track_json(setup.route.waypoints, flown.track, flown.verdict.leg_ends),
+    }
+
+
+def _track_json(route: Floats, track: Track, leg_ends: Sequence[float]) -> dict[str, Any]:
+    """Return a flown track for the map, and its progress along the route for the profile.
+
+    leg_ends: when each leg but the last ended, according to the verdict; the record of the guidance is not relied on.
+    """
+    if not len(track):
+        return {"track": [], "along": []}
+    if len(leg_ends) == len(route) - 2:
+        track = replace(track, leg=np.searchsorted(np.array(leg_ends), track.time).astype(track.leg.dtype))
+    rows = np.union1d(np.arange(0, len(track), max(1, len(track) // _MAX_DRAWN_ROWS)), [len(track) - 1])
+    along = np.asarray(track_distance(route, track))
+    return {"track": rounded(track.position[rows]), "along": rounded(along[rows]), "time": rounded(track.time[rows])}
+
+
+# ----------------------------------------------------------------------
+# Planning.
+
+
+@dataclass(frozen=True, slots=True)
+class PlanAsked:
+    """Request to plan between two places in the world of a scenario.
+
+    ends: (2, 3) m; None for the ends of the scenario.  algorithm: None for the default.
+    ways: greatest number of paths; of several, none is better than another in length, exposure, clearance and energy at
+    once.
+    """
+
+    scenario: Scenario
+    airframe: Airframe
+    seed: int
+    algorithm: str | None = None
+    ends: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    ways: int = 1
+
+
+def plan(asked: PlanAsked, advance: Advance) -> list[FrontPlan]:
+    """Plan a path, or several, the shortest first; if none is safe, return the best one."""
+    scenario = asked.scenario if asked.ends is None else between(asked.scenario, *asked.ends)
+    seconds = SECONDS if asked.ways == 1 else SECONDS_FOR_SEVERAL
+    airframe, seed, stop = asked.airframe, asked.seed, partial(_stop_reason, time.monotonic() + seconds)
+    # Between two items of a mission, the path must join the leg after the second.
+    onward = asked.ends is not None
+    if asked.ways > 1:
+        front = make_pareto_plans(scenario, airframe, seed, asked.ways, advance, stop=stop, onward=onward)
+        return list(front.plans) or [front.default]
+    made = make_plan(scenario, airframe, seed, asked.algorithm, advance, stop=stop, onward=onward)
+    # A single path needs no comparison: quantities that take longer to compute are left out.
+    length = float(np.linalg.norm(np.diff(made.waypoints, axis=0), axis=1).sum())
+    clearance = float(made.certificate.clearance) + scenario.limits.min_clearance_m
+    return [FrontPlan(made, length, math.nan, clearance, math.nan, math.nan)]
+
+
+def _stop_reason(deadline: float) -> str:
+    """Return the reason to end a search, "" to go on."""
+    return "budget" if time.monotonic() > deadline else ""
+
+
+def between(scenario: Scenario, start: tuple[float, ...], destination: tuple[float, ...]) -> Scenario:
+    """Return a scenario with other ends, (3,) m each, in the air and without courses."""
+    spec = scenario.to_json()
+    for key, (east, north, up) in (("start", start), ("destination", destination)):
+        spec[key] = {"east_m": east, "north_m": north, "amsl_m": up}
+    for key in ("launch", "landing"):
+        spec.pop(key, None)
+    return from_spec(spec, scenario.name, ground=scenario.terrain, external=scenario.external)

@@ -1,0 +1,1 @@
+"""Answers about surveys: remedies and text."""

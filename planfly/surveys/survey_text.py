@@ -1,0 +1,120 @@
+"""Text on the photo lines of a survey and on remedies for them."""
+
+import math
+from collections.abc import Sequence
+
+from flight.mission.surveys import Survey
+from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
+from logs.verdict.rules.survey_rule import FRONT, SIDE, lost_text, overlap_text
+from logs.verdict.tolerances import PHOTO_COVERAGE_FRACTION, PHOTO_OVERLAP_FRACTION
+from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, nth
+
+
+def usable(measure: LineMeasure | None) -> bool:
+    """Return True if enough of a line can be used.
+
+    >>> usable(None)
+    False
+    """
+    return measure is not None and measure.good >= PHOTO_COVERAGE_FRACTION
+
+
+def lines_headline(measures: list[LineMeasure | None]) -> str:
+    """Count the lines that can be used, and name the worst.
+
+    >>> lines_headline([None, None])
+    '0 of 2 photo lines can be used; line 1 is the worst: not flown'
+    """
+    good = sum(usable(one) for one in measures)
+    said = f"{good} of {len(measures)} photo lines can be used"
+    if good == len(measures):
+        return said
+    shares = [-1.0 if one is None else one.good for one in measures]
+    worst = min(range(len(shares)), key=lambda k: shares[k])
+    one = measures[worst]
+    return f"{said}; line {worst + 1} is the worst: {'not flown' if one is None else f'{100.0 * one.good:.0f} %'}"
+
+
+def line_text(number: int, measure: LineMeasure | None) -> str:
+    """Describe one line: its length, its usable share, and the faults of the rest."""
+    if measure is None:
+        return f"line {number:<3} not flown"
+    said = f"line {number:<3} {measure.length:6.0f} m  {100.0 * measure.good:5.1f} % can be used"
+    lacks = lost_text(measure)
+    photos = f"; {measure.missed} of {measure.photos} photos missed" if measure.missed else ""
+    return f"{said}{': ' if lacks else ''}{lacks}{photos}"
+
+
+def survey_text(survey: Survey) -> str:
+    """Describe the lines, spacing and course of a survey."""
+    course = round(math.degrees(survey.course)) % 360
+    return f"{len(survey.lines)} lines, {survey.spacing:.0f} m apart, the first on course {course}°"
+
+
+def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
+    """Describe the overlap of photos along the lines and across them, or say that it is not known.
+
+    >>> overlap_lines(None)
+    ('overlap not judged: the camera is not known (--camera)',)
+    """
+    if measure is None:
+        return ("overlap not judged: the camera is not known (--camera)",)
+    texts = [overlap_text(measure, check) for check in (FRONT, SIDE)]
+    if measure.front is None:
+        texts[0] = "front overlap not judged: how far apart photos are taken is not stated, or none can be used"
+    if measure.side is None:
+        texts[1] = "side overlap not judged: no photos that can be used lie beside each other"
+    return tuple(texts)
+
+
+def kept_overlap(measure: OverlapMeasure | None) -> bool:
+    """Return True if photos overlap as required, as far as that is known.
+
+    >>> kept_overlap(None)
+    True
+    """
+    if measure is None:
+        return True
+    pairs = ((measure.front, measure.camera.front), (measure.side, measure.camera.side))
+    return all(share is None or asked is None or share >= asked - PHOTO_OVERLAP_FRACTION for share, asked in pairs)
+
+
+def needed_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
+    """Describe from where on lines can be used, which shows the turn-arounds that would be needed."""
+    some = [one for one in lines if one is not None and one.good > 0.0]
+    if not some:
+        return (
+            f"no place of its {len(lines)} lines, {survey.spacing:.0f} m apart, can be used: there is no room to turn"
+        )
+    late, longest = max(one.late for one in some), max(one.length for one in some)
+    said = f"lines can be used from up to {late:.0f} m behind their begin on; the longest has {longest:.0f} m"
+    return f"{said}, and {len(lines) - len(some)} of {len(lines)} none that can" if len(some) < len(lines) else said
+
+
+def near_miss_text(near: NearMiss) -> str:
+    """Describe the best trial that did not pass, and why it did not."""
+    return f"{near.what}: {near.usable} of {near.lines} photo lines can be used; {near.verdict.headline}"
+
+
+def remedy_text(remedy: SurveyRemedy, length: float) -> str:
+    """Describe a remedy and the path length that it costs.  length: of the present route, m."""
+    match remedy.kind:
+        case "side":
+            change = "the lines from the other side"
+        case "turn-around":
+            change = f"turn-arounds of {remedy.value:.0f} m instead of {remedy.current:.0f} m"
+        case "every":
+            first = f" and {remedy.lead_in:.0f} m onto the first" if remedy.lead_in > remedy.turn_around else ""
+            order = f"every {nth(round(remedy.value))} line first"
+            change = f"{order}, with turn-arounds of {remedy.turn_around:.0f} m{first}"
+        case "course":
+            change = f"lines on course {remedy.value:.0f}° instead of {remedy.current:.0f}°"
+        case "parameter":
+            change = f"{remedy.name} {remedy.value:g} instead of {remedy.current:g} (--params)"
+        case "airspeed":
+            # A mission that is too slow is made faster by its items, not by an option.
+            how = f" (--airspeed {remedy.value:g})" if remedy.value < remedy.current else ""
+            change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s{how}"
+    if remedy.kind in ("parameter", "airspeed") and not math.isnan(remedy.turn_around):
+        change += f", with turn-arounds of {remedy.turn_around:.0f} m"
+    return f"{change}: flown, and all lines can be used; {remedy.length / 1000.0:.1f} km, {length / 1000.0:.1f} km now"

@@ -1,0 +1,353 @@
+"""Imported flights: another program's log in a scenario, along its mission, in its wind: judged, and flown again."""
+
+import hashlib
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import Limits
+from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.catalog import autopilot_of_log
+from flight.autopilots.parameter_origin import TITLES
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
+from flight.dynamics.envelope_tables import load_envelope
+from flight.mission.implied_scenario import implied_scenario
+from flight.mission.items import Mission
+from flight.mission.placing import PlacedMission, place_stops
+from flight.mission.route import lay_route
+from flight.mission_files.formats import read_mission
+from flight.simulation.setup import FlightSetup, ImportedLog, make_limits
+from flight.simulation.simulate import Flight, simulate, track_of
+from flight.simulation.track import Track
+from logs.importers.clean_places import LONGEST_STEP
+from logs.importers.imported_flight import LoggedFlight, make_flight, mean_wind, track_of_flight, with_flown_heights
+from logs.importers.open_log import open_log
+from logs.recording.reader import LogEvent
+from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, plan_mismatch
+from logs.verdict.imported.judge_imported_flight import missing_text
+from logs.verdict.imported.model_comparison import Reflight, compare_with_model
+from logs.verdict.judge_flight import judge_flight
+from logs.verdict.verdict import Verdict
+from planfly.flight_options import LogOptions, apply_options, flight_entries
+from planfly.named_fences import read_named_fences
+from planfly.workflow.airframe import find_airframe, load_airframe
+from planfly.workflow.file_autopilots import with_file_autopilot
+from planfly.workflow.make_plan import Advance
+from planfly.workflow.open_flight import existing_mission, mission_of_plan
+from planner.plan import read_plan
+from world.errors import LogError, MissionError
+from world.scenario import Scenario, load_scenario, with_flight, with_wind
+from world.scenario_tables import FlightTable
+
+Floats = NDArray[np.float64]
+
+_BLOCK = 2**20
+# Items that a mission has at least.
+_FEWEST = 2
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class ImportedFlight:
+    """An imported flight, judged.
+
+    setup: with its source.  track: its rows.  events: what the vehicle said.
+    ended: how the log shows that it ended.
+    """
+
+    setup: FlightSetup
+    track: Track
+    events: tuple[LogEvent, ...]
+    verdict: Verdict
+    ended: str
+
+    @property
+    def lossy(self) -> bool:
+        """Whether some of the log could not be read."""
+        return self.setup.source is not None and self.setup.source.damage.lossy
+
+    def __repr__(self) -> str:
+        return f"<ImportedFlight {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        return self.verdict._repr_html_() + self.track._repr_html_()
+
+
+def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
+    """Read a log, set it into its world and judge it.
+
+    Raises LogError for a file that is no log of an aeroplane's flight, MissionError if no mission is known, and for a
+    plan that is not the one flown.
+    """
+    plan, fences = options.get("plan"), read_named_fences(options.get("fence") or ())
+    flight = make_flight(open_log(path), options.get("flight"))
+    mission, origin_of_mission, planned_in = _mission(path, flight, options)
+    mission = fences.on_mission(mission)
+    plan_heights = plan is not None or flight.mission is None or flight.mission.with_heights
+    if not plan_heights:
+        mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
+    _refuse_other_autopilot(path, mission, flight.raw.program)
+    scenario, placed = _world(mission, options, planned_in)
+    scenario, wind_source = _in_its_wind(fences.on_scenario(apply_options(scenario, options)), flight, options)
+    named = (options.get("aircraft"), options.get("scenario"), planned_in)
+    known = any(one is not None for one in named)
+    logged = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
+    # A flight by an autopilot that planfly does not know says what the aircraft can.
+    autopilot, refused = logged or (PlanflyGuidance(scenario.flight.steering.guidance), ())
+    setup = _setup(scenario, placed, mission, autopilot, flight)
+    heights = flight.heights
+    if (datum := options.get("datum")) is not None and heights.datum == "unstated":
+        heights = replace(heights, datum=datum)
+    notes = (
+        *_edges(flight),
+        *_other_flights(flight),
+        *refused,
+        *mission.warnings,
+        *_differing(flight, mission, options),
+    )
+    source = ImportedLog(
+        missing=None if plan is not None or flight.mission is None else flight.mission.missing,
+        file=path.name,
+        sha256=_sha256(path),
+        format=flight.raw.format,
+        program=flight.raw.program,
+        utc_start=flight.raw.utc_start,
+        holds=flight.holds,
+        stretches=flight.stretches,
+        heights=heights,
+        wind=wind_source,
+        mission=origin_of_mission,
+        plan_heights=plan_heights,
+        aircraft_known=known,
+        begins_in_flight=flight.begins,
+        gaps=flight.gaps,
+        faults=flight.faults,
+        damage=flight.raw.damage,
+        notes=notes,
+    )
+    setup = replace(setup, source=source)
+    track = track_of_flight(flight, scenario.origin)
+    if plan is not None and (mismatch := plan_mismatch(setup, track)) is not None:
+        raise MissionError(f"{path}: not flown by {plan}: {mismatch.text}", file=path)
+    verdict = judge_flight(setup, track, "")
+    ended = "completed" if verdict.complete else _end_of(verdict)
+    return ImportedFlight(setup, track, _events(flight), verdict, ended)
+
+
+def _refuse_other_autopilot(path: Path, mission: Mission, program: str) -> None:
+    """Raise MissionError for a plan that was written for another autopilot than the one that wrote the log."""
+    flown = next((name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), "")
+    if mission.autopilot and flown and mission.autopilot != flown:
+        allowed = f"the flight of {path} is {program}'s: `plan` names the mission that was flown"
+        message = f"{mission.source}: written for {TITLES[mission.autopilot]}: {allowed}"
+        raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
+
+
+def _mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
+    """Return the mission that was to be flown, where it is from, and the scenario that its plan was made in."""
+    if (named := options.get("plan")) is not None:
+        plan_path, terrain = existing_mission(Path(named)), options.get("terrain")
+        if plan_path.suffix.lower() != ".json":
+            return read_mission(plan_path), f"of {plan_path.name}", None
+        plan = read_plan(plan_path, terrain=None if terrain is None else str(terrain))
+        scenario = with_file_autopilot(plan.scenario)
+        mission = mission_of_plan(plan, load_airframe(scenario), str(plan_path))
+        return mission, f"of {plan_path.name}", scenario
+    if flight.mission is None:
+        raise LogError(f"{path}: holds no mission: `plan` names the one that was to be flown", file=path)
+    found = flight.mission
+    if found.missing is not None and len(found.mission.items) < _FEWEST:
+        lacking = [missing_text(found.missing), *found.mission.warnings[:1]]
+        lacking.append("`plan` names the mission that was to be flown")
+        raise LogError(f"{path}: {'; '.join(lacking)}", file=path)
+    when = f", at {found.time:.1f} s" if found.time > 0.0 else ""
+    return found.mission, f"{found.origin} of the log{when}, {len(found.mission.items)} items", None
+
+
+def _world(mission: Mission, options: LogOptions, planned_in: Scenario | None) -> tuple[Scenario, PlacedMission]:
+    """Return the scenario that a flight is judged in, and the mission's places in it."""
+    scenario, named = planned_in, options.get("scenario")
+    terrain = None if options.get("terrain") is None else str(options["terrain"])
+    if named is not None:
+        scenario = load_scenario(str(named), terrain)
+    if scenario is None:
+        # As ArduPlane flies: so that a flight in the simulation can be held against it.
+        aircraft = flight_entries(options)["aircraft"]
+        table = FlightTable() if aircraft is None else FlightTable(aircraft=str(aircraft))
+        implied = implied_scenario(mission, terrain, table, vertical_legs=True)
+        return implied.scenario, implied.placed
+    return scenario, place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
+
+
+def _in_its_wind(scenario: Scenario, flight: LoggedFlight, options: LogOptions) -> tuple[Scenario, str]:
+    """Return the scenario in the mean wind of the stretches, and where that wind is from."""
+    if options.get("wind") is not None:
+        return scenario, "as given"
+    found = mean_wind(flight)
+    if found is None:
+        own = "as the scenario has it: the log holds no wind" if options.get("scenario") else ""
+        return scenario, own
+    blown = with_wind(scenario, found.speed, found.from_course, None)
+    return blown, f"from {round(math.degrees(found.from_course)) % 360:03d}°, by {found.source} of the log"
+
+
+def _setup(
+    scenario: Scenario,
+    placed: PlacedMission,
+    mission: Mission,
+    autopilot: Autopilot,
+    flight: LoggedFlight,
+) -> FlightSetup:
+    aircraft, battery = find_airframe(scenario)
+    limits = _limits(scenario, autopilot, flight, aircraft.airspeed)
+    return FlightSetup(
+        scenario=scenario,
+        mission=mission,
+        route=lay_route(placed, limits.airspeed, scenario.flight.fly_over, limits, autopilot.route_rules),
+        limits=limits,
+        aircraft=aircraft.name,
+        battery=battery,
+        seed=1,
+        autopilot=autopilot,
+        nav=scenario.flight.steering.nav,
+        guidance_hz=scenario.flight.guidance_hz,
+    )
+
+
+def _limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, usual: float) -> Limits:
+    """Limits at the speed that was to be flown: the autopilot's, the scenario's, or the one that was flown."""
+    aircraft, _ = find_airframe(scenario)
+    envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
+    airspeed, bank = scenario.flight.airspeed_mps or usual, math.radians(scenario.flight.max_bank_deg)
+    if autopilot.stated_airspeed is not None:
+        airspeed, _ = autopilot.stated_airspeed
+    elif scenario.flight.airspeed_mps is None and np.isfinite(flight.columns["airspeed"]).any():
+        airspeed = float(np.nanmedian(flight.columns["airspeed"]))
+    if autopilot.stated_bank is not None:
+        bank = autopilot.stated_bank
+    return make_limits(scenario, envelope, max(5.0, airspeed), bank)
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(_BLOCK):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def _edges(flight: LoggedFlight) -> tuple[str, ...]:
+    """What the log does not hold of the flight by its nature, in words: before it, after it, between its rows."""
+    notes = []
+    if flight.begins:
+        notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
+    if flight.ends:
+        notes.append(f"the log ends in flight, at {flight.time[-1]:.1f} s")
+    usual = float(np.median(np.diff(flight.time)))
+    if usual > LONGEST_STEP:
+        notes.append(f"the log has a place every {usual:.1f} s: what was between them it does not show")
+    return tuple(notes)
+
+
+def _other_flights(flight: LoggedFlight) -> tuple[str, ...]:
+    """That a log holds other flights, in words."""
+    if flight.count == 1:
+        return ()
+    others = ", ".join(f"at {start:.0f} s ({along:.0f} s along its mission)" for start, along in flight.others)
+    return (f"flight {flight.number} of {flight.count} is judged; the others began {others} (--flight N)",)
+
+
+def _differing(flight: LoggedFlight, mission: Mission, options: LogOptions) -> tuple[str, ...]:
+    """Say in words how the plan differs from the log's own mission."""
+    if options.get("plan") is None or flight.mission is None:
+        return ()
+    own = flight.mission.mission.items
+    pairs = zip(own, mission.items, strict=False)
+    changed = [one.seq for one, other in pairs if (one.x, one.y, one.alt) != (other.x, other.y, other.alt)]
+    if len(own) == len(mission.items) and not changed:
+        return ()
+    if len(own) != len(mission.items):
+        return (f"the mission of the log has {len(own)} items, the plan {len(mission.items)}",)
+    return (f"{len(changed)} items of the log's own mission lie elsewhere than the plan's, item {changed[0]} first",)
+
+
+def _events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
+    """What the vehicle said during the flight, and the modes it was in."""
+    if not len(flight.time):
+        return ()
+    low, high = float(flight.time[0]), float(flight.time[-1])
+    said = [(time, text) for time, text in flight.raw.events if text]
+    said += [(mode.time, f"mode {mode.name}") for mode in flight.raw.modes]
+    clock = flight.clock
+    moved = np.array([time for time, _ in said])
+    if clock is not None and said:
+        moved = clock.on_clock(moved)
+    events = zip(moved.tolist(), said, strict=True)
+    inside = [LogEvent(max(low, time), text, "info") for time, (_, text) in events if low - 60.0 <= time <= high]
+    return tuple(sorted(inside, key=lambda event: event.time))
+
+
+def _end_of(verdict: Verdict) -> str:
+    found = next((item for item in verdict.findings if item.rule == "completion"), None)
+    return "not judged" if found is None else found.brief
+
+
+# ----------------------------------------------------------------------
+# The mission of an imported flight, flown again by the model of its aircraft.
+
+
+def fly_again(
+    setup: FlightSetup, track: Track, aircraft: str | None, turbulence: str | None, advance: Advance, most: int = 9
+) -> tuple[Reflight, ...]:
+    """Fly the legs of every stretch again, in the wind of the log, and hold the flights side by side: longest first.
+
+    setup: with its source.  aircraft: that flies it, in place of the setup's.  turbulence: in place of the scenario's.
+    most: of the stretches, the longest.
+
+    Raises LogError for a flight that followed none of its mission, and StartError where the model cannot begin.
+    """
+    return tuple(_one_again(setup, legs, aircraft, turbulence, advance) for legs in _stretches(setup, track)[:most])
+
+
+def _one_again(
+    setup: FlightSetup, legs: FlownLegs, aircraft: str | None, turbulence: str | None, advance: Advance
+) -> Reflight:
+    scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
+    model, battery = find_airframe(scenario)
+    limits = setup.limits
+    if model.name != setup.aircraft:
+        envelope = load_envelope(model, motor_braking=scenario.flight.motor_braking)
+        limits = make_limits(scenario, envelope, setup.airspeed, min(setup.max_bank, envelope.max_bank))
+    own = replace(
+        legs.requirements.setup,
+        scenario=scenario,
+        limits=limits,
+        aircraft=model.name,
+        battery=battery,
+        source=None,
+        nav="perfect",
+    )
+
+    flight, blocks = Flight(own, model), []
+    length = flight.path.length
+    for block in simulate(flight):
+        blocks.append(block)
+        advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
+    flown, ended = track_of(blocks), blocks[-1].ended
+    if len(flown) < 2:
+        raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {ended}", file=scenario.name)
+    stands_in = setup.source is not None and not setup.source.aircraft_known and aircraft is None
+    return compare_with_model(own, legs, flown, ended, stands_in=stands_in)
+
+
+def _stretches(setup: FlightSetup, track: Track) -> list[FlownLegs]:
+    source = setup.source
+    stretches = () if source is None else source.stretches
+    found = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]
+    if not found:
+        name = "the log" if source is None else source.file
+        raise LogError(f"{name}: none of its mission's legs was flown: there is nothing to fly again", file=name)
+    return sorted(found, key=lambda legs: legs.first - legs.last)

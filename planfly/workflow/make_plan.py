@@ -1,0 +1,100 @@
+"""Make the plan of a scenario for its aircraft and autopilot, as every command makes it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from aircraft.path_limits import Limits
+from logs.verdict.conditions import Conditions, conditions_of
+from logs.verdict.measures.circle_reach import end_loiter_hazards
+from logs.verdict.measures.route_requirements import route_requirements
+from planfly.planning.gust_altitude_margin import keep_height
+from planfly.planning.gust_orbits import limit_waypoint_orbits
+from planfly.workflow.airframe import Airframe, laid_from_the_ground
+from planfly.workflow.open_flight import make_setup, mission_of_plan
+from planner.plan import Plan
+from planner.search.plan_path import plan_path
+from planner.search.replan import replan
+from planner.search.search_state import StopCondition
+from planner.search.shared_budget import Search, SharedBudget
+from world.scenario import Scenario
+
+# Takes how far a stage is: done, total, a remark.
+Advance = Callable[[float, float, str], None]
+
+
+def planned_for(scenario: Scenario, airframe: Airframe) -> Conditions:
+    """What a plan of a scenario is for."""
+    return conditions_of(scenario, airframe.aircraft.name, airframe.airspeed, airframe.autopilot)
+
+
+def make_plan(
+    scenario: Scenario,
+    airframe: Airframe,
+    seed: int,
+    algorithm: str | None = None,
+    advance: Advance | None = None,
+    *,
+    stop: StopCondition | None = None,
+    flown: tuple[Plan, int] | None = None,
+    onward: bool = False,
+) -> Plan:
+    """Plan within the scenario's and the aircraft's limits, as far as these are known for certain.
+
+    All commands plan by this, so that what one calls safe no other calls unsafe. Where gusts make the autopilot circle
+    at waypoints, the plan has as few of them as it can (`planfly.planning.gust_orbits`); where gusts take the aircraft from its
+    height, the plan leaves as much below or above it (`planfly.planning.gust_altitude_margin`); the ways from and to the ground are
+    laid; and where the autopilot circles at the mission's end, the certificate names what the circles may come too near
+    to.
+
+    A plan may take several searches, which share the scenario's budget of evaluations.
+
+    stop: as of `planner.search.plan_path.plan_path`.
+    flown: the plan that is being flown, and the leg to plan again from; None for a new plan.
+    onward: whether the mission that it becomes a part of goes on from its destination.
+    """
+    limits = airframe.limits.surely()
+
+    def settle(plan: Plan, search: Search) -> Plan:
+        def few_waypoints(found: Plan, within: Limits) -> Plan:
+            return limit_waypoint_orbits(found, airframe, lambda asked: search(asked, within), within)
+
+        def search_within(kept: Limits) -> Plan:
+            return few_waypoints(search(plan.scenario, kept), kept)
+
+        return keep_height(few_waypoints(plan, limits), airframe, search_within)
+
+    if flown is not None:
+        old, leg = flown
+        again = replan(
+            scenario, limits, old, leg, seed=seed, algorithm=algorithm, progress=advance, stop=stop, settle=settle
+        )
+        return _completed(again, airframe, old, onward=onward)
+
+    def search(world: Scenario, within: Limits) -> Plan:
+        return plan_path(world, within, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
+
+    searches = SharedBudget(search)
+    plan = searches.total(settle(searches(scenario, limits), searches))
+    return _completed(plan, airframe, onward=onward)
+
+
+def finish_plan(plan: Plan, airframe: Airframe, *, onward: bool = False) -> Plan:
+    """A path that was found, with all that `make_plan` does after its search; nothing else is searched for."""
+    return _completed(keep_height(limit_waypoint_orbits(plan, airframe), airframe), airframe, onward=onward)
+
+
+def _completed(plan: Plan, airframe: Airframe, old: Plan | None = None, *, onward: bool) -> Plan:
+    """The plan with its ways from and to the ground, and with what the circles at its end may come too near to.
+
+    old: the plan that is being flown.
+    """
+    plan = laid_from_the_ground(plan, airframe, old)
+    if onward or not airframe.autopilot.loiter_rules.ends_in_circle:
+        return plan
+    setup = make_setup(plan.scenario, airframe, mission_of_plan(plan, airframe), plan.seed, plan=plan)
+    beside = end_loiter_hazards(route_requirements(setup))
+    if beside is None or not beside[1]:
+        return plan
+    circles = f"{airframe.autopilot.title} circles about the destination, up to {beside[0]:.0f} m from it"
+    problems = (*plan.certificate.problems, f"{circles}: {', '.join(beside[1])}")
+    return replace(plan, certificate=replace(plan.certificate, problems=problems))

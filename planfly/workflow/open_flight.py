@@ -1,0 +1,157 @@
+"""Open what is to be flown: a plan or a mission file with the options of its flight becomes a `FlightSetup`."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+from flight.mission.fences import fence_zones
+from flight.mission.from_plan import plan_mission
+from flight.mission.implied_scenario import implied_scenario
+from flight.mission.items import OTHER_VEHICLES, Command, Mission, command_name
+from flight.mission.placing import PlacedMission, place_stops
+from flight.mission.preflight_notes import field_notes
+from flight.mission.route import lay_route, with_end_courses
+from flight.mission_files.formats import read_mission
+from flight.simulation.setup import FDM_HZ, FlightSetup
+from planfly.flight_options import MissionOptions, apply_options, named_scenario
+from planfly.named_fences import read_named_fences
+from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
+from planfly.workflow.file_autopilots import with_file_autopilot
+from planner.plan import Plan, parse_plan, plan_json, read_plan
+from world.errors import MissionError
+from world.files import did_you_mean
+from world.scenario import Scenario
+
+# The source of the mission of a plan that is no file, as messages name it.
+PLAN_FILE = "plan.json"
+
+
+def open_flight(source: Plan | str | Path, options: MissionOptions, program: Path | None = None) -> FlightSetup:
+    """Open a plan, or a plan.json, .waypoints or .plan file, in its own, a named or an implied scenario.
+
+    program: the autopilot's program that flies.
+    Raises MissionError, ScenarioError, ParameterError or TerrainError.
+
+    >>> from planfly.workflow.make_plan import make_plan
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("paper-07")
+    >>> setup = open_flight(make_plan(scenario, load_airframe(scenario), 1), {"wind": (4.0, 270.0)})
+    >>> setup.name, setup.mission.source, setup.scenario.wind.speed
+    ('paper-07', 'plan.json', 4.0)
+    """
+    if isinstance(source, Plan) or Path(source).suffix.lower() == ".json":
+        return _open_plan(source, options, program)
+    fences, named, terrain = read_named_fences(options.get("fence") or ()), options.get("scenario"), _terrain(options)
+    mission = fences.on_mission(for_fixed_wing(read_mission(existing_mission(Path(source)))))
+    if named is not None:
+        scenario = named_scenario(named, options, program)
+        placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
+    else:
+        implied = implied_scenario(mission, terrain, vertical_legs=True)
+        scenario, placed = apply_options(implied.scenario, options, program), implied.placed
+    scenario = with_file_autopilot(fences.on_scenario(scenario), mission)
+    seed = choose_seed(scenario, options.get("seed"))
+    return make_setup(scenario, load_airframe(scenario), mission, seed, placed=placed)
+
+
+def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path | None) -> FlightSetup:
+    """Open a plan in its own scenario, or its mission in the scenario that the options name."""
+    fences, named, terrain = read_named_fences(options.get("fence") or ()), options.get("scenario"), _terrain(options)
+    if not isinstance(source, Plan):
+        plan, file = read_plan(existing_mission(Path(source)), terrain=terrain), str(source)
+    else:
+        plan, file = source if terrain is None else parse_plan(plan_json(source), PLAN_FILE, terrain=terrain), PLAN_FILE
+    scenario = fences.on_scenario(apply_options(plan.scenario, options, program))
+    airframe, seed = load_airframe(scenario), options.get("seed")
+    mission, number = fences.on_mission(mission_of_plan(plan, airframe, file)), plan.seed if seed is None else seed
+    if named is None:
+        return make_setup(scenario, airframe, mission, number, plan=plan)
+    # The plan's waypoints are in the map of its own scenario: in another one its mission is flown, as a file.
+    scenario = fences.on_scenario(named_scenario(named, options, program))
+    return make_setup(scenario, load_airframe(scenario), mission, number)
+
+
+def _terrain(options: MissionOptions) -> str | None:
+    terrain = options.get("terrain")
+    return None if terrain is None else str(terrain)
+
+
+def existing_mission(path: Path) -> Path:
+    """Return the path of a file that exists.  Raises MissionError, with the most similar name in the folder."""
+    if not path.is_file():
+        near = did_you_mean(path.name, _mission_names(path.parent))
+        raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected{near}", file=path)
+    return path
+
+
+def _mission_names(folder: Path) -> list[str]:
+    """List the names of the files in a folder that may hold missions."""
+    try:
+        return sorted(file.name for file in folder.iterdir() if file.suffix in (".json", ".waypoints", ".plan", ".txt"))
+    except OSError:
+        return []
+
+
+def for_fixed_wing(mission: Mission) -> Mission:
+    """Return the mission if a fixed wing can fly it.  Raises MissionError for an item of other vehicles.
+
+    >>> spline = MissionItem(3, 82, 3, (0.0,) * 4, 46.0, 8.0, 75.0)
+    >>> for_fixed_wing(Mission(None, (spline,), source="a.waypoints"))
+    Traceback (most recent call last):
+        ...
+    world.errors.MissionError: a.waypoints: item 3: NAV_SPLINE_WAYPOINT: for a multicopter: planfly flies fixed-wing ...
+    """
+    for item in mission.items:
+        if item.command in OTHER_VEHICLES:
+            name = command_name(item.command)
+            allowed = f"for {OTHER_VEHICLES[Command(item.command)]}: planfly flies fixed-wing aircraft"
+            raise MissionError.at(mission.source, f"item {item.seq}", name, allowed, shown=name)
+    return mission
+
+
+def mission_of_plan(plan: Plan, airframe: Airframe, source: str = PLAN_FILE) -> Mission:
+    """Write the waypoints of a plan as the mission of an airframe, without fences; source: its file, for messages."""
+    return plan_mission(plan, airframe.airspeed, airframe.max_bank, source, airframe.limits.tracking)
+
+
+def make_setup(
+    scenario: Scenario,
+    airframe: Airframe,
+    mission: Mission,
+    seed: int,
+    *,
+    plan: Plan | None = None,
+    placed: PlacedMission | None = None,
+    fdm_hz: Literal[60, 120] = FDM_HZ,
+) -> FlightSetup:
+    """Fix everything that decides the flight of a mission in a scenario.
+
+    placed: the mission's places on the scenario's map if they are known already.  fdm_hz: JSBSim's steps a second.
+    Raises MissionError for a mission that cannot be laid out, and for a fence that makes no zones.
+    """
+    # A fence that makes no zones is bad input, and the verdict could not judge it.
+    fence_zones(mission.fences, scenario.origin, mission.source)
+    limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
+    autopilot = airframe.autopilot
+    mission = replace(mission, autopilot=autopilot.name)
+    if placed is None:
+        placed = place_stops(mission, scenario.origin, scenario.terrain)
+    route = lay_route(placed, airspeed, fly_over, limits, autopilot.route_rules)
+    route = with_end_courses(route, scenario, limits)
+    stated = {} if autopilot.parameters is None else autopilot.parameters.by_origin("file")
+    notes = field_notes(mission, route, scenario, autopilot.return_rules, stated)
+    route = replace(route, notes=(*route.notes, *notes)) if notes else route
+    return FlightSetup(
+        scenario=scenario,
+        mission=mission,
+        route=route,
+        limits=limits,
+        aircraft=airframe.aircraft.name,
+        battery=airframe.battery,
+        seed=seed,
+        plan=plan,
+        autopilot=autopilot,
+        nav=scenario.flight.steering.nav,
+        guidance_hz=scenario.flight.guidance_hz,
+        fdm_hz=fdm_hz,
+    )

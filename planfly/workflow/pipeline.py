@@ -1,0 +1,254 @@
+"""Plan, export, fly, record, judge: the chain, stage by stage, as functions of frozen data."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from flight.autopilots.catalog import program_autopilot
+from flight.autopilots.program import ProgramAutopilot
+from flight.dynamics.fdm import Variation
+from flight.mission.items import Mission
+from flight.simulation.airborne import Airborne
+from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import Flight, FlightBlock, simulate, track_of
+from flight.simulation.track import Track, join_tracks
+from logs.recording.reader import LogEvent
+from logs.recording.recorder import thin_track
+from logs.verdict.judge_flight import judge_flight, judge_plan_only
+from logs.verdict.measures.energy import predicted_energy
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.places import ReferenceFlights
+from logs.verdict.verdict import Verdict
+from planfly.returns.return_summary import ReturnSummary, return_summary
+from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
+from planfly.workflow.crash_safe_log import CrashSafeLog, FlightLimits
+from planfly.workflow.make_plan import Advance, make_plan, planned_for
+from planfly.workflow.open_flight import make_setup, mission_of_plan
+from planfly.workflow.reference_flights import FlyReference, judge_with_reference_flights
+from planner.plan import Plan
+from world.errors import FlightError, StartError
+from world.scenario import Scenario
+
+# Seconds of flight that are written at a time: some thirty milliseconds of a simulated flight.
+BATCH = 60
+# A mission that by prediction takes this many times the energy carried is not flown: hours would show no more.
+MAX_ENERGY_RATIO = 2.0
+_USUAL_LIMITS = FlightLimits()
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class PlanThenFly:
+    """What `plan_then_fly` returns.
+
+    plan: the path, with its certificate.
+    mission: the plan as mission items.
+    track: the flight, a row a guidance tick; None where there was no feasible plan to fly.
+    verdict: whether it flies, with a finding for every rule and place.
+
+    >>> from world.scenario import load_scenario
+    >>> result = plan_then_fly(load_scenario("paper-07"), seed=1)
+    >>> len(result.plan.waypoints), len(result.mission.items), round(float(result.track.time[-1]))
+    (10, 11, 524)
+    """
+
+    plan: Plan
+    mission: Mission
+    track: Track | None
+    verdict: Verdict
+
+    def __repr__(self) -> str:
+        return f"<PlanThenFly {self.plan!r}, {self.verdict!r}>"
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        return self.plan._repr_html_() + self.verdict._repr_html_()
+
+
+@dataclass(frozen=True, slots=True)
+class OffNominal:
+    """How the flight itself differs from what the plan and its guidance know.
+
+    variation: of the aircraft from its model.
+    start_offset: east, north and up from the first waypoint to where the flight begins, m.
+    """
+
+    variation: Variation
+    start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedFlight:
+    """A flight from its first tick to its verdict.
+
+    setup: with the program that flew, if one did.  requirements: the route requirements that it was judged by.
+    track: the rows that are recorded, all of them where there is no log; none of a flight that could not begin.
+    ended: how it ended, "completed" or the reason why not.
+    verdict: on these rows.
+    events: what the log holds beside them.
+    reference: the results of reference flights; None if none were flown.
+    returns: from a few places of it; None where they were not asked for.
+    """
+
+    setup: FlightSetup
+    requirements: RouteRequirements
+    track: Track
+    ended: str
+    verdict: Verdict
+    events: tuple[LogEvent, ...]
+    reference: ReferenceFlights | None = None
+    returns: ReturnSummary | None = None
+
+
+def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | None = None) -> PlanThenFly:
+    """Plan a path in a scenario, fly it and judge the flight.
+
+    seed: of planner and turbulence; None takes the scenario's, or 1.  log: where to write the flight, None for nowhere.
+    Raises a PlanflyError for bad input.  A plan that cannot be flown is a verdict, not an error.
+    """
+    number = choose_seed(scenario, seed)
+    airframe = load_airframe(scenario)
+    plan = make_plan(scenario, airframe, number)
+    mission = replace(mission_of_plan(plan, airframe, "plan"), autopilot=airframe.autopilot.name)
+    if not plan.feasible:
+        return PlanThenFly(plan, mission, None, judge_plan_only(plan, planned_for(scenario, airframe)))
+    setup = make_setup(scenario, airframe, mission, number, plan=plan)
+    flown = fly_and_judge(setup, airframe, log)
+    return PlanThenFly(plan, mission, flown.track, flown.verdict)
+
+
+def fly_and_judge(
+    setup: FlightSetup,
+    airframe: Airframe,
+    log: Path | None,
+    advance: Advance | None = None,
+    *,
+    every: int = 1,
+    autopilot: Path | None = None,
+    off_nominal: OffNominal | None = None,
+    reference: FlyReference = "failed",
+    returns: bool = False,
+    limits: FlightLimits = _USUAL_LIMITS,
+) -> JudgedFlight:
+    """Fly a setup, record it if a log is named, and judge it.
+
+    every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
+    autopilot: the program of ArduPlane or PX4, which then flies; its own log is kept beside ours.
+    off_nominal: how the flight differs from what guidance knows; none of a program's.
+    reference: when reference flights are flown, as of `planfly.workflow.reference_flights.judge_with_reference_flights`.
+    returns: whether returns from a few places are judged and drawn in the log, if one is named.
+    limits: how long it may fly, and how large its log may grow.
+
+    A flight that cannot begin, or that needs more than `MAX_ENERGY_RATIO` times the energy carried, has no row and no
+    log: its verdict is its route's, and that it did not begin.  Raises FlightError for a program that does not fly it
+    to its end; no log is left then.
+    """
+    task = _Task(airframe, log, advance, every, limits, reference, returns=returns)
+    requirements = route_requirements(setup)
+    stores = _stores_needed(requirements)
+    if stores > MAX_ENERGY_RATIO:
+        return _unflown(requirements, log, f"not started: it takes {stores:.0f} times the energy carried")
+    try:
+        if autopilot is not None:
+            return _fly_program(task, setup, program_autopilot(autopilot).flying(setup.autopilot, autopilot))
+        how = off_nominal or OffNominal(Variation())
+        flight = Flight(setup, airframe.aircraft, how.variation, start_offset=how.start_offset)
+        return _record_and_judge(task, requirements, flight)
+    except StartError as error:
+        return _unflown(requirements, log, f"not started: {error.reason}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """What `fly_and_judge` is asked to do with a flight; the fields are its arguments."""
+
+    airframe: Airframe
+    log: Path | None
+    advance: Advance | None
+    every: int
+    limits: FlightLimits
+    reference: FlyReference
+    returns: bool
+
+
+def _stores_needed(requirements: RouteRequirements) -> float:
+    """Predict how many times the energy carried a route takes; 0 if even full power throughout takes less than two."""
+    setup = requirements.setup
+    seconds, full = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full
+    full_energy = float(np.nanmax(full, initial=0.0)) * seconds / 3600.0
+    if full_energy <= MAX_ENERGY_RATIO * setup.battery:
+        return 0.0
+    return predicted_energy(requirements)[0] / setup.battery
+
+
+def _fly_program(task: _Task, setup: FlightSetup, program: ProgramAutopilot) -> JudgedFlight:
+    with program.start(setup, task.airframe.aircraft) as flight:
+        flight.prepare()
+        try:
+            judged = _record_and_judge(task, route_requirements(flight.setup), flight)
+        except FlightError:
+            if task.log is not None:
+                task.log.unlink(missing_ok=True)
+            raise
+        if task.log is not None:
+            flight.keep_log(task.log.with_suffix(program.log_suffix))
+    return judged
+
+
+def autopilot_log(log: Path, program: Path) -> Path:
+    """Return where the log that an autopilot's program writes is kept, next to planfly's log.
+
+    >>> autopilot_log(Path("runs/flight.mcap"), Path("arduplane")).name
+    'flight.BIN'
+    """
+    return log.with_suffix(program_autopilot(program).log_suffix)
+
+
+def _record_and_judge(task: _Task, requirements: RouteRequirements, flight: Airborne) -> JudgedFlight:
+    """Fly to the end, and judge the rows that are recorded."""
+    flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
+    if task.log is None:
+        track, ended = _fly(task, flight, None)
+        return _judged(task, requirements, track, ended)
+    with CrashSafeLog(task.log, flight.setup, every=task.every, batch=BATCH) as recorder:
+        track, recorder.ended = _fly(task, flight, recorder)
+        judged = _judged(task, requirements, thin_track(track, task.every), recorder.ended)
+        for event in judged.events:
+            recorder.event(event.time, event.text, event.level)
+        beside = return_summary(flight.setup, judged.track) if task.returns else None
+        drawn = None if beside is None else beside.plainly_drawn()
+        recorder.finish(judged.ended, judged.verdict, judged.reference, drawn)
+    return replace(judged, returns=beside)
+
+
+def _fly(task: _Task, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
+    """Fly to the end or until the log is full; record and report each block.  Return the track and how it ended."""
+    blocks, ended, length = list[FlightBlock](), "", flight.path.length
+    for block in simulate(flight):
+        blocks.append(block)
+        ended = block.ended
+        if recorder is not None and len(block.rows):
+            recorder.write(block.rows)
+            ended = ended or task.limits.log_full(recorder.size)
+        if task.advance is not None:
+            task.advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
+        if ended:
+            break
+    return track_of(blocks), ended
+
+
+def _unflown(requirements: RouteRequirements, log: Path | None, ended: str) -> JudgedFlight:
+    """Judge a flight without a row; the log of an earlier flight is removed."""
+    if log is not None:
+        log.unlink(missing_ok=True)
+    setup, track = requirements.setup, join_tracks([])
+    verdict = judge_flight(setup, track, ended, requirements=requirements)
+    return JudgedFlight(setup, requirements, track, ended, verdict, ())
+
+
+def _judged(task: _Task, requirements: RouteRequirements, track: Track, ended: str) -> JudgedFlight:
+    end = float(track.time[-1]) if len(track) else 0.0
+    event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
+    aircraft = task.airframe.aircraft
+    verdict, others = judge_with_reference_flights(requirements, aircraft, track, ended, fly=task.reference)
+    return JudgedFlight(requirements.setup, requirements, track, ended, verdict, (event,), others)

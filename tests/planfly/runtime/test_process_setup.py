@@ -1,0 +1,76 @@
+"""A process of planfly's own collects garbage seldom, and so do those that it starts; a script's own does not."""
+
+import os
+import resource
+import subprocess
+import sys
+
+import pytest
+
+from planfly.runtime import process_setup
+from planfly.runtime.process_setup import limit_of_address_space, prepare_process, watch_address_space, with_large_stack
+from world.address_space import RoomFinder
+
+LIMIT = 480_000 * 1024
+
+CHILD = "import gc, planfly; print(gc.get_threshold()[0])"
+PARENT = f"""
+import subprocess, sys
+from planfly.runtime.process_setup import prepare_process
+prepare_process()
+print(subprocess.run([sys.executable, "-c", {CHILD!r}], capture_output=True, text=True, check=True).stdout)
+"""
+
+
+def threshold(code: str) -> int:
+    env = {name: value for name, value in os.environ.items() if name != "PLANFLY_OWN_PROCESS"}
+    done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
+    return int(done.stdout)
+
+
+def test_only_processes_of_planflys_own_are_set_up() -> None:
+    pythons_own = threshold("import gc; print(gc.get_threshold()[0])")
+    assert threshold(CHILD) == pythons_own < 200_000
+    assert threshold(PARENT) == 200_000
+
+
+def test_a_number_of_threads_that_a_user_has_set_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
+    prepare_process()
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "3"
+
+
+def test_work_in_a_large_stack_returns_and_raises_as_it_does_alone() -> None:
+    def depth(left: int) -> int:
+        return 0 if left == 0 else 1 + depth(left - 1)
+
+    def stack_around() -> int:
+        frame, largest = sys._getframe(), 0
+        while frame.f_back is not None:
+            frame = frame.f_back
+            largest = max(largest, frame.f_code.co_stacksize)
+        return largest
+
+    # The piece of memory that frames lie in is as large as the largest of them asks for.
+    assert stack_around() < 1000 < 100_000 < with_large_stack(stack_around)
+    assert with_large_stack(lambda: depth(500)) == 500
+    with pytest.raises(ZeroDivisionError):
+        with_large_stack(lambda: 1 // 0)
+
+
+def test_only_a_process_with_a_limit_is_watched(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = list(sys.meta_path)
+    monkeypatch.setattr(sys, "meta_path", list(before))
+    monkeypatch.setattr(process_setup, "limit_of_address_space", lambda: None)
+    watch_address_space()
+    assert sys.meta_path == before
+    monkeypatch.setattr(process_setup, "limit_of_address_space", lambda: LIMIT)
+    for _ in range(2):
+        watch_address_space()
+    assert [type(one) for one in sys.meta_path[:2]] == [RoomFinder, type(before[0])]
+
+
+def test_the_limit_is_the_systems(monkeypatch: pytest.MonkeyPatch) -> None:
+    for given, found in (((LIMIT, resource.RLIM_INFINITY), LIMIT), ((resource.RLIM_INFINITY,) * 2, None)):
+        monkeypatch.setattr(resource, "getrlimit", lambda _, given=given: given)
+        assert limit_of_address_space() == found

@@ -1,0 +1,212 @@
+"""What would help a survey, found among flights that pass or fail by a rule of the test's own."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from flight.mission.items import Command, Mission
+from flight.mission.survey_layout import turn_around_of
+from flight.simulation.setup import FlightSetup
+from logs.verdict.findings import Finding, make_finding
+from logs.verdict.measures.route_requirements import surveys_of
+from logs.verdict.places import FLIGHT, Place
+from logs.verdict.verdict import Verdict
+from planfly.surveys import survey_remedies as remedies
+from planfly.surveys.survey_remedies import TriedRemedies
+from planfly.surveys.survey_text import remedy_text
+from planfly.workflow.airframe import airframe_of
+from planfly.workflow.open_flight import open_flight
+
+FIELD = Path(__file__).with_name("commands") / "field.waypoints"
+# Whether lines can be used, and what else fails with what margin, of a flight with these turn-arounds, m.
+Answer = Callable[[float], tuple[bool, dict[str, float]]]
+
+
+def verdict_of(setup: FlightSetup, answer: Answer) -> Verdict:
+    [survey] = surveys_of(setup)
+    usable, failed = answer(turn_around_of(setup.route, survey))
+    findings: list[Finding] = [
+        make_finding("survey", Place("leg", line.first), ok=usable, reason="", flown=90.0, limit=95.0, margin=-5.0)
+        for line in survey.lines
+    ]
+    findings += [make_finding(rule, FLIGHT, ok=False, reason="", margin=margin) for rule, margin in failed.items()]
+    flyable = usable and not failed
+    return Verdict(
+        tuple(findings), flyable=flyable, complete=True, lines=(f"fails by {sorted(failed)}",), level="flown"
+    )
+
+
+@dataclass
+class Flights:
+    """Flies by a test, and keeps the turn-arounds that it flew."""
+
+    answer: Answer
+    flown: list[float] = field(default_factory=list)
+
+    def __call__(self, setup: FlightSetup, *_: Any, **__: Any) -> Any:
+        self.flown.append(round(turn_around_of(setup.route, surveys_of(setup)[0])))
+        return SimpleNamespace(verdict=verdict_of(setup, self.answer))
+
+
+def opened(path: Path) -> FlightSetup:
+    return open_flight(path, {"aircraft": "x8", "autopilot_law": "ardupilot"})
+
+
+def tried(monkeypatch: pytest.MonkeyPatch, answer: Answer, path: Path = FIELD) -> tuple[TriedRemedies, list[float]]:
+    flights, mission = Flights(answer), opened(path)
+    monkeypatch.setattr(remedies, "fly_and_judge", flights)
+    found = remedies.survey_remedies(mission, airframe_of(mission), verdict_of(mission, answer))
+    return found, flights.flown
+
+
+def test_the_least_turn_around_that_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, flown = tried(monkeypatch, lambda metres: (metres >= 130.0, {}))
+    [longer] = found.remedies
+    assert (longer.kind, longer.current, longer.value, longer.turn_around) == ("turn-around", 0.0, 150.0, 150.0)
+    # By halves of the twelve.
+    assert flown[:4] == [150.0, 75.0, 100.0, 125.0]
+    assert found.nearest is None
+
+
+def test_every_second_line_is_come_to_as_all_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first line needs 130 m whatever the others need, which lie further from each other."""
+
+    def answer(metres: float) -> tuple[bool, dict[str, float]]:
+        return metres >= 130.0, {}
+
+    flights, mission = Flights(answer), opened(FIELD)
+
+    def fly(setup: FlightSetup, *rest: Any, **more: Any) -> Any:
+        [survey] = surveys_of(setup)
+        first = survey.lines[0]
+        lead_in = math.dist(setup.route.waypoints[first.begins], setup.route.waypoints[first.first])
+        if abs(survey.offsets[1]) > 100.0 and lead_in >= 130.0:
+            flights.answer = lambda metres: (metres >= 45.0, {})
+        found = flights(setup, *rest, **more)
+        flights.answer = answer
+        return found
+
+    monkeypatch.setattr(remedies, "fly_and_judge", fly)
+    found = remedies.survey_remedies(mission, airframe_of(mission), verdict_of(mission, answer))
+    longer, second = found.remedies
+    assert (longer.kind, longer.value, longer.lead_in) == ("turn-around", 150.0, 0.0)
+    assert (second.kind, second.value, second.turn_around, second.lead_in) == ("every", 2.0, 50.0, 150.0)
+    assert remedy_text(second, 5000.0).startswith(
+        "every second line first, with turn-arounds of 50 m and 150 m onto the first: flown, and all lines can be used"
+    )
+
+
+def test_one_with_which_the_battery_does_not_last_is_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Then lines are not flown at all: that says nothing against shorter ones."""
+
+    def answer(metres: float) -> tuple[bool, dict[str, float]]:
+        return 190.0 <= metres <= 225.0, {} if metres <= 225.0 else {"energy": -3.0, "completion": -9.0}
+
+    found, flown = tried(monkeypatch, answer)
+    assert [(one.kind, one.value) for one in found.remedies] == [("turn-around", 200.0)]
+    assert flown[:4] == [150.0, 250.0, 175.0, 200.0]
+
+
+def test_a_flight_that_ends_early_by_another_fault_says_nothing_of_longer_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that misses the end of its way with short turn-arounds has energy left for longer ones."""
+
+    def answer(metres: float) -> tuple[bool, dict[str, float]]:
+        return metres >= 290.0, {"completion": -9.0} if 20.0 < metres < 290.0 else {}
+
+    found, flown = tried(monkeypatch, answer)
+    assert [(one.kind, one.value) for one in found.remedies] == [("turn-around", 300.0)]
+    assert flown[:4] == [150.0, 250.0, 350.0, 300.0]
+
+
+def judged_by(
+    monkeypatch: pytest.MonkeyPatch, passes: Callable[[FlightSetup, float], bool], path: Path = FIELD
+) -> TriedRemedies:
+    """What helps where a rule looks at all of a flight, and at its turn-arounds, m."""
+
+    def fly(setup: FlightSetup, *_: Any, **__: Any) -> Any:
+        return SimpleNamespace(verdict=verdict_of(setup, lambda metres: (passes(setup, metres), {})))
+
+    mission = opened(path)
+    monkeypatch.setattr(remedies, "fly_and_judge", fly)
+    return remedies.survey_remedies(mission, airframe_of(mission), verdict_of(mission, lambda _: (False, {})))
+
+
+def test_where_nothing_alone_helps_two_changes_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """ROLL_LIMIT_DEG from 35 half way to 60, in whole degrees, is 47; neither it nor long turn-arounds alone pass."""
+
+    def passes(setup: FlightSetup, metres: float) -> bool:
+        own = setup.autopilot.parameters
+        assert own is not None
+        return metres >= 130.0 and next(one.value for one in own.values if one.name == "ROLL_LIMIT_DEG") >= 45.0
+
+    [both] = judged_by(monkeypatch, passes).remedies
+    assert (both.kind, both.name, both.current, both.value) == ("parameter", "ROLL_LIMIT_DEG", 35.0, 47.0)
+    assert both.turn_around == 150.0
+    assert remedy_text(both, 3000.0).startswith(
+        "ROLL_LIMIT_DEG 47 instead of 35 (--params), with turn-arounds of 150 m:"
+    )
+
+
+def test_a_slower_flight_with_longer_turn_arounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The x8 cruises at 18 m/s, and a tenth above its slowest airspeed are 15.5 m/s: the slowest that is tried."""
+    [both] = judged_by(monkeypatch, lambda setup, m: m >= 130.0 and setup.route.airspeed[0] < 17.0).remedies
+    assert (both.kind, both.current, both.value, both.turn_around) == ("airspeed", 18.0, 15.5, 150.0)
+    assert "15.5 m/s instead of 18 m/s (--airspeed 15.5), with turn-arounds of 150 m" in remedy_text(both, 3000.0)
+
+
+def test_a_mission_slower_than_the_aircraft_flies_is_made_faster(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A multicopter's 2 m/s; the 16 m/s further on the aircraft can fly."""
+    rows = FIELD.read_text(encoding="ascii").splitlines()
+    rows.insert(2, "1\t0\t2\t178\t0\t2\t-1\t0\t0\t0\t0\t1")
+    rows.append("20\t0\t2\t178\t0\t16\t-1\t0\t0\t0\t0\t1")
+    path = tmp_path / "slow.waypoints"
+    path.write_text("\n".join("\t".join([str(k), *row.split("\t")[1:]]) if k >= 0 else row
+                              for k, row in enumerate(rows, -1)) + "\n", encoding="ascii")  # fmt: skip
+
+    def speeds(mission: Mission) -> list[float]:
+        return [item.params[1] for item in mission.items if item.command == Command.DO_CHANGE_SPEED]
+
+    found = judged_by(monkeypatch, lambda setup, metres: metres >= 130.0 and speeds(setup.mission)[0] > 10.0, path)
+    [faster] = found.remedies
+    assert (faster.kind, faster.current, faster.value, faster.turn_around) == ("airspeed", 2.0, 18.0, 150.0)
+    assert speeds(faster.mission) == [18.0, 16.0]
+    assert "18 m/s instead of 2 m/s, with turn-arounds of 150 m" in remedy_text(faster, 3000.0)
+
+
+def test_what_comes_nearest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, _ = tried(monkeypatch, lambda metres: (metres >= 180.0, {"energy": -3.0} if metres > 20.0 else {}))
+    assert found.remedies == ()
+    assert found.nearest is not None
+    assert (found.nearest.usable, found.nearest.lines) == (4, 4)
+    assert (found.nearest.what, found.nearest.verdict.headline) == ("turn-arounds of 250 m", "fails by ['energy']")
+
+
+@pytest.mark.parametrize(("margin", "passes"), [(-31.0, True), (-33.0, False)])
+def test_what_failed_before_may_fail_as_much(monkeypatch: pytest.MonkeyPatch, margin: float, passes: bool) -> None:
+    """By 22 m before; ten metres of a corridor are what a person would notice."""
+    found, _ = tried(monkeypatch, lambda metres: (metres > 0.0, {"corridor": margin if metres > 0.0 else -22.0}))
+    assert bool(found.remedies) is passes
+    # What did not fail before may not at all.
+    found, _ = tried(monkeypatch, lambda metres: (metres > 0.0, {"corridor": -0.1} if metres > 0.0 else {}))
+    assert found.remedies == ()
+
+
+def test_why_no_other_layout_was_tried(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A change of speed between two lines would be lost."""
+    rows = FIELD.read_text(encoding="ascii").splitlines()
+    speed = "6\t0\t2\t178\t0\t17\t-1\t0\t0\t0\t0\t1"
+    at = next(k for k, row in enumerate(rows) if row.startswith("6\t"))
+    # Behind a waypoint it goes with the line: between the two of a turn-around it is its own.
+    lead = rows[at].replace("6\t", "5\t", 1).replace("47.30449915415902", "47.3054")
+    path = tmp_path / "a.waypoints"
+    path.write_text("\n".join([*rows[:at], lead, speed, *rows[at:]]) + "\n", encoding="ascii")
+    found, flown = tried(monkeypatch, lambda metres: (False, {}), path)
+    assert found.kept == "item 7, DO_CHANGE_SPEED, stands between two lines"
+    assert set(flown) <= {0.0}

@@ -1,0 +1,181 @@
+"""A flight cannot run away: its simulated time and its log have limits, and what it comes to is told before."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import track_rows
+from logs.recording.example_log import example_log
+from logs.recording.reader import read_log
+from logs.recording.recorder import Recorder
+from planfly.cli import main
+from planfly.workflow.airframe import airframe_of
+from planfly.workflow.crash_safe_log import CrashSafeLog, FlightLimits, flight_text, predicted_seconds
+from planfly.workflow.open_flight import open_flight
+from planfly.workflow.pipeline import fly_and_judge
+from tests.planfly.conftest import FIELD
+from tests.planfly.misuse.test_interruptions import LONG
+from world.errors import LogError
+from world.interruption import Interrupted, interrupt
+
+
+@pytest.fixture
+def long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A mission of 3 rounds, 14 km: some 10 minutes."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "field.toml").write_text(FIELD, encoding="utf-8")
+    (tmp_path / "long.waypoints").write_text(LONG.replace("177 1 12", "177 1 2"), encoding="ascii")
+    return tmp_path / "long.waypoints"
+
+
+def test_simulated_time_has_a_limit(long: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    argv = [
+        "fly",
+        long.name,
+        "--scenario",
+        "field.toml",
+        "--guidance",
+        "path",
+        "--log",
+        "f.mcap",
+        "--max-hours",
+        "0.02",
+    ]
+    assert main(argv) == 4
+    # 0.02 h are 72 s.
+    assert "time limit: not finished after 72 s" in capsys.readouterr().out
+    log = read_log(Path("f.mcap"))
+    assert log.complete
+    assert log.track.time[-1] == pytest.approx(72.0, abs=1.0 / 30.0)
+
+
+def test_a_log_has_a_limit(long: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["fly", long.name, "--scenario", "field.toml", "--guidance", "path", "--log", "f.mcap"]
+    argv += ["--max-log", "1.5"]
+    assert main(argv) == 4
+    assert "log limit: 1.5 MB are written; --max-log raises it" in capsys.readouterr().out
+    log = read_log(Path("f.mcap"))
+    assert log.complete
+    assert 1.5e6 < Path("f.mcap").stat().st_size < 2.5e6
+
+
+def test_what_a_flight_comes_to_is_told_before(long: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its predicted time is that of the flight, within a twentieth."""
+    opened = opened_calm(long)
+    told = flight_text(opened)
+    flown = fly_and_judge(opened, airframe_of(opened), None)
+    assert flown.ended == "completed"
+    assert predicted_seconds(opened) == pytest.approx(float(flown.track.time[-1]), rel=0.05)
+    assert told == f"{opened.path.length / 1e3:.1f} km, about {predicted_seconds(opened) / 60:.0f} min in the air"
+
+
+def test_energy_ends_a_flight(long: Path) -> None:
+    """At what is carried, where that is more than half of what the way takes by prediction; else it does not begin."""
+    opened = opened_calm(long)
+    flown = fly_and_judge(opened, airframe_of(opened), None)
+    used = float(flown.track.energy[-1])
+    less = dataclasses.replace(opened, battery=0.7 * used)
+    short = fly_and_judge(less, airframe_of(less), None)
+    assert short.ended == "nothing is left in the battery or the tank"
+    assert float(short.track.energy[-1]) == pytest.approx(0.7 * used, rel=1e-3)
+    none = fly_and_judge(dataclasses.replace(opened, battery=0.1 * used), airframe_of(opened), None)
+    assert (len(none.track), none.ended) == (0, "not started: it takes 10 times the energy carried")
+
+
+def opened_calm(path: Path) -> FlightSetup:
+    """Opened for planfly's own guidance in still air."""
+    return open_flight(path, {"scenario": "field.toml", "guidance": "path", "wind": (0.0, 0.0), "turbulence": "none"})
+
+
+@pytest.mark.parametrize(("size", "full"), [(20_000_000, False), (20_000_001, True)])
+def test_a_log_is_full_beyond_its_limit(size: int, full: bool) -> None:
+    assert bool(FlightLimits(megabytes=20.0).log_full(size)) is full
+
+
+def test_the_limit_of_time_is_in_ticks() -> None:
+    assert FlightLimits(hours=0.5).max_ticks(1.0 / 60.0) == 1800 * 60
+
+
+def test_a_short_flight_is_told_in_seconds() -> None:
+    assert flight_text(example_log().setup).endswith(" s in the air")
+
+
+# ----------------------------------------------------------------------
+# A log that an interruption leaves whole, or not at all.
+
+FLOWN = example_log()
+
+
+def test_an_interrupted_flight_keeps_every_row_it_was_handed(tmp_path: Path) -> None:
+    path = tmp_path / "flight.mcap"
+    rows = track_rows(FLOWN.track)
+    with pytest.raises(Interrupted), CrashSafeLog(path, FLOWN.setup, batch=60) as log:  # noqa: PT012
+        log.write(rows[:37])
+        log.write(rows[37:123])
+        interrupt(2)
+    left = read_log(path)
+    assert (left.complete, left.ended, left.recorded_verdict) == (True, "interrupted", None)
+    assert np.array_equal(left.track.position, FLOWN.track.position[:123])
+
+
+def test_a_signal_in_the_middle_of_a_write_waits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, written = tmp_path / "flight.mcap", Recorder.write_rows
+
+    def struck(self: Recorder, rows: object) -> None:
+        interrupt(2)
+        written(self, rows)
+
+    monkeypatch.setattr(Recorder, "write_rows", struck)
+    with pytest.raises(Interrupted), CrashSafeLog(path, FLOWN.setup) as log:
+        log.write(track_rows(FLOWN.track)[:50])
+    assert len(read_log(path).track) == 50
+
+
+def test_a_flight_that_was_over_is_said_to_be(tmp_path: Path) -> None:
+    path = tmp_path / "flight.mcap"
+    with pytest.raises(KeyboardInterrupt), CrashSafeLog(path, FLOWN.setup) as log:  # noqa: PT012
+        log.write(track_rows(FLOWN.track))
+        log.ended = "completed"
+        raise KeyboardInterrupt
+    assert read_log(path).ended == "completed"
+
+
+@pytest.mark.parametrize("opening", [True, False])
+def test_a_log_without_a_row_is_not_left(opening: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, made = tmp_path / "flight.mcap", Recorder.__init__
+
+    def struck(self: Recorder, *args: object, **options: object) -> None:
+        made(self, *args, **options)
+        interrupt(15)
+
+    if opening:
+        monkeypatch.setattr(Recorder, "__init__", struck)
+    with pytest.raises(KeyboardInterrupt), CrashSafeLog(path, FLOWN.setup):
+        raise KeyboardInterrupt
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_error_leaves_the_log_unfinished(tmp_path: Path) -> None:
+    path = tmp_path / "flight.mcap"
+    with pytest.raises(LogError), CrashSafeLog(path, FLOWN.setup) as log:  # noqa: PT012
+        log.write(track_rows(FLOWN.track))
+        raise LogError("full")
+    assert not read_log(path).complete
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_a_target_that_is_a_link_is_never_removed(there: bool, tmp_path: Path) -> None:
+    """One that leads to itself cannot be written; what an interruption leaves goes, not the link."""
+    link = tmp_path / "link.mcap"
+    link.symlink_to(tmp_path / ("real.mcap" if there else "link.mcap"))
+    if there:
+        with pytest.raises(Interrupted), CrashSafeLog(link, FLOWN.setup):
+            interrupt(2)
+        assert not (tmp_path / "real.mcap").exists()
+    else:
+        with pytest.raises(OSError, match="symbolic links"):
+            CrashSafeLog(link, FLOWN.setup)
+    assert link.is_symlink()

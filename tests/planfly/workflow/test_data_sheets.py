@@ -1,0 +1,180 @@
+"""A folder from a data sheet: it does what the sheet says, flies by both laws, and is made whole or not at all."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import Aircraft
+from aircraft.data_sheet import DataSheet
+from aircraft.uncertainty import read_draws, read_uncertainty
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.dynamics.characteristics import modes_at
+from flight.dynamics.envelope_tables import load_envelope
+from flight.dynamics.fdm import Fdm, Variation
+from flight.dynamics.trim import fastest, full_throttle, slowest, straight
+from flight.simulation.simulate import Flight, fly_to_end
+from planfly.workflow import data_sheets
+from planfly.workflow.data_sheets import change_of, make_data_sheet_folder, stated_parameters, with_parameters
+from tests.setups import setup_maker
+from world.errors import FlightError
+
+FOAM = DataSheet(mass=2.1, span=1.6, cruise=15.0, stall=10.0, layout="wing")
+FILES = {
+    *("README.md", "ardupilot.parm", "ardupilot.toml", "draws.csv", "gains.toml", "uncertainty.toml"),
+    *("foam.toml", "foam.xml"),
+}
+
+
+@pytest.fixture(scope="module")
+def foam(tmp_path_factory: pytest.TempPathFactory) -> Aircraft:
+    return make_data_sheet_folder(tmp_path_factory.mktemp("sheets") / "foam", FOAM)
+
+
+def test_the_model_does_what_the_sheet_says(foam: Aircraft) -> None:
+    assert {file.name for file in foam.folder.iterdir()} == FILES
+    fdm = Fdm(foam, tried=True)
+    climb, fast, slow = full_throttle(fdm, 15.0, 500.0), fastest(fdm, 500.0), slowest(fdm, 0.0)
+    assert climb is not None
+    assert fast is not None
+    assert slow is not None
+    assert math.degrees(climb.climb) == pytest.approx(12.0, abs=0.3)
+    assert fast.airspeed == pytest.approx(21.0, rel=0.01)
+    # The propeller's pull carries some of it: up to a tenth.
+    assert 0.9 * 10.0 < slow.airspeed < 10.0
+    assert (foam.stall_speed, foam.mass, foam.wing_span, foam.airspeed) == (10.0, 2.1, 1.6, 15.0)
+
+
+def test_it_is_stable(foam: Aircraft) -> None:
+    modes = {mode.name: mode for mode in modes_at(foam, 15.0)}
+    assert modes["short period"].damping > 0.3
+    assert modes["Dutch roll"].damping > 0.05
+
+
+@pytest.mark.parametrize("law", ["planfly", "arduplane"])
+def test_it_flies(foam: Aircraft, law: str) -> None:
+    way = np.array([[0.0, 0.0, 500.0], [0.0, 500.0, 520.0], [400.0, 800.0, 540.0], [900.0, 700.0, 520.0]])
+    setup = setup_maker(foam)(way, speeds=15.0, wind=(3.0, 200.0), turbulence="light", bank_deg=35.0)
+    if law == "arduplane":
+        setup = replace(setup, autopilot=ArduPlane(ArduPilotParameters.load(foam)))
+    flown = fly_to_end(Flight(setup, foam))
+    assert flown.ended == "completed"
+    if law == "planfly":
+        assert np.abs(flown.track.cross_track[300:]).max() < 3.0
+        assert np.abs(flown.track.height_error[300:]).max() < 2.0
+
+
+def test_its_intervals_are_those_of_its_draws(foam: Aircraft) -> None:
+    known = read_uncertainty(foam.folder)
+    assert known is not None
+    # A guessed climb is known to 4.8 / sqrt(2 / pi) = 6.0 degrees; the draws give what is stated.
+    assert math.degrees(known.climb) == pytest.approx(6.0, abs=0.1)
+    draws = read_draws(foam.folder / "draws.csv")
+    angles, tops = [], []
+    for seed in range(40):
+        fdm = Fdm(foam, tried=True, variation=Variation(properties=draws.properties(seed)))
+        climb = full_throttle(fdm, 15.0, 500.0)
+        assert climb is not None
+        angles.append(math.degrees(climb.climb))
+        top = fastest(fdm, 500.0)
+        assert top is not None
+        tops.append(top.airspeed)
+    # The fastest level flight is 21 m/s, give or take what the same draws do.
+    assert np.std(tops) == pytest.approx(known.fastest, rel=0.4)
+    assert load_envelope(foam).fastest_sd == known.fastest > 0.5
+    # 40 draws give a deviation to about 11 % (one standard deviation).
+    assert np.std(angles) == pytest.approx(6.0, rel=0.4)
+
+
+def test_what_is_said_of_the_climb_is_not_capped_with_the_propulsion(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(data_sheets, "GUESSED_CLIMB", math.radians(30.0))
+    known = read_uncertainty(make_data_sheet_folder(tmp_path / "foam", FOAM).folder)
+    assert known is not None
+    # Thrust goes to twice its 20 %, which comes to less than 30 degrees.
+    assert {one.name: one.sd for one in known.quantities}["ident/thrust"] == pytest.approx(0.4)
+    assert math.degrees(known.climb) == pytest.approx(30.0, abs=0.01)
+
+
+def test_it_surely_flies_as_fast_as_it_cruises(tmp_path: Path) -> None:
+    """The cruise speed is stated, not guessed: a sheet whose top is 1 m/s above it is sure of that much."""
+    made = make_data_sheet_folder(tmp_path / "foam", replace(FOAM, top=16.0, climb=math.radians(4.0)))
+    table = load_envelope(made)
+    assert table.level_speeds(500.0)[1] == pytest.approx(16.0, abs=0.3)
+    assert table.surely().level_speeds(500.0)[1] == pytest.approx(15.0, abs=0.1)
+
+
+@pytest.mark.parametrize("energy", [0.0, 74.0 * 3600.0])
+def test_a_battery_that_nobody_stated_is_a_guess(tmp_path: Path, energy: float) -> None:
+    made = make_data_sheet_folder(tmp_path / "foam", replace(FOAM, volts=14.8, energy=energy))
+    assert load_envelope(made).battery_guessed is (energy == 0.0)
+
+
+def test_parameters_are_data(tmp_path: Path) -> None:
+    file = tmp_path / "mine.parm"
+    # TRIM_THROTTLE 45 is ArduPlane's own value and says nothing.
+    file.write_text("AIRSPEED_CRUISE 16\nARSPD_FBW_MIN 12\nTECS_CLMB_MAX 4\nTRIM_THROTTLE 45\nLIM_ROLL_CD 3000\n")
+    stated = stated_parameters(file)
+    assert stated == {"AIRSPEED_CRUISE": 16.0, "AIRSPEED_MIN": 12.0, "TECS_CLMB_MAX": 4.0, "ROLL_LIMIT_DEG": 30.0}
+    made = make_data_sheet_folder(tmp_path / "mine", DataSheet(2.1, 1.6, 0.0, 0.0), file)
+    assert (made.airspeed, made.stall_speed) == (16.0, 10.0)
+    assert math.degrees(made.max_bank) == pytest.approx(30.0)
+    climb = full_throttle(Fdm(made, tried=True), 16.0, 500.0)
+    assert climb is not None
+    # 4 m/s at 16 m/s.
+    assert climb.climb == pytest.approx(math.asin(0.25), abs=math.radians(0.4))
+    known = read_uncertainty(made.folder)
+    assert known is not None
+    assert math.degrees(known.climb) == pytest.approx(3.0, abs=0.1)
+    assert "TECS_CLMB_MAX 4\n" in (made.folder / "ardupilot.parm").read_text()
+
+
+def test_an_angle_that_is_not_flown_is_no_small_change() -> None:
+    nan = math.nan
+    more, less = np.array([0.3, nan, 0.3, nan]), np.array([0.1, 0.05, nan, nan])
+    found = change_of(more, less, np.array([0.2, 0.2, 0.2, -0.2]))
+    # Half of what is between them; to the one; to the other; the whole angle.
+    assert found == pytest.approx([0.1, 0.15, 0.1, 0.2])
+
+
+def test_a_sheet_comes_before_parameters() -> None:
+    filled = with_parameters(FOAM, {"AIRSPEED_CRUISE": 30.0, "ROLL_LIMIT_DEG": 20.0})
+    assert (filled.cruise, round(math.degrees(filled.bank))) == (15.0, 20)
+
+
+@pytest.mark.parametrize(
+    ("sheet", "told"),
+    [
+        (DataSheet(2.1, 1.6, 15.0, 0.0), "stall: a data sheet needs it: 5..35 m/s"),
+        (replace(FOAM, mass=30.0), "mass 30 kg: allowed 0.5..25 kg"),
+    ],
+)
+def test_nothing_is_left_of_what_is_refused(tmp_path: Path, sheet: DataSheet, told: str) -> None:
+    with pytest.raises(FlightError, match=told):
+        make_data_sheet_folder(tmp_path / "mine", sheet)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_there_stays(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    with pytest.raises(FlightError, match="exists"):
+        make_data_sheet_folder(tmp_path / "mine", FOAM)
+
+
+def test_fuel_and_a_tail(tmp_path: Path) -> None:
+    made = make_data_sheet_folder(tmp_path / "petrol", DataSheet(12.0, 2.8, 24.0, 16.0, fuel=1.5))
+    assert made.battery_voltage == 0.0
+    assert made.battery_energy == pytest.approx(1.5 * 43.5e6)
+    fdm = Fdm(made, tried=True)
+    level = straight(fdm, 24.0, 500.0)
+    assert level is not None
+    fdm.balance(level.vector())
+    state = fdm.read()
+    # Heat is work by 0.2; thrust x airspeed is a part of the work that a propeller gives.
+    work = 0.2 * float(state.power)
+    drag = fdm.properties.getter("motor/thrust-n")() * 24.0
+    assert 0.4 < drag / work < 0.9

@@ -1,0 +1,114 @@
+"""Targets on disk: what may be written over, and what is cleared."""
+
+from pathlib import Path
+
+import pytest
+
+from planfly.workflow.output_paths import (
+    RUN_FILES,
+    RUN_FOLDER,
+    expand_path_pattern,
+    file_target,
+    prepare_folder,
+    refuse_existing,
+    refuse_folder,
+)
+from world.errors import PlanflyError
+
+
+def test_a_named_file_is_refused_where_it_would_destroy(tmp_path: Path) -> None:
+    there, link = tmp_path / "there.plan", tmp_path / "link.plan"
+    there.write_text("mine", encoding="utf-8")
+    link.symlink_to(there)
+    refuse_existing(tmp_path / "new.plan", overwrite=False, source=there)
+    refuse_existing(there, overwrite=True)
+    for path, overwrite, source, message in (
+        (there, False, None, "overwrite=True replaces it"),
+        (link, True, there, "is the input itself"),
+        (tmp_path, True, None, "is a folder"),
+        (tmp_path / "none" / "a.plan", True, None, "does not exist"),
+    ):
+        with pytest.raises(PlanflyError, match=message):
+            refuse_existing(path, overwrite, source)
+    assert there.read_text(encoding="utf-8") == "mine"
+
+
+def test_a_named_folder_is_refused_unless_it_is_empty(tmp_path: Path) -> None:
+    refuse_folder(tmp_path, overwrite=False)
+    refuse_folder(tmp_path / "new", overwrite=False)
+    file = tmp_path / "mine.txt"
+    file.write_text("mine", encoding="utf-8")
+    with pytest.raises(PlanflyError, match="not empty; overwrite=True"):
+        refuse_folder(tmp_path, overwrite=False)
+    with pytest.raises(PlanflyError, match="a folder is expected"):
+        refuse_folder(file, overwrite=True)
+    refuse_folder(tmp_path, overwrite=True)
+
+
+def test_a_run_clears_its_old_results_and_nothing_of_others(tmp_path: Path) -> None:
+    old = tmp_path / "round-1"
+    mixed = tmp_path / "round-2"
+    for folder in (tmp_path, old, mixed):
+        folder.mkdir(exist_ok=True)
+        for name in RUN_FILES:
+            (folder / name).write_text("old", encoding="utf-8")
+    for kept in (tmp_path / "mine.txt", mixed / "mine.txt", tmp_path / "map.svg"):
+        kept.write_text("mine", encoding="utf-8")
+    (tmp_path / "rounds.json").write_text("old", encoding="utf-8")
+    prepare_folder(tmp_path)
+    left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*"))
+    assert left == ["map.svg", "mine.txt", "round-2", "round-2/mine.txt"]
+
+
+def test_a_folder_of_old_results_alone_stays_to_take_the_new_ones(tmp_path: Path) -> None:
+    folder = tmp_path / "runs" / "a"
+    prepare_folder(folder)
+    (folder / "plan.json").write_text("old", encoding="utf-8")
+    prepare_folder(folder)
+    assert folder.is_dir()
+    assert list(folder.iterdir()) == []
+
+
+def test_another_command_leaves_a_runs_rounds_alone(tmp_path: Path) -> None:
+    (tmp_path / "round-1").mkdir()
+    for name in ("round-1/map.png", "map.png", "plan.json", "rounds.json"):
+        (tmp_path / name).write_text("old", encoding="utf-8")
+    prepare_folder(tmp_path, ("map.png", "report.html"))
+    left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file())
+    assert left == ["plan.json", "round-1/map.png", "rounds.json"]
+
+
+@pytest.mark.parametrize(
+    ("name", "folder"),
+    [
+        ("jacksboro", "runs/jacksboro-seed3"),
+        # The six letters are those of sha256sum (GNU coreutils).
+        ("../../etc/passwd", "runs/-..-etc-passwd-3754d6-seed3"),
+        ("a b/c", "runs/a-b-c-539138-seed3"),
+        ("...", "runs/run-ab5df6-seed3"),
+        (".", "runs/run-cdb4ee-seed3"),
+        ("..", "runs/run-5ec1f7-seed3"),
+        ("a/b", "runs/a-b-c14cdd-seed3"),
+        ("a\\b", "runs/a-b-c62016-seed3"),
+    ],
+)
+def test_a_default_folder_stays_below_runs(name: str, folder: str) -> None:
+    assert expand_path_pattern(RUN_FOLDER, name, 3) == Path(folder)
+
+
+def test_no_two_names_share_a_folder() -> None:
+    names = ["a/b", "a\\b", "a b", "a:b", "a-b", "a.b", ".a-b", ".", "..", "...", "run", "-", "/", "a", ".a", "\udcff"]
+    folders = {expand_path_pattern("{name}", name, 0) for name in names}
+    assert len(folders) == len(names)
+    assert all(len(folder.parts) == 1 and ".." not in folder.parts for folder in folders)
+
+
+def test_a_patterns_folder_may_be_missing_and_a_named_files_may_not(tmp_path: Path) -> None:
+    made = file_target(tmp_path / "{name}-{seed}" / "plan.json", "a/b", 3, overwrite=False)
+    assert made == tmp_path / "a-b-c14cdd-3" / "plan.json"
+    made.parent.mkdir()
+    made.write_text("mine", encoding="utf-8")
+    with pytest.raises(PlanflyError, match="overwrite=True replaces it"):
+        file_target(tmp_path / "{name}-{seed}" / "plan.json", "a/b", 3, overwrite=False)
+    with pytest.raises(PlanflyError, match="does not exist"):
+        file_target(tmp_path / "none" / "plan.json", "a/b", 3, overwrite=True)

@@ -1,0 +1,285 @@
+"""The parameter that decides, found among flights that pass or fail by a rule of the test's own."""
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from aircraft.catalog import load_aircraft
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import Px4Parameters
+from flight.live.telemetry import AUTO
+from flight.simulation.setup import FlightSetup
+from logs.recording.reader import read_log
+from logs.verdict.findings import Fact, Finding, make_finding
+from logs.verdict.places import Place
+from logs.verdict.verdict import verdict_json
+from logs.verdict.wording import deciding_text
+from planfly.flight_logs import judge_log
+from planfly.live.served_flights import ServedLog
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.pipeline import JudgedFlight, fly_and_judge
+from planfly.workflow.reference_flights import (
+    airframe_answer,
+    deciding_parameter,
+    find_deciding_parameter,
+    has_room,
+    judge_with_reference_flights,
+)
+from tests.setups import setup_maker
+
+LEG = Place("leg", 4)
+LOW = make_finding("clearance", LEG, ok=False, reason="", flown=52.0, limit=60.0, margin=-8.0)
+HEIGHTS = make_finding("slope", LEG, ok=True, reason="", facts=[Fact("height error", -8.4, "m")])
+WIDE = make_finding("corridor", LEG, ok=False, reason="", flown=210.0, limit=180.0, margin=-30.0)
+
+
+@pytest.mark.parametrize(
+    ("failed", "flown", "margin", "enough"),
+    [
+        # Of 160 m off the legs a law may be wrong by 16.
+        (WIDE, 160.0, 16.1, True),
+        (WIDE, 160.0, 15.9, False),
+        (LOW, 61.3, 1.3, True),
+        (LOW, 61.1, 1.1, False),
+    ],
+)
+def test_a_value_that_is_suggested_passes_with_the_laws_own_error_to_spare(
+    failed: Finding, flown: float, margin: float, enough: bool
+) -> None:
+    made = make_finding(failed.rule, LEG, ok=True, reason="", flown=flown, limit=flown, margin=margin)
+    assert has_room((made,), (failed, HEIGHTS)) is enough
+    # Elsewhere nothing failed, and nothing more is asked for.
+    assert has_room((replace(made, place=Place("leg", 5)),), (failed, HEIGHTS))
+    assert has_room((made,), (HEIGHTS,))
+
+
+class Flights:
+    """Flies by a test, and counts."""
+
+    def __init__(self, passes: Callable[[ArduPilotParameters], bool]) -> None:
+        self.count = 0
+        self._passes = passes
+
+    def __call__(self, law: Autopilot) -> bool:
+        assert isinstance(law, ArduPlane)
+        self.count += 1
+        return self._passes(law.parameters)
+
+
+@pytest.mark.parametrize(
+    ("most", "passing"),
+    [(2.81, 2.8), (2.79, 2.6), (1.21, 1.2), (1.19, 1.0), (1.0, 1.0)],
+)
+def test_the_nearest_value_that_passes_is_named(most: float, passing: float) -> None:
+    flights = Flights(lambda new: new.tecs_height_demand_time <= most)
+    found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (LOW, HEIGHTS), flights)
+    assert found is not None
+    assert (found.name, found.current, found.passing, found.unit) == ("TECS_HDEM_TCONST", 3.0, passing, "s")
+    assert (found.rule, found.place, found.off) == ("clearance", LEG, -8.4)
+    # The farthest value, and the nine between it and the present one by halves.
+    assert flights.count <= 5
+
+
+@pytest.mark.parametrize(("present", "passing"), [(30.0, 35.0), (40.0, 41.0)])
+def test_no_value_below_the_documented_range_is_named(present: float, passing: float) -> None:
+    def banks_further(law: Autopilot) -> bool:
+        assert isinstance(law, Px4)
+        return law.parameters["FW_R_LIM"] > math.radians(present + 0.5)
+
+    law = Px4(Px4Parameters.defaults("1.17")).with_parameters(FW_R_LIM=present)
+    found = deciding_parameter(law, (WIDE,), banks_further)
+    assert found is not None
+    assert (found.name, found.current, found.passing) == ("FW_R_LIM", present, passing)
+
+
+def test_nothing_decides_how_a_mission_is_flown_that_is_not_taken() -> None:
+    refused = make_finding("mission", Place("mission", item=1), ok=False, reason="")
+    flights = Flights(lambda _: True)
+    assert deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (refused,), flights) is None
+    assert flights.count == 0
+
+
+def test_what_failed_says_where_to_look_first() -> None:
+    passes = Flights(lambda new: new.tecs_height_demand_time < 2.0 or new.navl1_period < 15.0)
+    found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (LOW,), passes)
+    assert found is not None
+    assert found.name == "TECS_HDEM_TCONST"
+    found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (WIDE,), passes)
+    assert found is not None
+    assert (found.name, found.passing, found.off) == ("NAVL1_PERIOD", 14.0, 210.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "passes", "passing"),
+    [
+        ("WP_RADIUS", lambda new: new.wp_radius <= 62.0, 60.0),
+        ("WP_RADIUS", lambda new: new.wp_radius >= 118.0, 120.0),
+        ("TECS_CLMB_MAX", lambda new: new.tecs_climb_max >= 6.2, 6.5),
+    ],
+)
+def test_both_ways(name: str, passes: Callable[[ArduPilotParameters], bool], passing: float) -> None:
+    found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (WIDE,), Flights(passes))
+    assert found is not None
+    assert (found.name, found.passing) == (name, passing)
+
+
+def test_none_where_none_decides() -> None:
+    flights = Flights(lambda new: False)
+    assert deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (WIDE,), flights) is None
+    assert flights.count == 8
+    assert deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (HEIGHTS,), flights) is None
+
+
+def test_a_value_beyond_the_farthest_is_not_tried() -> None:
+    quick = ArduPilotParameters.defaults().changed(TECS_HDEM_TCONST=1.0)
+    seen: list[float] = []
+
+    def passes(new: ArduPilotParameters) -> bool:
+        seen.append(new.tecs_height_demand_time)
+        return False
+
+    assert deciding_parameter(ArduPlane(quick), (LOW,), Flights(passes)) is None
+    assert set(seen) == {1.0}
+
+
+def test_findings_that_pass_are_not_blamed() -> None:
+    fine: Finding = make_finding("corridor", LEG, ok=True, reason="")
+    assert deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (fine,), lambda new: True) is None
+
+
+# ----------------------------------------------------------------------
+# A climb over a hill that the aircraft clears and ArduPlane does not, for it follows a slope three seconds late.
+
+AIRCRAFT = load_aircraft("aerosonde")
+SLOPE = 0.1
+REQUIRED = 100.0
+
+
+def over_a_hill(spare: float) -> FlightSetup:
+    """A climb of 1 in 10 over a hill under its middle, that clears it by what is required and ``spare`` m more.
+
+    Line less Gaussian is least 0.1 sigma^2 / height before the peak, by half of 0.1 of that less than over the peak.
+    """
+    sigma = 300.0
+    height = 450.0 - REQUIRED - spare
+    height -= 0.5 * SLOPE * SLOPE * sigma**2 / height
+    points = [[0, 0, 300], [0, 1000, 300], [0, 4000, 600], [0, 5000, 600]]
+    peak = {"east_m": 0.0, "north_m": 2500.0, "height_m": height, "sigma_m": sigma}
+    made = setup_maker(AIRCRAFT)(
+        points, terrain={"kind": "peaks", "peak": [peak]}, limits={"min_clearance_m": REQUIRED}
+    )
+    return replace(made, autopilot=ArduPlane(ArduPilotParameters.load(AIRCRAFT)))
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[JudgedFlight, Path]:
+    setup, log = over_a_hill(4.7), tmp_path_factory.mktemp("hill") / "flight.mcap"
+    return fly_and_judge(setup, load_airframe(setup.scenario), log), log
+
+
+def test_the_aircraft_can_and_arduplane_cannot(flown: tuple[JudgedFlight, Path]) -> None:
+    """2.5 m/s of climb, three seconds late, are 7.5 m: too low by 3 m; 1.2 m are the law's own error, and a lag
+    of 3.5 / 2.5 = 1.4 s would pass."""
+    judged, _ = flown
+    climb = 25.0 * math.sin(math.atan(SLOPE))
+    assert [(level.name, level.flyable) for level in judged.verdict.levels] == [
+        ("geometry", True),
+        ("airframe", True),
+        ("autopilot", False),
+    ]
+    deciding = judged.verdict.deciding
+    assert deciding is not None
+    assert (deciding.name, deciding.current, deciding.rule, deciding.place.index) == (
+        "TECS_HDEM_TCONST", 3.0, "clearance", 1,
+    )  # fmt: skip
+    assert deciding.passing == pytest.approx((4.7 - 1.2) / climb, abs=0.4)
+    # And what the start of the climb takes.
+    assert deciding.off == pytest.approx(-3.0 * climb, abs=2.5)
+    second = judged.verdict.lines[1]
+    assert second.startswith("The aircraft can, ArduPlane with these parameters cannot: TECS_HDEM_TCONST 3 puts it ")
+    assert second.endswith(f"m low on leg 1, to item 2; {deciding.passing:g} would pass")
+
+
+def test_a_served_flight_tells_stations_which_parameter_decides(
+    flown: tuple[JudgedFlight, Path], tmp_path: Path
+) -> None:
+    judged, _ = flown
+    served = ServedLog(tmp_path / "flight-001.mcap", judged.setup, AIRCRAFT, AUTO)
+    served.write(judged.track)
+    told = served.finish(judged.ended, lambda: False)
+    deciding = judged.verdict.deciding
+    assert deciding is not None
+    assert not told.flyable
+    assert deciding_text(deciding) in [text.text for text in told.texts]
+
+
+@pytest.mark.parametrize("patience", [0, 300])
+def test_in_a_hurry_flights_beside_are_given_up_and_the_verdict_is_not(
+    patience: int, flown: tuple[JudgedFlight, Path], tmp_path: Path
+) -> None:
+    """At once, and after the airframe's flight of some 200 s: nothing is lost but what was not known yet."""
+    judged, _ = flown
+    asked = itertools.count()
+    served = ServedLog(tmp_path / "flight-001.mcap", judged.setup, AIRCRAFT, AUTO)
+    served.write(judged.track)
+    told = served.finish(judged.ended, lambda: next(asked) >= patience)
+    assert not told.flyable
+    assert next(asked) == patience + 1
+    log = read_log(tmp_path / "flight-001.mcap")
+    assert log.complete
+    assert log.recorded_verdict is not None
+    assert log.recorded_verdict["flyable"] is False
+    assert judged.reference is not None
+    assert log.reference == (None if patience == 0 else replace(judged.reference, deciding=None))
+
+
+def test_its_log_repeats_the_verdict_byte_for_byte(flown: tuple[JudgedFlight, Path]) -> None:
+    judged, path = flown
+    log = read_log(path)
+    assert log.reference == judged.reference
+    assert verdict_json(judge_log(log)) == verdict_json(judged.verdict)
+
+
+def test_a_flight_that_passes_has_a_reference_flight_only_on_request() -> None:
+    setup = over_a_hill(30.0)
+    airframe = load_airframe(setup.scenario)
+    usual = fly_and_judge(setup, airframe, None)
+    assert usual.reference is None
+    assert usual.verdict.flyable
+    assert [level.name for level in usual.verdict.levels] == ["geometry", "autopilot"]
+    asked = fly_and_judge(setup, airframe, None, reference="always")
+    assert asked.reference is not None
+    assert asked.reference.airframe == airframe_answer(setup, AIRCRAFT)
+    assert asked.reference.deciding is None
+    assert asked.verdict.findings == usual.verdict.findings
+    assert [line for line in asked.verdict.lines if line not in usual.verdict.lines] == [
+        "By the airframe (planfly's guidance, exact navigation): flyable; both flights agree"
+    ]
+    assert find_deciding_parameter(setup, AIRCRAFT, usual.verdict) is None
+
+
+def test_campaigns_fly_no_reference_flight_of_a_flight_that_fails(flown: tuple[JudgedFlight, Path]) -> None:
+    judged, _ = flown
+    alone, none = judge_with_reference_flights(judged.requirements, AIRCRAFT, judged.track, judged.ended, fly="never")
+    assert none is None
+    assert alone.findings == judged.verdict.findings
+
+
+def test_planflys_guidance_has_no_flight_beside_it() -> None:
+    setup = replace(over_a_hill(30.0), autopilot=PlanflyGuidance())
+    judged = fly_and_judge(setup, load_airframe(setup.scenario), None)
+    assert judged.reference is None
+    assert [level.name for level in judged.verdict.levels] == ["geometry", "airframe"]
+
+
+def test_the_airframe_knows_where_it_is_whatever_the_autopilot_does() -> None:
+    lost = replace(over_a_hill(30.0), nav="gnss", autopilot=ArduPlane(ArduPilotParameters.defaults()))
+    assert airframe_answer(lost, AIRCRAFT) == airframe_answer(replace(lost, nav="perfect"), AIRCRAFT)
