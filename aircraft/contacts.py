@@ -15,12 +15,10 @@ from typing import Literal
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from aircraft.envelope import GRAVITY
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Landing gear of an aircraft whose model has no contacts.
 Gear = Literal["belly", "wheels"]

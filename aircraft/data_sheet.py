@@ -11,14 +11,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from aircraft.model_writer import AeroCoefficients, Layout, ModelNumbers
 from aircraft.propulsion import BOOK_PROPELLER, ElectricMotor, FuelEngine, Propeller
+from world.arrays import Floats
 from world.errors import FlightError
-
-Floats = NDArray[np.float64]
 
 # Air density at sea level, kg/m^3.
 SEA_LEVEL = 1.225
@@ -145,22 +143,62 @@ DRAG_POWER = -0.2
 # 0.0434 at Reynolds numbers of 3.2e5 and 2.9e5, Cmq -38 and -13.6 at aspect ratios of 15.2 and 5.2, Cm_alpha -2.74 and
 # -0.72; radii of gyration 0.095, 0.111, 0.138 and 0.150, 0.165, 0.220 of the span; other values lie between the two.
 TAIL = AircraftClass(
-    lift_slope=1.05, lift_max=1.25, drag=0.0425, oswald=0.82, by_aspect=True, pitch_alpha=-0.16, pitch_q=-2.55,
-    lift_q=7.0, lift_elevator=0.11, side_beta=-0.7, roll_beta=-0.085, roll_p=-0.48, roll_r=0.17, roll_aileron=0.17,
-    yaw_beta=0.073, yaw_p=0.02, yaw_r=-0.13, yaw_aileron=-0.011, side_rudder=0.19, roll_rudder=0.005,
-    yaw_rudder=-0.11, gyration=(0.12, 0.14, 0.175), product_share=0.08, elevator_stall=-math.radians(22.0),
+    lift_slope=1.05,
+    lift_max=1.25,
+    drag=0.0425,
+    oswald=0.82,
+    by_aspect=True,
+    pitch_alpha=-0.16,
+    pitch_q=-2.55,
+    lift_q=7.0,
+    lift_elevator=0.11,
+    side_beta=-0.7,
+    roll_beta=-0.085,
+    roll_p=-0.48,
+    roll_r=0.17,
+    roll_aileron=0.17,
+    yaw_beta=0.073,
+    yaw_p=0.02,
+    yaw_r=-0.13,
+    yaw_aileron=-0.011,
+    side_rudder=0.19,
+    roll_rudder=0.005,
+    yaw_rudder=-0.11,
+    gyration=(0.12, 0.14, 0.175),
+    product_share=0.08,
+    elevator_stall=-math.radians(22.0),
     throw=(math.radians(25.0), math.radians(25.0), math.radians(25.0)),
-)  # fmt: skip
+)
 # The Skywalker X8 (Gryte et al. 2018) and the Zagi (Beard and McLain, first edition, appendix E.1): lift slopes 0.89
 # and 0.72 of the elliptic wing's slope, least drag 0.0182 and 0.0254 at Reynolds numbers of 4.4e5 and 3.4e5; lateral
 # values of the X8 only, since the Zagi's table has no directional stability.
 WING = AircraftClass(
-    lift_slope=0.80, lift_max=1.05, drag=0.0225, oswald=0.86, by_aspect=False, pitch_alpha=-0.51, pitch_q=-1.35,
-    lift_q=3.4, lift_elevator=0.275, side_beta=-0.22, roll_beta=-0.085, roll_p=-0.40, roll_r=0.055, roll_aileron=0.13,
-    yaw_beta=0.0283, yaw_p=0.0044, yaw_r=-0.072, yaw_aileron=-0.0034, side_rudder=0.0, roll_rudder=0.0,
-    yaw_rudder=0.0, gyration=(0.16, 0.12, 0.2), product_share=0.0, elevator_stall=-math.radians(22.0),
+    lift_slope=0.80,
+    lift_max=1.05,
+    drag=0.0225,
+    oswald=0.86,
+    by_aspect=False,
+    pitch_alpha=-0.51,
+    pitch_q=-1.35,
+    lift_q=3.4,
+    lift_elevator=0.275,
+    side_beta=-0.22,
+    roll_beta=-0.085,
+    roll_p=-0.40,
+    roll_r=0.055,
+    roll_aileron=0.13,
+    yaw_beta=0.0283,
+    yaw_p=0.0044,
+    yaw_r=-0.072,
+    yaw_aileron=-0.0034,
+    side_rudder=0.0,
+    roll_rudder=0.0,
+    yaw_rudder=0.0,
+    gyration=(0.16, 0.12, 0.2),
+    product_share=0.0,
+    elevator_stall=-math.radians(22.0),
     throw=(math.radians(25.0), math.radians(25.0), math.radians(25.0)),
-)  # fmt: skip
+)
 # Class of each layout.
 CLASSES: dict[Layout, AircraftClass] = {"tail": TAIL, "vtail": TAIL, "wing": WING}
 
@@ -559,8 +597,7 @@ def _solve_errors(errors: Callable[[Sequence[float]], list[float]], count: int, 
     for size in (1.0, 0.6, 1.7):
         x = _newton(lambda x: np.array(errors(np.exp(x).tolist())), np.log([size, 1.0 / size][:count]))
         if x is not None:
-            free: list[float] = np.exp(x).tolist()
-            return free
+            return np.exp(x).tolist()
     raise _no_propeller(sheet)
 
 

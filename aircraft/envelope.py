@@ -4,11 +4,9 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.kernels import compiled
-
-Floats = NDArray[np.float64]
 
 # Standard gravity, m/s^2.
 GRAVITY = 9.80665
@@ -159,9 +157,7 @@ class Envelope:
 
 
 @compiled
-def ground_slope(
-    air_angle: float, airspeed: float, tailwind: float, crosswind: float
-) -> float:  # pragma: no cover - compiled
+def ground_slope(air_angle: float, airspeed: float, tailwind: float, crosswind: float) -> float:
     """Return the path angle over the ground of a steady climb at ``air_angle`` to the air, rad.
 
     NaN without progress.
@@ -171,7 +167,7 @@ def ground_slope(
 
 
 @compiled
-def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:  # pragma: no cover - compiled
+def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:
     """Return the ground speed along a course held against the wind, m/s; NaN if it cannot be held."""
     square = airspeed**2 - crosswind**2
     along = math.sqrt(square) + tailwind if square > 0.0 else -1.0
@@ -179,7 +175,7 @@ def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:  
 
 
 @compiled
-def turn_radius(speed: float, bank: float) -> float:  # pragma: no cover - compiled
+def turn_radius(speed: float, bank: float) -> float:
     """Return the radius of a coordinated level turn, m, from speed (m/s) and bank (rad)."""
     return speed**2 / (GRAVITY * math.tan(bank))
 

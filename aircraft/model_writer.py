@@ -286,9 +286,13 @@ _ALPHA = "aero/alpha-rad"
 # Property of the sideslip.
 _BETA = "aero/beta-rad"
 # Properties of the rotation rates.
-_RATE_P, _RATE_Q, _RATE_R = (f"velocities/{axis}-aero-rad_sec" for axis in "pqr")
+_RATE_P = "velocities/p-aero-rad_sec"
+_RATE_Q = "velocities/q-aero-rad_sec"
+_RATE_R = "velocities/r-aero-rad_sec"
 # Properties of the control surfaces.
-_ELEVATOR, _AILERON, _RUDDER = (f"surface/{name}-rad" for name in ("elevator", "aileron", "rudder"))
+_ELEVATOR = "surface/elevator-rad"
+_AILERON = "surface/aileron-rad"
+_RUDDER = "surface/rudder-rad"
 # Property of the factor on the control surfaces' moments.
 _CONTROL = "aero/control-factor"
 

@@ -9,16 +9,14 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, Envelope, ground_slope, ground_speed
 from aircraft.tracking import TrackingError, air_density_factor, density_factor
+from world.arrays import Floats
 from world.by_reference import by_reference
 from world.geometry import leg_courses, leg_slopes, wrap
 from world.kernels import compiled, compiled_inline, inlined
 from world.wind import W20, Wind, mean_wind_speed
-
-Floats = NDArray[np.float64]
 
 # Time to roll from one bank angle into the opposite one, s per rad by which the change exceeds the bank limit: rolling
 # in from level is part of every turn. Measured on the shortest S-turn legs that are flown within tolerance
@@ -221,20 +219,19 @@ def _read_only(values: Floats) -> Floats:
 
 
 @inlined
-def wind_speed_at(table: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
+def wind_speed_at(table: PerformanceTable, amsl: float) -> float:
     """Return the mean wind speed at an altitude, m/s."""
     return mean_wind_speed(table.wind_speed, table.wind_gradient, table.wind_reference_amsl, amsl)
 
 
 @compiled_inline
-def true_airspeed(table: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
+def true_airspeed(table: PerformanceTable, amsl: float) -> float:
     """Return the true airspeed at an altitude, m/s."""
-    speed: float = table.airspeed * (1.0 + table.equivalent * (density_factor(amsl) - 1.0))
-    return speed
+    return table.airspeed * (1.0 + table.equivalent * (density_factor(amsl) - 1.0))
 
 
 @compiled_inline
-def ground_speed_on(table: PerformanceTable, course: float, amsl: float) -> float:  # pragma: no cover - compiled
+def ground_speed_on(table: PerformanceTable, course: float, amsl: float) -> float:
     """Return the ground speed on a course held against the mean wind, m/s; NaN if it cannot be held."""
     wind = wind_speed_at(table, amsl)
     angle = table.wind_to - course
@@ -242,15 +239,13 @@ def ground_speed_on(table: PerformanceTable, course: float, amsl: float) -> floa
 
 
 @compiled_inline
-def downwind(table: PerformanceTable) -> tuple[float, float]:  # pragma: no cover - compiled
+def downwind(table: PerformanceTable) -> tuple[float, float]:
     """Return the east and north components of the downwind unit vector."""
     return math.sin(table.wind_to), math.cos(table.wind_to)
 
 
 @inlined
-def slopes_along(
-    table: PerformanceTable, tail_share: float, cross_share: float, amsl: float
-) -> tuple[float, float]:  # pragma: no cover - compiled
+def slopes_along(table: PerformanceTable, tail_share: float, cross_share: float, amsl: float) -> tuple[float, float]:
     """Return the steepest climb and dive over the ground, rad.
 
     tail_share, cross_share: fractions of the wind along and across the course.
@@ -276,9 +271,7 @@ def slopes_along(
 
 
 @compiled_inline
-def aircraft_slopes(
-    table: PerformanceTable, course: float, amsl: float
-) -> tuple[float, float]:  # pragma: no cover - compiled
+def aircraft_slopes(table: PerformanceTable, course: float, amsl: float) -> tuple[float, float]:
     """Return the steepest climb and dive over the ground on this course, rad; (0, 0) without progress."""
     angle = table.wind_to - course
     return slopes_along(table, math.cos(angle), math.sin(angle), amsl)
@@ -287,7 +280,7 @@ def aircraft_slopes(
 @inlined
 def _turn_radius(
     table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, side: float, wx: float, wy: float
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the arc radius between the unit courses u and v, m.
 
     w: `downwind`. side: sign of the turn, 0 for either direction.
@@ -306,14 +299,11 @@ def _turn_radius(
         if side == 0.0 or (side * (ux * wy - uy * wx) > 0.0 and side * (wx * vy - wy * vx) > 0.0):
             fastest = max(fastest, speed + wind)
     fastest += table.gust_sigma
-    radius: float = fastest * fastest / (GRAVITY * table.tan_max_bank)
-    return radius
+    return fastest * fastest / (GRAVITY * table.tan_max_bank)
 
 
 @compiled_inline
-def turn_radius_between(
-    table: PerformanceTable, course_in: float, course_out: float, amsl: float
-) -> float:  # pragma: no cover - compiled
+def turn_radius_between(table: PerformanceTable, course_in: float, course_out: float, amsl: float) -> float:
     """Return the arc radius at the bank limit between two courses; inf if one cannot be held.
 
     It is for the highest ground speed in the turn. In turbulence one standard deviation of the gusts is added: the
@@ -330,7 +320,7 @@ def turn_radius_between(
 @inlined
 def corner_tangent(
     table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, wx: float, wy: float
-) -> tuple[float, float]:  # pragma: no cover - compiled
+) -> tuple[float, float]:
     """Return the tangent length of the fly-by arc between the unit courses u and v, and its radius, m.
 
     R tan(theta/2) = R |sin| / (1 + cos); 0 without a turn, inf for a U-turn. w: `downwind`.
@@ -345,7 +335,7 @@ def corner_tangent(
 
 
 @compiled_inline
-def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> float:  # pragma: no cover - compiled
+def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> float:
     """Return the tangent of the slope along a fly-by arc.
 
     It is the altitude difference of the arc's tangent points over the arc's length.
@@ -360,7 +350,7 @@ def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> f
 
 
 @compiled_inline
-def fly_over_run(turn: float) -> float:  # pragma: no cover - compiled
+def fly_over_run(turn: float) -> float:
     """Return the distance along the leg after a fly-over turn until the track is back on it, in radii.
 
     turn: rad.
@@ -375,7 +365,7 @@ def fly_over_run(turn: float) -> float:  # pragma: no cover - compiled
 
 
 @compiled
-def turn_tangents(table: PerformanceTable, waypoints: Floats) -> Floats:  # pragma: no cover - compiled
+def turn_tangents(table: PerformanceTable, waypoints: Floats) -> Floats:
     """Return the tangent length of the fly-by arc at each waypoint, (w,) m; 0 at the ends.
 
     waypoints: (w, 3). R tan(theta/2); inf for a U-turn, which has no tangent point.
@@ -402,7 +392,7 @@ def roll_reversal_length(
     radius_out: float,
     wx: float,
     wy: float,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the leg length (m) for rolling from a turn into an opposite turn.
 
     radius_in, radius_out: radii of the two arcs, m.
@@ -416,5 +406,4 @@ def roll_reversal_length(
         return 0.0
     pull = speed * speed / GRAVITY
     roll = math.atan(pull / radius_in) + math.atan(pull / radius_out) - math.atan(table.tan_max_bank)
-    length: float = speed * ROLL_TIME * max(0.0, roll)
-    return length
+    return speed * ROLL_TIME * max(0.0, roll)

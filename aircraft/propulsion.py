@@ -274,9 +274,12 @@ class ActuatorDisc:
         first = out if self.ducted else total(out, air)
         half = number(0.5 * self.area * self.coefficient)
         pull = product(
-            f"<v> {half} </v>", factor("thrust"), "<p> motor/rho-kg_m3 </p>", first,
+            f"<v> {half} </v>",
+            factor("thrust"),
+            "<p> motor/rho-kg_m3 </p>",
+            first,
             f"<difference> {out} {air} </difference>",
-        )  # fmt: skip
+        )
         power = product(f"<v> {number(0.5 / self.efficiency)} </v>", "<p> motor/thrust-n </p>", total(out, air))
         return f"""    <property value="{number(self.volts)}"> motor/battery-v </property>
     <function name="motor/exit-mps"> {exit_speed} </function>
@@ -320,14 +323,19 @@ class ShaftPower:
         d = self.diameter
         speed = factor("motor-speed")
         shaft = product(
-            speed, speed, speed,
+            speed,
+            speed,
+            speed,
             f"<max> <v> 0 </v> {_polynomial(self.shaft, '<p> motor/throttle-norm </p>')} </max>",
-        )  # fmt: skip
+        )
         pull = product(
-            f"<v> {number(d**4)} </v>", factor("thrust"), "<p> motor/rho-kg_m3 </p>",
-            "<p> motor/turns-1_s </p>", "<p> motor/turns-1_s </p>",
+            f"<v> {number(d**4)} </v>",
+            factor("thrust"),
+            "<p> motor/rho-kg_m3 </p>",
+            "<p> motor/turns-1_s </p>",
+            "<p> motor/turns-1_s </p>",
             _polynomial(self.thrust, "<p> motor/advance </p>"),
-        )  # fmt: skip
+        )
         return f"""    <property value="{number(self.volts)}"> motor/battery-v </property>
     <function name="motor/shaft-power-w"> {shaft} </function>
     <function name="motor/flow-mps"> <max> <v> 1 </v> <p> motor/airspeed-mps </p> </max> </function>

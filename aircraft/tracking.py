@@ -8,12 +8,9 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.kernels import Record, compiled, inlined, record_dtype
-
-Floats = NDArray[np.float64]
-
 
 # Turn angles of the tables, from 0 in equal steps, rad.
 TURNS = np.radians(np.linspace(0.0, 150.0, 11))
@@ -109,18 +106,15 @@ def air_density_factor(amsl: float) -> float:
 
 
 @compiled
-def density_factor(amsl: float) -> float:  # pragma: no cover - compiled
+def density_factor(amsl: float) -> float:
     """Return the same ratio as `air_density_factor`, for compiled functions."""
     # Two terms of (1 - 2.2558e-5 h)^-2.128, accurate to 0.5 % up to 4,000 m; a library's power rounds differently on
     # different machines.
-    factor: float = 1.0 + amsl * (4.8e-5 + 1.8e-9 * amsl)
-    return factor
+    return 1.0 + amsl * (4.8e-5 + 1.8e-9 * amsl)
 
 
 @compiled
-def _interpolate(
-    table: Floats, airspeed: float, turn: float, ground_speed: float
-) -> float:  # pragma: no cover - compiled
+def _interpolate(table: Floats, airspeed: float, turn: float, ground_speed: float) -> float:
     """Interpolate bilinearly in a table (turns, speeds); use its nearest edge outside it."""
     turns, speeds = table.shape
     place = min(max(turn / _TURN_STEP_RAD, 0.0), turns - 1.0)
@@ -129,14 +123,11 @@ def _interpolate(
     v, u = place - i, other - j
     low = table[i, j] + u * (table[i, j + 1] - table[i, j])
     high = table[i + 1, j] + u * (table[i + 1, j + 1] - table[i + 1, j])
-    value: float = low + v * (high - low)
-    return value
+    return low + v * (high - low)
 
 
 @inlined
-def corner_deviation(
-    tracking: Record, turn: float, ground_speed: float
-) -> tuple[float, float, float]:  # pragma: no cover - compiled
+def corner_deviation(tracking: Record, turn: float, ground_speed: float) -> tuple[float, float, float]:
     """Return the largest distance from the legs at a corner, and the affected lengths around it, m.
 
     The first affected length is on the leg before the corner, the second on the leg after it.

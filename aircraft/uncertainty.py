@@ -12,12 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.errors import FlightError, PlanflyError
 from world.files import did_you_mean, read_small_file, read_toml, utf8_text
-
-Floats = NDArray[np.float64]
 
 # Files with uncertainties; the first that exists applies.
 FILES = ("posterior.toml", "uncertainty.toml")
@@ -36,10 +34,20 @@ _REQUIRED_KEYS = frozenset({"climb_sd_deg", "descent_sd_deg"})
 # Optional keys.
 _OPTIONAL_KEYS = frozenset({"source", "quantity", "battery_guessed", "fastest_sd_mps", "power_sd"})
 # Further keys of `posterior.toml`, about the logs.
-_LOG_KEYS = frozenset({
-    "base", "mass_kg", "seconds", "battery_current", "airspeed_factor", "airspeed_factor_sd", "dynamics", "held_fixed",
-    "log", "correlation",
-})  # fmt: skip
+_LOG_KEYS = frozenset(
+    {
+        "base",
+        "mass_kg",
+        "seconds",
+        "battery_current",
+        "airspeed_factor",
+        "airspeed_factor_sd",
+        "dynamics",
+        "held_fixed",
+        "log",
+        "correlation",
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -34,10 +33,9 @@ from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
 from planner.evaluation.problem import TURBULENCE_SHARE
+from world.arrays import Floats
 from world.errors import ScenarioError
 from world.scenario import Scenario, from_spec, load_scenario
-
-Floats = NDArray[np.float64]
 
 # Program of a real ArduPlane; without the variable, the one in the working folder.
 BINARY = Path(os.environ.get("PLANFLY_ARDUPLANE", "arduplane"))

@@ -4,15 +4,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from tests.missions import feasible
+from world.arrays import Floats
 from world.geometry import wrap
-
-Floats = NDArray[np.float64]
 
 # Shortest straight stretch of a leg that is measured, m.
 STRETCH = 100.0

@@ -26,14 +26,13 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 import planfly
 from planfly.api.optimising import Model
+from world.arrays import Floats
 from world.kernels import compiled
 
-Floats = NDArray[np.float64]
 Cost = Callable[[Floats], Floats]
 
 # Number of variables of a function.
@@ -42,12 +41,31 @@ VARIABLES = 20
 EVALUATIONS = 100_000
 # Functions of BBOB, by number.
 BBOB = {
-    1: "sphere", 2: "ellipsoid", 3: "Rastrigin", 4: "Büche-Rastrigin", 5: "linear slope", 6: "attractive sector",
-    7: "step ellipsoid", 8: "Rosenbrock", 9: "Rosenbrock, turned", 10: "ellipsoid, turned", 11: "discus",
-    12: "bent cigar", 13: "sharp ridge", 14: "different powers", 15: "Rastrigin, turned", 16: "Weierstrass",
-    17: "Schaffers F7", 18: "Schaffers F7, ill-conditioned", 19: "Griewank-Rosenbrock", 20: "Schwefel",
-    21: "Gallagher, 101 peaks", 22: "Gallagher, 21 peaks", 23: "Katsuura", 24: "Lunacek, two funnels",
-}  # fmt: skip
+    1: "sphere",
+    2: "ellipsoid",
+    3: "Rastrigin",
+    4: "Büche-Rastrigin",
+    5: "linear slope",
+    6: "attractive sector",
+    7: "step ellipsoid",
+    8: "Rosenbrock",
+    9: "Rosenbrock, turned",
+    10: "ellipsoid, turned",
+    11: "discus",
+    12: "bent cigar",
+    13: "sharp ridge",
+    14: "different powers",
+    15: "Rastrigin, turned",
+    16: "Weierstrass",
+    17: "Schaffers F7",
+    18: "Schaffers F7, ill-conditioned",
+    19: "Griewank-Rosenbrock",
+    20: "Schwefel",
+    21: "Gallagher, 101 peaks",
+    22: "Gallagher, 21 peaks",
+    23: "Katsuura",
+    24: "Lunacek, two funnels",
+}
 # Evaluations of each method on a function.
 ON_FUNCTIONS = 50_000
 # Default file of stored results.
@@ -61,10 +79,16 @@ START = (200.0, 100.0, 150.0)
 # End: east, north, m above ground.
 END = (800.0, 800.0, 150.0)
 # Cylinders: east, north, radius.
-CYLINDERS = np.array([
-    [400.0, 500.0, 80.0], [600.0, 200.0, 70.0], [500.0, 350.0, 80.0],
-    [350.0, 200.0, 70.0], [700.0, 550.0, 70.0], [650.0, 750.0, 80.0],
-])  # fmt: skip
+CYLINDERS = np.array(
+    [
+        [400.0, 500.0, 80.0],
+        [600.0, 200.0, 70.0],
+        [500.0, 350.0, 80.0],
+        [350.0, 200.0, 70.0],
+        [700.0, 550.0, 70.0],
+        [650.0, 750.0, 80.0],
+    ]
+)
 # Lowest height of a path, m above ground.
 LOW = 100.0
 # Highest height of a path, m above ground.
@@ -84,7 +108,7 @@ STEEP = 45.0
 
 
 @compiled
-def path_cost(nodes: Floats, ground: Floats, cylinders: Floats) -> float:  # pragma: no cover - compiled
+def path_cost(nodes: Floats, ground: Floats, cylinders: Floats) -> float:
     """Return the cost of a path (w, 3), in cells and m above ground: length, cylinders, heights and turns.
 
     The cost is infinite for a path through a cylinder.
@@ -117,7 +141,7 @@ def path_cost(nodes: Floats, ground: Floats, cylinders: Floats) -> float:  # pra
 
 
 @compiled
-def path_costs(paths: Floats, ground: Floats, cylinders: Floats) -> Floats:  # pragma: no cover - compiled
+def path_costs(paths: Floats, ground: Floats, cylinders: Floats) -> Floats:
     """Return the costs (n,) of paths (n, w, 3)."""
     out = np.empty(paths.shape[0])
     for k in range(out.size):
@@ -161,12 +185,16 @@ def path_boxes() -> dict[str, tuple[Callable[[Floats, Floats], Floats], Floats, 
     return {
         "distances and bearings (20)": (by_bearing, np.concatenate(low), np.concatenate(high)),
         "with climb angles (30)": (
-            by_bearing, np.concatenate([low[0], -quarter, low[1]]), np.concatenate([high[0], quarter, high[1]]),
+            by_bearing,
+            np.concatenate([low[0], -quarter, low[1]]),
+            np.concatenate([high[0], quarter, high[1]]),
         ),
         "offsets and heights (20)": (
-            by_offset, np.concatenate([-offset, np.full(NODES, LOW)]), np.concatenate([offset, np.full(NODES, HIGH)]),
+            by_offset,
+            np.concatenate([-offset, np.full(NODES, LOW)]),
+            np.concatenate([offset, np.full(NODES, HIGH)]),
         ),
-    }  # fmt: skip
+    }
 
 
 def measure_paths(terrain: Path, seeds: int) -> None:

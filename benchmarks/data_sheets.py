@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft, load_aircraft
 from aircraft.data_sheet import FUEL_HEAT, TAIL, WING, AircraftClass, DataSheet, check_sheet, size_aircraft
@@ -27,9 +26,8 @@ from flight.dynamics.trim import fastest, full_throttle, idle, straight
 from flight.simulation.simulate import Flight, fly_to_end
 from planfly.workflow.data_sheets import make_data_sheet_folder
 from tests.setups import setup_maker
+from world.arrays import Floats
 from world.errors import FlightError
-
-Floats = NDArray[np.float64]
 
 # Default number of random sheets.
 SHEETS = 20
@@ -60,9 +58,14 @@ def random_sheet(random: np.random.Generator) -> DataSheet:
         more["top"] = cruise * random.uniform(1.25, 1.6)
         more["climb"] = math.radians(random.uniform(8.0, 16.0))
     return DataSheet(
-        mass=round(mass, 2), span=round(span, 2), cruise=round(cruise, 1), stall=round(stall, 1), layout=layout,
-        fuel=round(0.15 * mass, 2) if fuelled else 0.0, **more,
-    )  # fmt: skip
+        mass=round(mass, 2),
+        span=round(span, 2),
+        cruise=round(cruise, 1),
+        stall=round(stall, 1),
+        layout=layout,
+        fuel=round(0.15 * mass, 2) if fuelled else 0.0,
+        **more,
+    )
 
 
 def sheets(count: int, seed: int) -> list[DataSheet]:
@@ -99,9 +102,13 @@ def fly_both(aircraft: Aircraft, seed: int) -> dict[str, tuple[str, float, float
     climb, descent = make(np.array([[0.0, 0.0, AMSL], [0.0, 500.0, AMSL]])).envelope.air_angles(aircraft.airspeed, AMSL)
     wind = (float(random.uniform(0.0, WIND * aircraft.airspeed)), float(random.uniform(0.0, 360.0)))
     setup = make(
-        route(aircraft, random, climb, descent), wind=wind, turbulence="light", seed=seed, speeds=aircraft.airspeed,
+        route(aircraft, random, climb, descent),
+        wind=wind,
+        turbulence="light",
+        seed=seed,
+        speeds=aircraft.airspeed,
         bank_deg=math.degrees(aircraft.max_bank),
-    )  # fmt: skip
+    )
     setup = replace(setup, battery=aircraft.battery_energy / 3600.0)
     found = {}
     for name, flown_by in (("planfly", setup.autopilot), ("arduplane", ArduPlane(ArduPilotParameters.load(aircraft)))):
@@ -190,12 +197,18 @@ def sheet_of(name: str) -> DataSheet:
     known = load_aircraft(name)
     top = fastest(Fdm(known), AMSL)
     return DataSheet(
-        mass=known.mass, span=known.wing_span, area=known.wing_area, cruise=known.airspeed,
-        stall=STALL.get(name, known.stall_speed), top=0.0 if top is None else top.airspeed, bank=known.max_bank,
-        volts=known.battery_voltage, energy=known.battery_energy if known.battery_voltage else 0.0,
+        mass=known.mass,
+        span=known.wing_span,
+        area=known.wing_area,
+        cruise=known.airspeed,
+        stall=STALL.get(name, known.stall_speed),
+        top=0.0 if top is None else top.airspeed,
+        bank=known.max_bank,
+        volts=known.battery_voltage,
+        energy=known.battery_energy if known.battery_voltage else 0.0,
         fuel=known.battery_energy / FUEL_HEAT if not known.battery_voltage else 0.0,
         layout="wing" if name in ("zagi", "x8") else "tail",
-    )  # fmt: skip
+    )
 
 
 def check_intervals(draws: int) -> int:

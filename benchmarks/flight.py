@@ -26,8 +26,7 @@ from flight.simulation import simulate as simulation
 from flight.simulation.setup import FDM_HZ, FlightSetup
 from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from tests.setups import MakeSetup, setup_maker, standard
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Time after the start that is excluded, s.
 SETTLING = 5.0

@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import planfly
 from aircraft.catalog import Aircraft, load_aircraft
@@ -46,9 +45,8 @@ from tests.instrumented_flights import (
     fly_identification,
     sensed,
 )
+from world.arrays import Floats
 from world.errors import FlightError, LogError
-
-Floats = NDArray[np.float64]
 
 # Width of the draws as a fraction of the priors.
 _PRIOR_FRACTION = 0.8
@@ -100,9 +98,11 @@ def worse_sensors(seed: int, factor: float, *, battery: bool) -> Sensors:
     usual = drawn_sensors(seed, battery=battery)
     ahead, right, down = usual.bias
     return replace(
-        usual, bias=(factor * ahead, factor * right, factor * down), level=factor * usual.level,
+        usual,
+        bias=(factor * ahead, factor * right, factor * down),
+        level=factor * usual.level,
         airspeed=1.0 + factor * (usual.airspeed - 1.0),
-    )  # fmt: skip
+    )
 
 
 def identify(
@@ -135,10 +135,13 @@ def fly_missions(folder: Path, truth: Truth, seed: int) -> tuple[list[Track], Ai
     for k, file in enumerate(sorted(MISSIONS.glob("*.waypoints"))):
         draw = np.random.default_rng([seed, 6, k])
         made = planfly.fly(
-            str(file), aircraft=str(aircraft.folder), seed=seed + k, turbulence="light",
+            str(file),
+            aircraft=str(aircraft.folder),
+            seed=seed + k,
+            turbulence="light",
             wind=(float(draw.uniform(1.0, 7.0)), float(draw.uniform(0.0, 360.0))),
             params=str(aircraft.folder / "ardupilot.parm"),
-        )  # fmt: skip
+        )
         tracks.append(made.track)
         if made.track.time[-1] < _MIN_MISSION_S:
             raise NotFlown(f"seed {seed}: {file.name} ended after {made.track.time[-1] / 60.0:.1f} min")

@@ -19,7 +19,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import load_aircraft
 from aircraft.identification.base_model import BaseModel
@@ -46,9 +45,7 @@ from planfly.identification.folder import DENSITY
 from planfly.identification.records import flight_records
 from planfly.identification.servos import read_servos
 from tests.instrumented_flights import drawn_sensors, sensed
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from world.arrays import Flags, Floats
 
 # Cruise airspeed, m/s.
 _CRUISE_MPS = 25.0
@@ -73,8 +70,11 @@ def flown_as(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
     motor = base.motor.changed(resistance=1.0 + resistance, idle=1.0 + idle)
     assert isinstance(motor, ElectricMotor)
     c = base.coefficients
-    changed = replace(base, motor=replace(motor, voltage=motor.voltage * (1.0 + voltage)),
-                      coefficients=replace(c, drag_elevator=c.drag_elevator * (1.0 + elevator)))  # fmt: skip
+    changed = replace(
+        base,
+        motor=replace(motor, voltage=motor.voltage * (1.0 + voltage)),
+        coefficients=replace(c, drag_elevator=c.drag_elevator * (1.0 + elevator)),
+    )
     every = values.copy()
     every[_IS_DRAG_PARAMETER] = unknown[:own]
     made = performance(changed, every, _CRUISE_MPS, DENSITY)
@@ -152,9 +152,10 @@ def stated(base: BaseModel, estimate: Estimate) -> dict[str, float]:
     ends = [np.percentile(values, [2.5, 97.5]) for values in (drawn.sink, drawn.power, np.degrees(drawn.climb))]
     sink, power, climb = (0.5 * float(high - low) for low, high in ends)
     return {
-        "sink_percent": 100.0 * sink / float(best.sink[0]), "power_percent": 100.0 * power / float(best.power[0]),
+        "sink_percent": 100.0 * sink / float(best.sink[0]),
+        "power_percent": 100.0 * power / float(best.power[0]),
         "climb_deg": climb,
-    }  # fmt: skip
+    }
 
 
 def one_seed(seed: int) -> dict[str, Any]:
@@ -165,9 +166,7 @@ def one_seed(seed: int) -> dict[str, Any]:
     base = scaled(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
     with tempfile.TemporaryDirectory() as place:
         tracks, changed = fly_missions(Path(place), truth, seed)
-        logs = [
-            sensed(track, changed, drawn_sensors(seed), seed + 100_000 * k) for k, track in enumerate(tracks)
-        ]  # fmt: skip
+        logs = [sensed(track, changed, drawn_sensors(seed), seed + 100_000 * k) for k, track in enumerate(tracks)]
         servos = read_servos(prior.folder / "ardupilot.toml")
         records = [record for log in logs for record in flight_records(log, prior, servos)]
     estimate = estimate_model(records, base)
@@ -179,11 +178,12 @@ def one_seed(seed: int) -> dict[str, Any]:
     nothing, nuisances = np.zeros(len(sds), np.bool_), np.arange(len(sds)) >= int(_IS_DRAG_PARAMETER.sum())
     throttle = forces.signals.throttle
     made: dict[str, Any] = {
-        "seed": seed, "minutes": sum(record.seconds for record in records) / 60.0,
+        "seed": seed,
+        "minutes": sum(record.seconds for record in records) / 60.0,
         "throttle_below": {f"{level:g}": float((throttle < level).mean()) for level in (0.2, 0.4, 0.55)},
         "prior": halves(before, slopes, nothing),
         "stated": stated(base, estimate),
-    }  # fmt: skip
+    }
     for noise in ("accelerometers", "sensors", "model"):
         known = before + information(forces, unknown, noise)
         made[f"bound: {noise}"] = halves(known, slopes, nothing)

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import planfly
 from aircraft.catalog import Aircraft, load_aircraft, read_aircraft
@@ -35,17 +34,23 @@ from tests.instrumented_flights import drawn_sensors
 from tests.instrumented_wings import MASS, TORQUE, changed_wing, fly_wing, log_of_elevons
 from world.errors import FlightError, LogError
 
-Floats = NDArray[np.float64]
-
 # Width of the draws as a fraction of the priors.
 _PRIOR_FRACTION = 0.8
 # Names of the bases.
 BASES = ("x8", "zagi", "foam")
 # Factors that all three models have.
 _DRAWN = (
-    "zero-lift-drag", "induced-drag", "thrust", "motor-speed", "lift-slope", "pitch-stiffness", "pitch-damping",
-    "elevator-power", "roll-damping", "aileron-power",
-)  # fmt: skip
+    "zero-lift-drag",
+    "induced-drag",
+    "thrust",
+    "motor-speed",
+    "lift-slope",
+    "pitch-stiffness",
+    "pitch-damping",
+    "elevator-power",
+    "roll-damping",
+    "aileron-power",
+)
 
 
 def base_aircraft(name: str, folder: Path) -> Aircraft:
@@ -99,9 +104,12 @@ def one_variant(name: str, seed: int, repeats: int) -> dict[str, Any]:
         track = fly_wing(wing, folder, seed, repeats=repeats, wind=wind)
         numbers = scaled(base_model(base), wing.mass, base.wing_span, base.wing_area)
         made: dict[str, Any] = {
-            "base": name, "seed": seed, "minutes": float(track.time[-1]) / 60.0,
-            "truth": {key: round(value, 3) for key, value in truth.items()}, "true": true,
-        }  # fmt: skip
+            "base": name,
+            "seed": seed,
+            "minutes": float(track.time[-1]) / 60.0,
+            "truth": {key: round(value, 3) for key, value in truth.items()},
+            "true": true,
+        }
         before = folder / "before"
         before.mkdir()
         text = identified_xml(base, "before", numbers, prior_means())
@@ -127,10 +135,11 @@ def one_variant(name: str, seed: int, repeats: int) -> dict[str, Any]:
             made["with_battery" if battery else "without_battery"] = _errors(flown_like(read_aircraft(own)), true) | {
                 "within": [bool(low <= one <= high) for one, (low, high) in zip(true, ends, strict=True)],
                 "half_climb_deg": float(0.5 * (ends[0][1] - ends[0][0])),
-                "inside": int((off < 1.96).sum()), "of": len(NAMES),
+                "inside": int((off < 1.96).sum()),
+                "of": len(NAMES),
                 "outside": [name for name, one in zip(NAMES, off, strict=True) if one >= 1.96],
                 "explained": {one.name: round(one.explained, 3) for one in estimate.equations},
-            }  # fmt: skip
+            }
     return made
 
 

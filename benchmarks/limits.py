@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aircraft.catalog import Aircraft, load_aircraft
 from benchmarks.flight import flown_with
@@ -18,9 +18,8 @@ from flight.simulation.setup import FlightSetup, make_limits
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import route_requirements
+from world.arrays import Floats
 from world.scenario import from_spec
-
-Floats = NDArray[np.float64]
 
 # Course of the flights, rad.
 COURSE = 0.5

@@ -15,15 +15,12 @@ import sys
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
 from benchmarks.peers import Found, as_json, found
 from benchmarks.task import Task, graded_scores, is_safe, make_task
-
-Floats = NDArray[np.float64]
 
 # Number of steps of the planner between readings of the clock; its best cost is checked after each step.
 STEPS = 20

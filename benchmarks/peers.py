@@ -13,12 +13,10 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.task import PROBLEMS, Task, all_known, best_known, is_safe, make_task, scalar, seed_vectors, smooth_axes
 from planner.search.plan_path import plan_path
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Scenarios without a path in a straight frame; their best length is not known.
 TRAPS = ("trap-u", "trap-valley", "trap-wall", "trap-spiral")
@@ -214,9 +212,13 @@ def race(seconds: float) -> dict[str, Any]:
             f"{100 * share:>9.0f}%{more + f'{without:.1f}':>19}"
         )
         record[name] = {
-            "ours_s": ours, "ompl_s": theirs, "cap_s": seconds, "ratio": other / mine, "share_in_evaluation": share,
+            "ours_s": ours,
+            "ompl_s": theirs,
+            "cap_s": seconds,
+            "ratio": other / mine,
+            "share_in_evaluation": share,
             "ratio_without_evaluation": without,
-        }  # fmt: skip
+        }
     for key, text in (("ratio", "ratio"), ("ratio_without_evaluation", "ratio without the time in our evaluation")):
         record[f"median_{key}"] = float(np.median([row[key] for row in record.values() if isinstance(row, dict)]))
         print(f"  median of the problems, {text}: {record[f'median_{key}']:.1f}")

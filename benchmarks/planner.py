@@ -12,7 +12,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.reference import brute_scores, numpy_scores, ranks_by_definition
 from benchmarks.task import PROBLEMS, Task, best_known, exact_airframe, graded_scores, make_task
@@ -22,9 +21,8 @@ from planner.evaluation.problem import ProblemArrays
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
+from world.arrays import Floats
 from world.scenario import Scenario, from_spec, load_scenario
-
-Floats = NDArray[np.float64]
 
 EQUAL = 1e-12
 LEVELS = (Level((0, 1, 2, 3), (0.0,) * 4), Level((4, 5), (NO_GOAL,) * 2), Level((6, 7), (NO_GOAL,) * 2))
@@ -83,9 +81,14 @@ def evaluation() -> dict[str, Any]:
             f"  {'to 1e-12' if all(equal) else 'NO'}"
         )
         record[name] = {
-            "ours_us": ours, "graded_us": graded, "brute_us": brute, "numpy_us": batch,
-            "numpy_over_ours": batch / ours, "paths_per_second": 1e6 / ours, "equal": all(equal),
-        }  # fmt: skip
+            "ours_us": ours,
+            "graded_us": graded,
+            "brute_us": brute,
+            "numpy_us": batch,
+            "numpy_over_ours": batch / ours,
+            "paths_per_second": 1e6 / ours,
+            "equal": all(equal),
+        }
     return record
 
 
@@ -189,11 +192,15 @@ def _searches_of(task: Task, algorithm: str, seeds: int) -> dict[str, Any]:
     nan = float("nan")
     median, worst = (float(np.median(safe)), max(safe)) if safe else (nan, nan)
     return {
-        "safe": len(safe), "length_median": median, "length_worst": worst,
-        "median_over_best": median / known, "worst_over_best": worst / known,
-        "cpu_s_median": float(np.median(seconds)), "first_safe_s_median": float(np.median(first)) if first else nan,
+        "safe": len(safe),
+        "length_median": median,
+        "length_worst": worst,
+        "median_over_best": median / known,
+        "worst_over_best": worst / known,
+        "cpu_s_median": float(np.median(seconds)),
+        "first_safe_s_median": float(np.median(first)) if first else nan,
         "evaluations_most": most,
-    }  # fmt: skip
+    }
 
 
 _FIRST = """

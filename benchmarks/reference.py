@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 
 from planner.evaluation.problem import ProblemArrays
 from planner.optimisers.preference import Level
+from world.arrays import Floats, Ints
 from world.frames import PolyMapRecord
 from world.geometry import CLOSEST
 from world.kernels import Records
 from world.terrain import EDGE
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 POINTS = 6
 

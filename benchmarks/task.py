@@ -6,7 +6,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planfly.workflow.airframe import Airframe, load_airframe
 from planner.evaluation.certify import certify
@@ -17,9 +16,8 @@ from planner.plan import Certificate
 from planner.seeding.first_samples import bridge_basis, bridge_modes
 from planner.seeding.grids import grid_routes
 from planner.seeding.waypoint_fitting import fit_waypoints
+from world.arrays import Floats
 from world.scenario import Scenario, from_spec, load_scenario
-
-Floats = NDArray[np.float64]
 
 PROBLEMS = (7, 15, 30, 60)
 # Numbers of stages of the grids that seed a peer.

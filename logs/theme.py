@@ -13,7 +13,11 @@ import re
 from dataclasses import dataclass
 
 # Wong's names of Okabe and Ito's palette.
-_SKY, _BLUE, _ORANGE, _VERMILLION, _YELLOW = "#56b4e9", "#0072b2", "#e69f00", "#d55e00", "#f0e442"
+_SKY = "#56b4e9"
+_BLUE = "#0072b2"
+_ORANGE = "#e69f00"
+_VERMILLION = "#d55e00"
+_YELLOW = "#f0e442"
 _GREEN = "#007a5a"  # bluish green, darkened for thin dashes on pale ground
 _PURPLE = "#b0408a"  # reddish purple, darkened for text
 _VIOLET = "#5e3c99"  # ColorBrewer's PuOr
@@ -56,7 +60,8 @@ _FLOWN = Look("#000000", "#f4f4f4", width=1.1)
 _FAIL = Look(_PURPLE, "#e87cc4", width=2.2, size=12.0)
 _ZONE = Look(_BROWN, "#e89090", fill=0.14, hatch="////")
 _SECOND = Look(_BLUE, "#7cc0f5", width=1.8)
-_GREY, _PALE_GREY = "#6b6b6b", "#a9adb5"
+_GREY = "#6b6b6b"
+_PALE_GREY = "#a9adb5"
 # The way, by what comes of a return from there, and by what can be reached from there without an engine.
 _SAFE = Look(_GREEN, "#2fc79a", width=4.4, halo=True)
 _WRONG = Look(_PURPLE, "#e87cc4", width=4.4, dash=(5.0, 1.0), halo=True)

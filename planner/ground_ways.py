@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 _Metres = Annotated[float, Field(ge=-500_000.0, le=500_000.0)]
 _Place = Annotated[list[_Metres], Field(min_length=3, max_length=3)]

@@ -13,20 +13,16 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from planner.ground_ways import GroundWays, GroundWaysFile, ground_ways_json
+from world.arrays import Floats, Ints
 from world.errors import MissionError
 from world.files import read_small_file
 from world.html_table import html_table
 from world.scenario import Scenario, fixed_ends, from_spec
 from world.scenario_file import first_fault
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 
 PLAN_SCHEMA = "planfly.plan/1"
 # Maximum size of a file, bytes; ten thousand waypoints with as many threats take 4 MB.

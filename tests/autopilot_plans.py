@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.simulation.track import Track
+from world.arrays import Floats
 from world.scenario import Scenario, from_spec
-
-Floats = NDArray[np.float64]
 
 SEED = 2024
 TERRAINS = ("tile", "hills", "plain")

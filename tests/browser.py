@@ -16,13 +16,25 @@ from typing import Any
 from tests.clients import need
 
 _FLAGS = (
-    "--headless=new", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-    "--hide-scrollbars", "--no-first-run", "--disable-extensions", "--disable-background-networking",
-    "--disable-component-update", "--disable-dev-shm-usage", "--mute-audio", "--remote-debugging-pipe",
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--hide-scrollbars",
+    "--no-first-run",
+    "--disable-extensions",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-dev-shm-usage",
+    "--mute-audio",
+    "--remote-debugging-pipe",
     # A browser on a machine with other work takes itself for stuck or unseen, and draws no more.
-    "--disable-gpu-watchdog", "--disable-renderer-backgrounding", "--disable-backgrounding-occluded-windows",
+    "--disable-gpu-watchdog",
+    "--disable-renderer-backgrounding",
+    "--disable-backgrounding-occluded-windows",
     "--disable-background-timer-throttling",
-)  # fmt: skip
+)
 _PATIENCE = 60.0
 # The browser reads from descriptor 3 and writes to descriptor 4.
 _START = """

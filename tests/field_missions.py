@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
+from world.arrays import Floats
 from world.frames import to_geo
 from world.scenario import Scenario, from_spec
-
-Floats = NDArray[np.float64]
 
 GROUND, AIRSPEED = 200.0, 25.0
 LEGS, RUNS, MAX_TURN, MAX_SLOPE = (6, 9), (600.0, 1600.0), math.radians(60.0), math.radians(4.0)
@@ -132,9 +130,13 @@ def _missile_beside(random: np.random.Generator, way: Floats, gap: float) -> dic
     radius = float(round(random.uniform(300.0, 800.0)))
     centre = place[:2] + outward * (radius + gap)
     return {
-        "name": "close", "east_m": float(centre[0]), "north_m": float(centre[1]), "amsl_m": float(place[2]),
-        "kill_radius_m": radius, "kill_scale_m": 0.25 * radius,
-    }  # fmt: skip
+        "name": "close",
+        "east_m": float(centre[0]),
+        "north_m": float(centre[1]),
+        "amsl_m": float(place[2]),
+        "kill_radius_m": radius,
+        "kill_scale_m": 0.25 * radius,
+    }
 
 
 def _made(name: str, way: Floats, tables: dict[str, Any], close_to: str, *, exceeded: bool) -> FieldMission:

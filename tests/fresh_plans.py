@@ -7,11 +7,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.scenario import Scenario, from_spec
-
-Floats = NDArray[np.float64]
 
 SEED = 39
 AIRCRAFT = ("aerosonde", "x8", "zagi", "ultrastick25e")

@@ -8,12 +8,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.scenario import Scenario, from_spec
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
 
 SEED = 3535
 # m.  How far the aircraft comes from, and how far the destination is before the field.

@@ -10,10 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from world.arrays import Flags, Floats
 
 SEED = 2014
 SCENARIOS = Path(__file__).parents[1] / "world" / "scenarios"

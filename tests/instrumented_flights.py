@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import savgol_filter
 
@@ -27,8 +26,8 @@ from flight.simulation.track import Track
 from logs.importers.motion import MotionLog, Samples
 from planfly.identification.manoeuvres import identification_mission
 from tests.logs.importers.written_logs import DataflashWriter
+from world.arrays import Floats
 
-Floats = NDArray[np.float64]
 HOME = (36.2578, -84.1401, 335.0)
 
 
@@ -270,12 +269,22 @@ def sensed(track: Track, aircraft: Aircraft, sensors: Sensors, seed: int) -> Mot
 
 
 PARAMETERS: Mapping[str, float] = {
-    "AIRSPEED_MIN": 18.0, "AIRSPEED_CRUISE": 25.0, "AIRSPEED_MAX": 31.0, "LOG_BITMASK": 65535.0,
-    **{f"SERVO{k}_{name}": value for k, function in ((1, 4), (2, 19), (3, 70), (4, 21))
-       for name, value in (("FUNCTION", function), ("MIN", 1000.0 if k == 3 else 1100.0),
-                           ("MAX", 2000.0 if k == 3 else 1900.0), ("TRIM", 1000.0 if k == 3 else 1500.0),
-                           ("REVERSED", 0.0))},
-}  # fmt: skip
+    "AIRSPEED_MIN": 18.0,
+    "AIRSPEED_CRUISE": 25.0,
+    "AIRSPEED_MAX": 31.0,
+    "LOG_BITMASK": 65535.0,
+    **{
+        f"SERVO{k}_{name}": value
+        for k, function in ((1, 4), (2, 19), (3, 70), (4, 21))
+        for name, value in (
+            ("FUNCTION", function),
+            ("MIN", 1000.0 if k == 3 else 1100.0),
+            ("MAX", 2000.0 if k == 3 else 1900.0),
+            ("TRIM", 1000.0 if k == 3 else 1500.0),
+            ("REVERSED", 0.0),
+        )
+    },
+}
 
 
 def _pulses(commands: Floats) -> Floats:
@@ -350,12 +359,17 @@ def write_motion(path: Path, log: MotionLog) -> Path:
 
     put(
         replace(log.inertial, values=log.inertial.values[:, [3, 4, 5, 0, 1, 2]]),
-        "IMU", "Bffffff", "I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ", (0,),
-    )  # fmt: skip
+        "IMU",
+        "Bffffff",
+        "I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ",
+        (0,),
+    )
     put(
-        replace(log.outputs, values=log.outputs.values.astype(np.int64)), "RCOU", "H" * 14,
+        replace(log.outputs, values=log.outputs.values.astype(np.int64)),
+        "RCOU",
+        "H" * 14,
         ",".join(f"C{k}" for k in range(1, 15)),
-    )  # fmt: skip
+    )
     put(replace(log.attitude, values=np.degrees(log.attitude.values)), "ATT", "fff", "Roll,Pitch,Yaw")
     put(log.velocity, "XKF1", "Bfff", "C,VN,VE,VD", (0,))
     put(log.wind, "XKF2", "Bff", "C,VWN,VWE", (0,))
@@ -381,10 +395,22 @@ def write_motion(path: Path, log: MotionLog) -> Path:
 # PX4.
 
 PX4_PARAMETERS: Mapping[str, float] = {
-    "CA_AIRFRAME": 1, "CA_ROTOR_COUNT": 1, "CA_SV_CS_COUNT": 4, "FW_AIRSPD_MIN": 18.0, "FW_AIRSPD_TRIM": 25.0,
-    "FW_AIRSPD_MAX": 31.0, "CA_SV_CS0_TYPE": 1, "CA_SV_CS0_TRQ_R": -0.5, "CA_SV_CS1_TYPE": 2, "CA_SV_CS1_TRQ_R": 0.5,
-    "CA_SV_CS2_TYPE": 3, "CA_SV_CS2_TRQ_P": 1.0, "CA_SV_CS3_TYPE": 4, "CA_SV_CS3_TRQ_Y": 1.0, "CA_SV_CS2_TRIM": -0.05,
-}  # fmt: skip
+    "CA_AIRFRAME": 1,
+    "CA_ROTOR_COUNT": 1,
+    "CA_SV_CS_COUNT": 4,
+    "FW_AIRSPD_MIN": 18.0,
+    "FW_AIRSPD_TRIM": 25.0,
+    "FW_AIRSPD_MAX": 31.0,
+    "CA_SV_CS0_TYPE": 1,
+    "CA_SV_CS0_TRQ_R": -0.5,
+    "CA_SV_CS1_TYPE": 2,
+    "CA_SV_CS1_TRQ_R": 0.5,
+    "CA_SV_CS2_TYPE": 3,
+    "CA_SV_CS2_TRQ_P": 1.0,
+    "CA_SV_CS3_TYPE": 4,
+    "CA_SV_CS3_TRQ_Y": 1.0,
+    "CA_SV_CS2_TRIM": -0.05,
+}
 
 
 def px4_topics(log: MotionLog) -> dict[str, tuple[Floats, dict[str, Floats]]]:
@@ -395,10 +421,14 @@ def px4_topics(log: MotionLog) -> dict[str, tuple[Floats, dict[str, Floats]]]:
     """
     roll, pitch, yaw = 0.5 * log.attitude.values.T
     cr, sr, cp, sp, cy, sy = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch), np.cos(yaw), np.sin(yaw)
-    turn = np.column_stack([
-        cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy,
-    ])  # fmt: skip
+    turn = np.column_stack(
+        [
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        ]
+    )
     one, two, three, four = log.outputs.values[:, :4].T
     aileron, elevator, rudder = (one - 1500.0) / 400.0, (two - 1500.0) / 400.0 + 8.4 / 30.0, (four - 1500.0) / 400.0
     unused = np.full((len(one), 8), np.nan)
@@ -410,28 +440,48 @@ def px4_topics(log: MotionLog) -> dict[str, tuple[Floats, dict[str, Floats]]]:
     place = np.column_stack([np.full(len(height.time), HOME[0]), np.full(len(height.time), HOME[1]), height.values])
     ratio = np.interp(log.airspeed.time, log.ratio.time, log.ratio.values[:, 0])[:, np.newaxis]
     made = {
-        "sensor_combined": (log.inertial.time, {
-            "gyro_rad": log.inertial.values[:, 3:], "accelerometer_m_s2": log.inertial.values[:, :3]}),
+        "sensor_combined": (
+            log.inertial.time,
+            {"gyro_rad": log.inertial.values[:, 3:], "accelerometer_m_s2": log.inertial.values[:, :3]},
+        ),
         "vehicle_attitude": (log.attitude.time, {"q": turn}),
-        "vehicle_local_position": (log.velocity.time, {
-            name: log.velocity.values[:, k] for k, name in enumerate(("vx", "vy", "vz"))}),
-        "vehicle_global_position": (height.time, {
-            name: place[:, k] for k, name in enumerate(("lat", "lon", "alt"))}),
-        "airspeed_validated": (log.airspeed.time, {
-            "calibrated_airspeed_m_s": log.airspeed.values, "true_airspeed_m_s": log.airspeed.values * ratio,
-            "selected_airspeed_index": np.ones(len(ratio))}),
-        "wind": (log.wind.time[::25], {
-            "windspeed_north": log.wind.values[::25, 0], "windspeed_east": log.wind.values[::25, 1]}),
+        "vehicle_local_position": (
+            log.velocity.time,
+            {name: log.velocity.values[:, k] for k, name in enumerate(("vx", "vy", "vz"))},
+        ),
+        "vehicle_global_position": (height.time, {name: place[:, k] for k, name in enumerate(("lat", "lon", "alt"))}),
+        "airspeed_validated": (
+            log.airspeed.time,
+            {
+                "calibrated_airspeed_m_s": log.airspeed.values,
+                "true_airspeed_m_s": log.airspeed.values * ratio,
+                "selected_airspeed_index": np.ones(len(ratio)),
+            },
+        ),
+        "wind": (
+            log.wind.time[::25],
+            {"windspeed_north": log.wind.values[::25, 0], "windspeed_east": log.wind.values[::25, 1]},
+        ),
         "actuator_servos": (log.outputs.time, {"control": servos}),
         "actuator_motors": (log.outputs.time, {"control": np.column_stack([motors, motors[:, 1:5]])}),
-        "battery_status": (log.battery.time, {
-            "voltage_v": log.battery.values[:, 0], "current_a": log.battery.values[:, 1]}),
-        "vehicle_status": (status, {
-            "vehicle_type": np.full(len(status), 2.0), "nav_state": np.full(len(status), 3.0),
-            "in_transition_mode": np.zeros(len(status)), "arming_state": np.full(len(status), 2.0)}),
-        "home_position": (status[:1], {
-            name: np.full(1, value) for name, value in zip(("lat", "lon", "alt"), HOME, strict=True)}),
-    }  # fmt: skip
+        "battery_status": (
+            log.battery.time,
+            {"voltage_v": log.battery.values[:, 0], "current_a": log.battery.values[:, 1]},
+        ),
+        "vehicle_status": (
+            status,
+            {
+                "vehicle_type": np.full(len(status), 2.0),
+                "nav_state": np.full(len(status), 3.0),
+                "in_transition_mode": np.zeros(len(status)),
+                "arming_state": np.full(len(status), 2.0),
+            },
+        ),
+        "home_position": (
+            status[:1],
+            {name: np.full(1, value) for name, value in zip(("lat", "lon", "alt"), HOME, strict=True)},
+        ),
+    }
     return {name: table for name, table in made.items() if len(table[0])}
 
 
@@ -491,9 +541,19 @@ def short_motion(seconds: float = 4.0) -> MotionLog:
 
     outputs = some(14, 25.0)
     return MotionLog(
-        source="short.BIN", sha256="", program="ArduPlane V4.6.0", vehicle="plane", inertial=some(6, 50.0),
+        source="short.BIN",
+        sha256="",
+        program="ArduPlane V4.6.0",
+        vehicle="plane",
+        inertial=some(6, 50.0),
         outputs=replace(outputs, values=draw.integers(1000, 2000, outputs.values.shape).astype(np.float64)),
-        attitude=some(3, 25.0), velocity=some(3, 25.0), wind=some(2, 25.0), airspeed=some(1, 10.0),
-        ratio=some(1, 25.0), height=some(1, 25.0), battery=some(2, 10.0), modes=((20.0, 10),),
+        attitude=some(3, 25.0),
+        velocity=some(3, 25.0),
+        wind=some(2, 25.0),
+        airspeed=some(1, 10.0),
+        ratio=some(1, 25.0),
+        height=some(1, 25.0),
+        battery=some(2, 10.0),
+        modes=((20.0, 10),),
         parameters=dict(PARAMETERS),
-    )  # fmt: skip
+    )

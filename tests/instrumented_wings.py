@@ -66,9 +66,13 @@ def fly_wing(
     file = folder / f"identify-{seed}.waypoints"
     file.write_text(waypoints_text(mission), encoding="utf-8")
     made = planfly.fly(
-        str(file), aircraft=str(aircraft.folder), seed=seed, wind=wind, turbulence="light",
+        str(file),
+        aircraft=str(aircraft.folder),
+        seed=seed,
+        wind=wind,
+        turbulence="light",
         params=str(aircraft.folder / "ardupilot.parm"),
-    )  # fmt: skip
+    )
     return made.track
 
 
@@ -83,8 +87,13 @@ def log_of_elevons(track: Track, aircraft: Aircraft, sensors: Sensors, seed: int
     pulses[:, 1] = 1500.0 + 400.0 * (-elevator + aileron) / aircraft.max_elevator
     pulses[:, 2] = 1000.0 + 1000.0 * throttle
     parameters = {
-        "SERVO1_FUNCTION": 77.0, "SERVO2_FUNCTION": 78.0, "SERVO3_FUNCTION": 70.0, "SERVO3_MIN": 1000.0,
-        "SERVO3_MAX": 2000.0, "AIRSPEED_MIN": aircraft.airspeed_min, "AIRSPEED_CRUISE": aircraft.airspeed,
+        "SERVO1_FUNCTION": 77.0,
+        "SERVO2_FUNCTION": 78.0,
+        "SERVO3_FUNCTION": 70.0,
+        "SERVO3_MIN": 1000.0,
+        "SERVO3_MAX": 2000.0,
+        "AIRSPEED_MIN": aircraft.airspeed_min,
+        "AIRSPEED_CRUISE": aircraft.airspeed,
         "AIRSPEED_MAX": aircraft.airspeed_max,
-    }  # fmt: skip
+    }
     return replace(log, outputs=replace(log.outputs, values=np.round(pulses)), parameters=parameters)

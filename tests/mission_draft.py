@@ -4,11 +4,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Turns (rad) and legs (m) that are drawn, and the shortest leg that is to break a slope limit.
 TURNS = (math.radians(10.0), math.radians(90.0))

@@ -11,7 +11,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft, load_aircraft
 from aircraft.envelope import Envelope
@@ -23,10 +22,9 @@ from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
 from tests.mission_draft import Draft, draw_heights, draw_runs, draw_turns
 from tests.setups import spec_around, waypoint_mission
+from world.arrays import Floats
 from world.scenario import Scenario, from_spec
 from world.wind import Wind
-
-Floats = NDArray[np.float64]
 
 SEED = 2014
 # What an infeasible mission breaks: the steepest climb or dive of aircraft or scenario, the turn that its legs leave

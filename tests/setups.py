@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aircraft.catalog import Aircraft
 from aircraft.envelope import Envelope
@@ -17,10 +17,10 @@ from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup, make_limits
+from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
 from world.scenario import Scenario, from_spec
 
-Floats = NDArray[np.float64]
 MakeSetup = Callable[..., FlightSetup]
 
 

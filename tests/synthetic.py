@@ -11,17 +11,16 @@ from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, Envelope
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from tests.setups import route_along, setup_along, spec_around
+from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs, signed_turns
 from world.scenario import Scenario, from_spec
 from world.terrain import Terrain
 
-Floats = NDArray[np.float64]
 Profile = Callable[[Floats], Any]
 
 CALM_CLIMB, CALM_DESCENT = 13.7, 7.8  # degrees at 25 m/s

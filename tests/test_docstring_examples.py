@@ -18,9 +18,16 @@ MODULES = sorted(
 )
 # Each makes whole runs, many returns, or pages with pictures; other tests of these modules do, too.
 LONG = {
-    "planfly.api.running", "planfly.api.reporting", "planfly.api.flying", "planfly.api.returning", "planfly.api.fronts",
-    "planfly.workflow.pipeline", "planner.search.plan_front", "logs.views.report.page", "logs.views.report.compare",
-}  # fmt: skip
+    "planfly.api.running",
+    "planfly.api.reporting",
+    "planfly.api.flying",
+    "planfly.api.returning",
+    "planfly.api.fronts",
+    "planfly.workflow.pipeline",
+    "planner.search.plan_front",
+    "logs.views.report.page",
+    "logs.views.report.compare",
+}
 
 
 @pytest.mark.parametrize("module", [name for name in MODULES if SOAK or name not in LONG])

@@ -8,8 +8,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.errors import ScenarioError
 from world.frames import GeoOrigin
 from world.map_positions import check_above_ground, check_in_area, map_place, map_position
@@ -23,8 +23,6 @@ from world.scenario_tables import (
 )
 from world.terrain import Terrain
 from world.wind import Wind
-
-Floats = NDArray[np.float64]
 
 # Default launch length, m: the rail of a small catapult, the swing of an arm with two steps, a runway.  A catapult of
 # 6 m at 12 degrees launched the Aerosonde without loss of height.

@@ -73,8 +73,7 @@ def _layout(value: Any) -> _Layout:
     if "_layout" not in kept:
         held = _by_value(typeof_impl.dispatch(tuple)(value, None))
         kept["_layout"] = _Layout(Reference(held), _in_memory(held, value))
-    layout: _Layout = kept["_layout"]
-    return layout
+    return kept["_layout"]
 
 
 def _address(value: Any) -> int:

@@ -11,15 +11,15 @@ from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from world.arrays import Floats
 from world.kernels import compiled, inlined
 from world.least_squares import least_squares
 
 if TYPE_CHECKING:
     from pyproj import Proj, Transformer
 
-Floats = NDArray[np.float64]
 
 # Number of terms along each axis of the largest polynomial of a `PolyMap`, of degree 9.
 MAX_TERMS = 10
@@ -255,7 +255,7 @@ def fit_polymap(
 
 
 @inlined
-def polymap(record: PolyMapRecord, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
+def polymap(record: PolyMapRecord, x: float, y: float) -> tuple[float, float]:
     """Evaluate both components of the record of a `PolyMap` at one point, by Horner's scheme."""
     a = (x - record.centre_x) / record.half_x
     b = (y - record.centre_y) / record.half_y
@@ -273,7 +273,7 @@ def polymap(record: PolyMapRecord, x: float, y: float) -> tuple[float, float]:  
 
 
 @compiled
-def _polymap_many(record: PolyMapRecord, x: Floats, y: Floats) -> Floats:  # pragma: no cover - compiled
+def _polymap_many(record: PolyMapRecord, x: Floats, y: Floats) -> Floats:
     out = np.empty((2, x.size))
     for k in range(x.size):
         out[0, k], out[1, k] = polymap(record, x[k], y[k])

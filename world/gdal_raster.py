@@ -15,18 +15,10 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.errors import TerrainError
 from world.frames import crs_transformer, height_unit, is_geographic, transform_points, wkt_of
-from world.raster_file import (
-    Floats,
-    Grid,
-    RasterFile,
-    file_sha256,
-    longitude_near,
-    one_line,
-    outline,
-    refuse_few_pixels,
-)
+from world.raster_file import Grid, RasterFile, file_sha256, longitude_near, one_line, outline, refuse_few_pixels
 
 # Options of GDAL: read the one file, and nothing that lies beside it or is named in it.
 GUARD: dict[str, Any] = {
@@ -249,9 +241,17 @@ def geotiff_bytes(heights: NDArray[np.float32], grid: Grid, crs: str, nodata: fl
 
     rows, cols = heights.shape
     profile: dict[str, Any] = {
-        "driver": "GTiff", "height": rows, "width": cols, "count": 1, "dtype": "float32", "crs": crs,
-        "transform": rasterio.Affine(*grid), "nodata": nodata, "compress": "deflate", "predictor": 3,
-    }  # fmt: skip
+        "driver": "GTiff",
+        "height": rows,
+        "width": cols,
+        "count": 1,
+        "dtype": "float32",
+        "crs": crs,
+        "transform": rasterio.Affine(*grid),
+        "nodata": nodata,
+        "compress": "deflate",
+        "predictor": 3,
+    }
     with rasterio.Env(**GUARD), MemoryFile() as memory:
         with memory.open(**profile) as file:
             file.write(heights, 1)

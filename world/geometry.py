@@ -7,11 +7,10 @@ a flown track call the same code.
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from world.arrays import Floats
 from world.kernels import compiled_inline, inlined
-
-Floats = NDArray[np.float64]
 
 # Lower limit of the distance in the exposure, which grows as 1/d^4, m.
 CLOSEST = 1.0
@@ -110,15 +109,13 @@ def fly_by_offset(turn: float, radius: float) -> float:
 
 
 @compiled_inline
-def wrap(angle: float) -> float:  # pragma: no cover - compiled
+def wrap(angle: float) -> float:
     """Wrap an angle to [-pi, pi), rad."""
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
 
 
 @inlined
-def turning_angle(
-    ax: float, ay: float, bx: float, by: float, cx: float, cy: float
-) -> float:  # pragma: no cover - compiled
+def turning_angle(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
     """Return the course change at b on the path a, b, c: rad in [0, pi] (paper eq. 1, by atan2)."""
     ux, uy, vx, vy = bx - ax, by - ay, cx - bx, cy - by
     # + 0.0 for a leg without length: see `signed_turns`.
@@ -126,9 +123,7 @@ def turning_angle(
 
 
 @inlined
-def sphere_window(
-    a: Floats, b: Floats, centre: Floats, radius: float
-) -> tuple[float, float, float]:  # pragma: no cover - compiled
+def sphere_window(a: Floats, b: Floats, centre: Floats, radius: float) -> tuple[float, float, float]:
     """Intersect the segment a-b with a sphere: closest distance to its centre (m), fractions of entry and exit.
 
     a, b, centre: (3,).  Both fractions are in [0, 1], and 0 if the segment stays outside.  A point on the surface is
@@ -156,9 +151,7 @@ def sphere_window(
 
 
 @inlined
-def segment_exposure(
-    a: Floats, b: Floats, centre: Floats, radius: float, scale: float
-) -> tuple[float, float]:  # pragma: no cover - compiled
+def segment_exposure(a: Floats, b: Floats, centre: Floats, radius: float, scale: float) -> tuple[float, float]:
     """Return the fraction of the segment a-b inside a sphere, and the mean over the segment of (scale/d)^4 inside it.
 
     Exact: with perpendicular distance h (at least `CLOSEST`) and path coordinate s from the closest point, the integral
@@ -181,9 +174,7 @@ def segment_exposure(
 
 
 @inlined
-def window_exposure(
-    enter: float, leave: float, length2: float, along: float, start2: float, scale: float
-) -> float:  # pragma: no cover - compiled
+def window_exposure(enter: float, leave: float, length2: float, along: float, start2: float, scale: float) -> float:
     """Return the mean over a segment of (scale/d)^4 between two fractions of it: the integral of `segment_exposure`.
 
     length2: squared length.  along: step times (start - centre).  start2: squared distance of the start.

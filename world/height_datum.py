@@ -11,9 +11,9 @@ from functools import cache
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from world.arrays import Floats
+
 # Datum as the user states it: its name, or the height of mean sea level in the file, m.
 NamedDatum = Literal["ellipsoid", "egm96", "egm2008"]
 StatedDatum = str | float

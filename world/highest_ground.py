@@ -7,13 +7,11 @@ on the square's sides.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats, Heights
 from world.frames import PolyMapRecord, polymap
 from world.kernels import compiled, inner
-from world.terrain import Heights, Terrain, segment_clearance
-
-Floats = NDArray[np.float64]
+from world.terrain import Terrain, segment_clearance
 
 
 def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, rows: int, columns: int) -> Floats:
@@ -35,9 +33,7 @@ def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, r
 
 
 @compiled
-def _fill_cells(
-    heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float, out: Floats
-) -> None:  # pragma: no cover - compiled
+def _fill_cells(heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float, out: Floats) -> None:
     rows, columns = out.shape
     a, b = np.zeros(3), np.zeros(3)
     for i in range(rows + 1):
@@ -60,16 +56,14 @@ def _fill_cells(
 
 
 @inner
-def _raise(out: Floats, i: int, j: int, height: float) -> None:  # pragma: no cover - compiled
+def _raise(out: Floats, i: int, j: int, height: float) -> None:
     """Raise a cell to a height if it is lower; a cell outside the array is ignored, and NaN stays."""
     if 0 <= i < out.shape[0] and 0 <= j < out.shape[1] and (height > out[i, j] or math.isnan(height)):
         out[i, j] = height
 
 
 @inner
-def _highest_pixel(
-    heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float
-) -> float:  # pragma: no cover - compiled
+def _highest_pixel(heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float) -> float:
     """Return the highest pixel in a cell that is straight in pixels, -inf without a pixel.
 
     NaN if one has no data.

@@ -160,7 +160,7 @@ def _type_of_inner_kernel(kernel: _InnerKernel, _: Any) -> _InnerType:
 
 
 @inlined
-def copy_into(out: NDArray[Any], values: NDArray[Any]) -> None:  # pragma: no cover - compiled
+def copy_into(out: NDArray[Any], values: NDArray[Any]) -> None:
     """Copy numbers (n,) into an array, or part of one, of the same length, which is not checked.
 
     Numba's ``out[:] = values`` checks the length, and compiles its error message with Unicode handling into each
@@ -176,7 +176,7 @@ def copy_into(out: NDArray[Any], values: NDArray[Any]) -> None:  # pragma: no co
 
 
 @inner
-def sort_few(values: NDArray[Any]) -> None:  # pragma: no cover - compiled
+def sort_few(values: NDArray[Any]) -> None:
     """Sort a few numbers (n,) in place by insertion, which compiles a second faster than numba's own sort.
 
     >>> some = np.array([3.0, 1.0, 2.0])

@@ -5,11 +5,9 @@ them the track that starts from it.  Least-squares problems behind a plan or a f
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.kernels import compiled, inner
-
-Floats = NDArray[np.float64]
 
 # A column is dependent if its squared orthogonal remainder is below this fraction of the longest squared column.  The
 # finite differences of a trim leave up to 1e-8 of its length in the column of a surface that an aircraft does not have.
@@ -25,12 +23,11 @@ def least_squares(basis: Floats, values: Floats) -> Floats:
     >>> least_squares(np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]]), np.array([1.0, 3.0, 5.0])).round(9).tolist()
     [1.0, 2.0]
     """
-    solution: Floats = _least_squares(np.ascontiguousarray(basis), np.ascontiguousarray(values))
-    return solution
+    return _least_squares(np.ascontiguousarray(basis), np.ascontiguousarray(values))
 
 
 @compiled
-def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover - compiled
+def _least_squares(basis: Floats, values: Floats) -> Floats:
     count, size = basis.shape
     # Orthogonalise the columns and the values together.
     q, r = np.empty((count, size + 1)), np.zeros((size, size + 1))
@@ -62,7 +59,7 @@ def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover
 
 
 @inner
-def _dot(columns: Floats, one: int, other: int) -> float:  # pragma: no cover - compiled
+def _dot(columns: Floats, one: int, other: int) -> float:
     """Return the dot product of two columns."""
     total = 0.0
     for n in range(columns.shape[0]):

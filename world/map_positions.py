@@ -3,15 +3,13 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.errors import ScenarioError
 from world.frames import GeoOrigin, to_map
 from world.scenario_tables import PointTable, PositionTable, ThreatTable
 from world.terrain import Terrain
 from world.threats import Threats, threat_label
-
-Floats = NDArray[np.float64]
 
 
 def map_place(table: PositionTable, origin: GeoOrigin) -> tuple[float, float]:

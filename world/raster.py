@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from world.address_space import AddressSpaceError
+from world.arrays import Floats
 from world.elevation_formats import EMBEDDED, FORMATS, SUFFIXES
 from world.elevation_tiles import joined, tile_files
 from world.errors import TerrainError
@@ -25,7 +26,6 @@ from world.frames import GeoOrigin, fit_polymap, to_geo, to_map
 from world.gdal_raster import PIXELS_AT_ONCE, open_geotiff, open_hgt
 from world.height_datum import HeightDatum, StatedDatum, height_datum
 from world.raster_file import (
-    Floats,
     RasterFile,
     ToSource,
     file_sha256,
@@ -88,7 +88,9 @@ def grid_in_degrees(
 
 # Rows of the tile that we ship (matplotlib does, too), and what it states as xmin, xmax, ymin and ymax, deg; a copy of
 # it under another name is known by them, to a hundredth of a pixel.
-_TILE_ROWS, _TILE_EDGES, _SAME_EDGE = 344, (-84.41375, -84.07791667, 36.73291667, 36.44625), 1e-5
+_TILE_ROWS = 344
+_TILE_EDGES = (-84.41375, -84.07791667, 36.73291667, 36.44625)
+_SAME_EDGE = 1e-5
 
 
 def open_npz(file: Path, name: str) -> RasterFile:

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.errors import TerrainError
 from world.frames import GeoOrigin
 from world.height_datum import UNSTATED, HeightDatum
 
-Floats = NDArray[np.float64]
 ToSource = Callable[[Floats, Floats], tuple[Floats, Floats]]
 # Affine coefficients (a, b, c, d, e, f) from columns and rows: x = a col + b row + c, y = d col + e row + f.
 Grid = tuple[float, ...]

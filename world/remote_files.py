@@ -25,7 +25,9 @@ from world.errors import TerrainError
 from world.files import write_whole
 
 # s without an answer; tries of a request, and the pause before the second, which doubles.
-_PATIENCE, _TRIES, _PAUSE = 30.0, 3, 0.5
+_PATIENCE = 30.0
+_TRIES = 3
+_PAUSE = 0.5
 # Bytes that are written at a time.
 _AT_ONCE = 2**18
 # A file is refused beyond this, bytes: a tile of GLO-30 has some 40 MB.
@@ -155,8 +157,7 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
 
 def _open(url: str, headers: dict[str, str], method: str = "GET") -> http.client.HTTPResponse:
     request = urllib.request.Request(url, headers={"User-Agent": "planfly"} | headers, method=method)
-    answer: http.client.HTTPResponse = _opener().open(request, timeout=_PATIENCE)
-    return answer
+    return _opener().open(request, timeout=_PATIENCE)
 
 
 @cache
@@ -164,10 +165,14 @@ def _opener() -> urllib.request.OpenerDirector:
     """What speaks http and https, wherever it is led, and nothing else."""
     opener = urllib.request.OpenerDirector()
     for handler in (
-        urllib.request.ProxyHandler, urllib.request.UnknownHandler, urllib.request.HTTPHandler,
-        urllib.request.HTTPSHandler, urllib.request.HTTPRedirectHandler, urllib.request.HTTPDefaultErrorHandler,
+        urllib.request.ProxyHandler,
+        urllib.request.UnknownHandler,
+        urllib.request.HTTPHandler,
+        urllib.request.HTTPSHandler,
+        urllib.request.HTTPRedirectHandler,
+        urllib.request.HTTPDefaultErrorHandler,
         urllib.request.HTTPErrorProcessor,
-    ):  # fmt: skip
+    ):
         opener.add_handler(handler())
     return opener
 

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from world.airfield import AskedReturns, LandingStrip, Launch, make_home, make_landing, make_launch, make_returns
 from world.airspace.zone_files import FileZones, read_zone_files
 from world.airspace.zone_times import is_active, parse_span
 from world.airspace.zones import Zone
 from world.airspace.zones_on_map import FAR, check_ends, make_zones, near_zones
+from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import ScenarioError, TerrainError
 from world.files import did_you_mean, whole_path
@@ -42,8 +42,6 @@ from world.scenario_tables import (
 from world.terrain import Peak, Terrain, flat_terrain, peaks_terrain
 from world.threats import Threats
 from world.wind import Wind
-
-Floats = NDArray[np.float64]
 
 # ----------------------------------------------------------------------
 # The scenario itself, from an embedded name, a file, a plan or a log.

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import cover_text, is_covered, read_terrain, tile_bounds
 from world.raster_file import RasterFile
-
-Floats = NDArray[np.float64]
 
 # Width of terrain on either side of the straight line, for detours, as a fraction of the line's length.
 _MARGIN_FRACTION = 0.3

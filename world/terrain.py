@@ -10,13 +10,11 @@ from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from world.arrays import Floats, Heights
 from world.frames import PolyMap, PolyMapRecord, fit_polymap, polymap
 from world.kernels import compiled, inlined
-
-Floats = NDArray[np.float64]
-Heights = NDArray[np.float32]
 
 # Longest piece of a segment that is treated as straight in the raster's grid, m: at 60 degrees latitude a 500 m piece
 # bows by 9 mm.
@@ -80,7 +78,7 @@ def _locked(heights: Heights, *others: Any) -> Terrain:
 
 
 @inlined
-def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: no cover - compiled
+def pixel_height(heights: Heights, col: float, row: float) -> float:
     """Return the bilinear height at fractional pixel coordinates.
 
     NaN over `EDGE` beyond the outer pixel centres.
@@ -96,12 +94,11 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: 
     above, below, left, right = np.uintp(i), np.uintp(i + 1), np.uintp(j), np.uintp(j + 1)
     top = heights[above, left] * (1.0 - u) + heights[above, right] * u
     low = heights[below, left] * (1.0 - u) + heights[below, right] * u
-    height: float = top * (1.0 - v) + low * v
-    return height
+    return top * (1.0 - v) + low * v
 
 
 @compiled
-def steepest_slopes(heights: Heights, pitch: float) -> Heights:  # pragma: no cover - compiled
+def steepest_slopes(heights: Heights, pitch: float) -> Heights:
     """Return the steepest possible slope of the bilinear ground in each tile of `TILE` x `TILE` cells, m per m.
 
     From the steps between pixels and their pitch (m).  NaN is ignored.
@@ -124,9 +121,7 @@ def steepest_slopes(heights: Heights, pitch: float) -> Heights:  # pragma: no co
 
 
 @inlined
-def ground_height(
-    heights: Heights, to_pixel: PolyMapRecord, east: float, north: float
-) -> float:  # pragma: no cover - compiled
+def ground_height(heights: Heights, to_pixel: PolyMapRecord, east: float, north: float) -> float:
     """Return the ground height at one map position; NaN outside the raster."""
     col, row = polymap(to_pixel, east, north)
     return pixel_height(heights, col, row)
@@ -141,9 +136,7 @@ def _heights_many(heights: Heights, to_pixel: PolyMapRecord, east: Floats, north
 
 
 @compiled
-def segment_clearance(
-    heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats
-) -> tuple[float, float]:  # pragma: no cover - compiled
+def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats) -> tuple[float, float]:
     """Return the smallest height above the bilinear ground on a-b and its fraction.
 
     (NaN, fraction) off the raster.
@@ -169,7 +162,7 @@ def segment_clearance(
 
 
 @inlined
-def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no cover - compiled
+def _next_crossing(start: float, step: float, t: float) -> float:
     """Return the next fraction after t at which start + t * step is a whole number; inf if it never is."""
     if step == 0.0:
         return math.inf
@@ -181,7 +174,7 @@ def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no 
 @inlined
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
-) -> tuple[float, float]:  # pragma: no cover - compiled
+) -> tuple[float, float]:
     """Return the smallest height above ground on a piece straight in pixels, and its fraction.
 
     Off the data it returns (NaN, fraction).

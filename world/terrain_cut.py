@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from world.arrays import Heights
 from world.errors import TerrainError
 from world.files import write_whole
 from world.gdal_raster import block_spans, geotiff_bytes, open_geotiff
@@ -22,7 +23,6 @@ from world.raster import MAX_PIXELS, open_raster
 from world.raster_file import RasterFile, is_ground, moved_grid
 from world.remote_files import RemoteFile, find_remote
 
-Heights = NDArray[np.float32]
 Floats = NDArray[Any]
 
 COPERNICUS = "https://copernicus-dem-30m.s3.amazonaws.com"
@@ -245,7 +245,8 @@ def _touched(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
 
 
 # Degrees by which a tile may lie off its own; pixels that are none.
-_OFF, _HAIR = 0.02, 1e-3
+_OFF = 0.02
+_HAIR = 1e-3
 
 
 class _Placed(NamedTuple):

@@ -5,28 +5,23 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.kernels import compiled, compiled_inline
 
-Floats = NDArray[np.float64]
 Turbulence = Literal["none", "light", "moderate"]
 # Wind speed at 6 m (20 ft) of MIL-F-8785C's low-altitude model, m/s.
 W20 = {"none": 0.0, "light": 7.7, "moderate": 15.4}
 
 
 @compiled_inline
-def mean_wind_speed(
-    speed: float, gradient: float, reference_amsl: float, amsl: float
-) -> float:  # pragma: no cover - compiled
+def mean_wind_speed(speed: float, gradient: float, reference_amsl: float, amsl: float) -> float:
     """Return the mean wind speed (m/s) at an altitude (m): linear from the reference altitude, and never below 0."""
     return max(0.0, speed + gradient * (amsl - reference_amsl))
 
 
 @compiled
-def _mean_wind_speeds(
-    speed: float, gradient: float, reference_amsl: float, amsl: Floats
-) -> Floats:  # pragma: no cover - compiled
+def _mean_wind_speeds(speed: float, gradient: float, reference_amsl: float, amsl: Floats) -> Floats:
     out = np.empty(amsl.size)
     for k in range(amsl.size):
         out[k] = mean_wind_speed(speed, gradient, reference_amsl, amsl[k])

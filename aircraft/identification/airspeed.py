@@ -8,14 +8,12 @@ of the difference from one second to the next is used.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.flight_record import low_pass
 from aircraft.identification.flow import Flow
 from aircraft.identification.regression import fit_with_prior
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Standard deviation of an uncalibrated sensor's factor.
 SCALE_SD = 0.02

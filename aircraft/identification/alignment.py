@@ -10,12 +10,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord, derivative, lagged, low_pass, shifted
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from world.arrays import Floats, Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,9 +110,19 @@ class Signals:
 
 # Fields of `Signals` with one row per sample.
 _SAMPLED_FIELDS = (
-    "acceleration", "rates", "rate_changes", "attitude", "velocity", "wind", "airspeed", "density", "surfaces",
-    "throttle", "current", "voltage",
-)  # fmt: skip
+    "acceleration",
+    "rates",
+    "rate_changes",
+    "attitude",
+    "velocity",
+    "wind",
+    "airspeed",
+    "density",
+    "surfaces",
+    "throttle",
+    "current",
+    "voltage",
+)
 # Length of flight through the air within which residuals may be autocorrelated, m: gusts have lengths, and a slower
 # aircraft stays longer in each.
 BLOCK_METRES = 500.0

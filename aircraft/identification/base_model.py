@@ -2,12 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from aircraft.identification.motor import Motor
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

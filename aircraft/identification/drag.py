@@ -9,15 +9,13 @@ for them, and without them would fly with another thrust than the measured one.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.flow import Flow, lift_curve, other_lift, pressure_of, voltage_of
 from aircraft.identification.parameters import PARAMETERS, prior_means, prior_sds
 from aircraft.identification.regression import Fit, fit_with_prior
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Cutoff below which forces are compared, Hz.
 FORCE_BAND = 1.0

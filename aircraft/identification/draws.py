@@ -1,12 +1,10 @@
 """Draw whole aircraft from an estimate, with the correlations of their parameters."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import PARAMETERS
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Number of draws.
 COUNT = 512

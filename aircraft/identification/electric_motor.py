@@ -7,9 +7,8 @@ equals the propeller's torque q2 w^2 + q1 w + q0. A motor that does not brake wi
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +52,12 @@ class ElectricMotor:
         """Return a motor wound for another voltage, with the same torque and power at the same speed."""
         ratio = volts / self.voltage
         return replace(
-            self, voltage=volts, back_voltage=self.back_voltage * ratio, resistance=self.resistance * ratio * ratio,
+            self,
+            voltage=volts,
+            back_voltage=self.back_voltage * ratio,
+            resistance=self.resistance * ratio * ratio,
             idle_current=self.idle_current / ratio,
-        )  # fmt: skip
+        )
 
     def speed(self, airspeed: Floats, throttle: Floats, density: Floats, voltage: Floats | float) -> Floats:
         """Return the propeller speed (n,), rad/s.

@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.identification.airspeed import SCALE_SD, with_airspeed_scale
 from aircraft.identification.alignment import Clocks, Signals, align, find_clocks, invert_first_order_lag
@@ -27,8 +26,7 @@ from aircraft.identification.lift import fit_lift
 from aircraft.identification.moments import AXES, MOMENT_THINNING, fit_moments
 from aircraft.identification.parameters import PARAMETERS, Group, prior_means, prior_sds
 from aircraft.identification.regression import Fit, correlation_samples
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Length of a log's part that is used to align its clocks, s.
 ALIGNED_SECONDS = 200.0

@@ -4,13 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.flow import VANE_BAND
+from world.arrays import Floats
 
-Floats = NDArray[np.float64]
 # Signals and model after a change.
 Changed = tuple[Signals, BaseModel]
 

@@ -4,10 +4,8 @@ from dataclasses import dataclass, fields, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from world.arrays import Floats
 
 # Samples per second of the grid.
 GRID_HZ = 50.0

@@ -7,14 +7,12 @@ Attitude and velocity give the angle of attack in air without vertical motion, w
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.motor import Motor
 from aircraft.identification.parameters import INDEX
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Cutoff of the vane, Hz.
 VANE_BAND = 8.0

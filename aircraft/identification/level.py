@@ -3,11 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.identification.alignment import Signals
 
-Floats = NDArray[np.float64]
 # Standard gravity, m/s^2.
 GRAVITY = 9.80665
 

@@ -5,15 +5,13 @@ attitude and velocity does. Therefore lift is the regressor without errors, and 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.flow import attitude_alpha
 from aircraft.identification.parameters import prior_sds
 from aircraft.identification.regression import Fit, fit_with_prior
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Cutoff below which lift and angle of attack are compared, Hz.
 LIFT_BAND = 0.15

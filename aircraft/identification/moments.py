@@ -5,7 +5,6 @@ moments relative to the moments of inertia are observable.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
@@ -13,8 +12,8 @@ from aircraft.identification.flow import pressure_of
 from aircraft.identification.motor import Motor
 from aircraft.identification.parameters import PARAMETERS, Group
 from aircraft.identification.regression import Fit, fit_with_prior
+from world.arrays import Floats
 
-Floats = NDArray[np.float64]
 # Axes in the order in which they are fitted.
 AXES: tuple[Group, ...] = ("pitch", "roll", "yaw")
 
@@ -85,13 +84,25 @@ def _terms(signals: Signals, base: BaseModel) -> dict[Group, list[Floats]]:
     one = np.ones(len(alpha))
     return {
         "pitch": [
-            c.pitch_zero * one, one, c.pitch_alpha * alpha, c.pitch_rate * pitch, c.pitch_elevator * elevator,
+            c.pitch_zero * one,
+            one,
+            c.pitch_alpha * alpha,
+            c.pitch_rate * pitch,
+            c.pitch_elevator * elevator,
         ],
         "roll": [
-            c.roll_rudder * rudder, c.roll_beta * beta, c.roll_roll * roll, c.roll_yaw * yaw, c.roll_aileron * aileron,
+            c.roll_rudder * rudder,
+            c.roll_beta * beta,
+            c.roll_roll * roll,
+            c.roll_yaw * yaw,
+            c.roll_aileron * aileron,
         ],
         "yaw": [
-            0.0 * one, c.yaw_beta * beta, c.yaw_roll * roll, c.yaw_yaw * yaw, c.yaw_aileron * aileron,
+            0.0 * one,
+            c.yaw_beta * beta,
+            c.yaw_roll * roll,
+            c.yaw_yaw * yaw,
+            c.yaw_aileron * aileron,
             c.yaw_rudder * rudder,
         ],
-    }  # fmt: skip
+    }

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from world.arrays import Floats
+
 # Equations in which parameters are estimated.
 Group = Literal["lift", "drag", "pitch", "roll", "yaw"]
 

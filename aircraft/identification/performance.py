@@ -7,12 +7,11 @@ reference (`flight.dynamics.trim`), and tests compare the two.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.parameters import INDEX
+from world.arrays import Floats
 
-Floats = NDArray[np.float64]
 # Standard gravity, m/s^2.
 GRAVITY = 9.80665
 

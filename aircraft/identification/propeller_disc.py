@@ -7,9 +7,8 @@ disc. Published models of flying wings have this form.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)

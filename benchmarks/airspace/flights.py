@@ -11,7 +11,6 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.airspace.scenarios import airspace_scenario, ring_distance
 from flight.mission.from_plan import plan_mission
@@ -19,10 +18,9 @@ from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
+from world.arrays import Floats
 from world.scenario import Scenario
 from world.scenario_tables import ZoneTable
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

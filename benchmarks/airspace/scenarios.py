@@ -8,13 +8,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planfly.workflow.airframe import load_airframe
+from world.arrays import Flags, Floats
 from world.scenario import Scenario, from_spec
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # Seed of all scenarios.
 SEED = 2026

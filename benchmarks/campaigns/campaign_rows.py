@@ -42,9 +42,11 @@ def mission_13_km(folder: Path) -> CampaignBase:
     wind = load_scenario("jacksboro-air").wind
 
     options: MissionOptions = {
-        "terrain": "jacksboro", "seed": 1, "wind": (wind.speed, math.degrees(wind.from_course)),
+        "terrain": "jacksboro",
+        "seed": 1,
+        "wind": (wind.speed, math.degrees(wind.from_course)),
         "turbulence": wind.turbulence,
-    }  # fmt: skip
+    }
     return open_campaign(str(path), default_dispersions(), options)
 
 

@@ -91,8 +91,12 @@ def measure(seeds: int) -> dict[str, Any]:
             safe = over[np.isfinite(over)]
             median, worst = (float(np.median(safe)), float(safe.max())) if safe.size else (np.nan, np.nan)
             record[f"{name}, {group}"] = {
-                "safe": int(safe.size), "of": int(over.size), "median": median, "worst": worst, "cpu_s": spent
-            }  # fmt: skip
+                "safe": int(safe.size),
+                "of": int(over.size),
+                "median": median,
+                "worst": worst,
+                "cpu_s": spent,
+            }
             line += f"{safe.size:>4}/{over.size:<3}{median:>8.4f}{worst:>8.4f}{spent:>6.2f}"
         print(line, flush=True)
     return record

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.planning.reference_search import reference_search
 from benchmarks.planning.wild_instances import wild_scenario
@@ -27,10 +26,9 @@ from planner.plan import Objective
 from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
 from tests.instances import SEED, Instance, draw_threats, random_scenario, scenario_text
+from world.arrays import Floats
 from world.scenario import from_spec
 from world.scenario_file import parse_scenario
-
-Floats = NDArray[np.float64]
 
 # Default file of the stored references.
 KEPT = Path("runs") / "fresh-instances.json"
@@ -109,11 +107,18 @@ def measure(tasks: Sequence[Task], reference: Floats, algorithms: Sequence[str],
         over = found / best[:, None]
         safe, solved = over[np.isfinite(over)], np.isfinite(over[by_reference])
         entry = record[name] = {
-            "solved": int(solved.sum()), "of": int(solved.size), "more": int(safe.size - solved.sum()),
-            "median": float(np.median(safe)), "p90": float(np.quantile(safe, 0.9)), "worst": float(safe.max()),
-            "long": int((safe > 1.0 + LONG).sum()), "cpu_s": float(np.median(spent)), "cpu_s_most": float(spent.max()),
-            "ratios": over.round(5).tolist(), "seconds": spent.round(3).tolist(),
-        }  # fmt: skip
+            "solved": int(solved.sum()),
+            "of": int(solved.size),
+            "more": int(safe.size - solved.sum()),
+            "median": float(np.median(safe)),
+            "p90": float(np.quantile(safe, 0.9)),
+            "worst": float(safe.max()),
+            "long": int((safe > 1.0 + LONG).sum()),
+            "cpu_s": float(np.median(spent)),
+            "cpu_s_most": float(spent.max()),
+            "ratios": over.round(5).tolist(),
+            "seconds": spent.round(3).tolist(),
+        }
         print(
             f"  {name:<16}{entry['solved']:>5}/{entry['of']:<3}{entry['more']:>9}{entry['median']:>16.4f}"
             f"{entry['p90']:>8.4f}{entry['worst']:>8.4f}{entry['long']:>9}{entry['cpu_s']:>8.2f}"

@@ -25,7 +25,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.planning.fresh_instances import random_task
 from planfly.workflow.airframe import load_airframe
@@ -33,9 +32,8 @@ from planner.evaluation.certify import certify
 from planner.evaluation.encoding import ENCODINGS, Encoding
 from planner.optimisers.hypervolume import covering_order, hypervolume
 from planner.search.plan_front import Front, FrontTask, fitted_task, front_task, plan_front, seed_paths
+from world.arrays import Floats
 from world.scenario import Scenario, load_scenario
-
-Floats = NDArray[np.float64]
 
 # Scenarios of the comparison.
 PROBLEMS = ("hard-30", "hard-60", "jacksboro")

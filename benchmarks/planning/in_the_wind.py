@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, PerformanceTable, ground_speed_on
 from flight.mission.from_plan import plan_mission
@@ -30,9 +29,8 @@ from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
 from planner.evaluation.travel_cost import energy_cost, path_cost, time_cost
 from tests.autopilot_plans import plan_scenario
+from world.arrays import Floats
 from world.scenario import Scenario, from_spec
-
-Floats = NDArray[np.float64]
 
 # Number of the first mission; no other benchmark or test uses numbers this high.
 FIRST = 3900

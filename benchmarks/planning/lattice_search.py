@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from benchmarks.task import Task, is_safe, scalar
 from planner.evaluation.encoding import rotated_frame, rotated_vectors
@@ -21,10 +20,7 @@ from planner.evaluation.problem import ProblemArrays
 from planner.seeding.pattern_search import search_patterns
 from planner.seeding.waypoint_chains import free_points
 from planner.seeding.waypoint_fitting import fit_waypoints, tighten
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from world.arrays import Flags, Floats, Ints
 
 # Spacing of the lattice's places, m.
 PITCH = 66.0

@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.task import exact_airframe
 from planfly.planning.paper import PROBLEMS, STRIP_ACROSS, problem_name
@@ -20,11 +19,9 @@ from planner.evaluation.problem import make_problem
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from planner.search.search_state import CONSTRAINTS, DETECTION, HEIGHT, KILL, LENGTH, best_first, safe, score_table
+from world.arrays import Floats, Ints
 from world.random_streams import PLANNER, stream
 from world.scenario import load_scenario
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LAST = Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
 PAPER_LEVELS = (CONSTRAINTS, Level((LENGTH, KILL), (NO_GOAL, NO_GOAL)), LAST)

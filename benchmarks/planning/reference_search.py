@@ -11,15 +11,13 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.planning.lattice_search import lattice_ways
 from benchmarks.planning.smooth_search import Programme
 from benchmarks.task import Task, is_safe
 from planner.evaluation.problem import SEARCH_KILL_MARGIN
 from planner.seeding.shortening import resample, shorten_path
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Number of lattice routes.
 WAYS = 400

@@ -11,15 +11,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from benchmarks.planning.lattice_search import lattice_ways
 from benchmarks.task import Task, is_safe
 from planner.search.plan_path import plan_path
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from world.arrays import Floats, Ints
 
 # Unit of the programme's variables, m.
 UNIT = 100.0

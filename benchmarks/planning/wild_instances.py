@@ -8,11 +8,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.scenario import Scenario, from_spec
-
-Floats = NDArray[np.float64]
 
 # Seed of all instances.
 SEED = 3901

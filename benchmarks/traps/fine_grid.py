@@ -20,10 +20,8 @@ from planfly.workflow.airframe import load_airframe
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import make_problem
 from planner.search.plan_path import plan_path
+from world.arrays import Flags, Floats
 from world.scenario import Scenario, embedded_names, load_scenario
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # Spacing of places, m.
 PITCH = 50.0

@@ -6,15 +6,13 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Variation
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.route_requirements import route_requirements
 from tests.setups import MakeSetup, standard
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Number of legs.
 LEGS = 7

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import ClassVar, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from aircraft.contacts import Contact
@@ -26,14 +25,12 @@ from flight.mission.ground_ways import GroundWays
 from flight.mission.loiter_circles import USUAL_LOITERS, LoiterRules
 from flight.mission.return_path import USUAL_RULES, ReturnRules
 from flight.mission.route import RouteRules
+from world.arrays import Floats, Heights
 from world.errors import ScenarioError
 from world.json_schema import DocumentConfig
 from world.kernels import Record
 from world.scenario_tables import FlightTable, Guidance, Navigation
-from world.terrain import Heights
 from world.wind import Turbulence
-
-Floats = NDArray[np.float64]
 
 # One tick of the compiled loop, on the block of a `flight.simulation.tick.Workspace`: a key of `ENDS`, 0 to fly on.
 Tick = Callable[[Floats, Heights], int]

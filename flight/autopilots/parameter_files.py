@@ -93,8 +93,11 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
             allowed = "each name is expected once"
             raise ParameterError(
                 f"{entry.where}: {entry.name}: already on line {first}: {allowed}",
-                file=source, field=entry.name, value=entry.value, allowed=allowed,
-            )  # fmt: skip
+                file=source,
+                field=entry.name,
+                value=entry.value,
+                allowed=allowed,
+            )
         found[entry.name] = entry
     if not found:
         raise ParameterError(f"{source}: no parameter: lines of a name and a value are expected", file=source)

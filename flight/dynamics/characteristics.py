@@ -10,8 +10,7 @@ from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.state import STATE
 from flight.dynamics.trim import Trim, linearise, straight
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Altitude of all measurements, m AMSL.
 TRIM_AMSL = 500.0

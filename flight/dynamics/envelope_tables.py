@@ -14,7 +14,8 @@ from aircraft.catalog import Aircraft, model_hash
 from aircraft.envelope import POWERS, TABLES, Envelope
 from aircraft.uncertainty import read_uncertainty
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
-from flight.dynamics.trim import Floats, Trim, fastest, full_throttle, idle, slowest, straight
+from flight.dynamics.trim import Trim, fastest, full_throttle, idle, slowest, straight
+from world.arrays import Floats
 from world.files import write_whole
 
 # Version of the file format; increase it with any change of the contents or of their computation.

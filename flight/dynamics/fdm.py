@@ -48,7 +48,8 @@ from flight.dynamics.jsbsim_properties import (
 )
 from flight.dynamics.model_check import check_model, try_model
 from flight.dynamics.state import STATE
-from flight.dynamics.trim import Engine, Floats, Trim, air_velocity, body_axes, euler, first_guess, straight
+from flight.dynamics.trim import Engine, Trim, air_velocity, body_axes, euler, first_guess, straight
+from world.arrays import Floats
 from world.errors import FlightError
 from world.files import temporary_folder
 from world.kernels import Record, field_names
@@ -316,8 +317,10 @@ class Fdm:
             raise FlightError(
                 f"{self.aircraft.name} holds no steady flight at {airspeed:.1f} m/s,"
                 f" {math.degrees(climb):+.1f} degrees to the air and {amsl:.0f} m above sea level",
-                file=self.aircraft.name, field="airspeed", value=airspeed,
-            )  # fmt: skip
+                file=self.aircraft.name,
+                field="airspeed",
+                value=airspeed,
+            )
         self.balance(found.vector())
         self._release_motion()
         return found
@@ -399,8 +402,7 @@ class Fdm:
         values = np.empty(len(_STATE_FIELDS))
         _PACK_STATE(values, 0, *[reader() for reader in self._readers])
         np.multiply(values, self._factors, values)
-        state: Record = values.view(STATE)[0]
-        return state
+        return values.view(STATE)[0]
 
     def write(self, commands: Iterable[float]) -> None:
         """Set four commands, in the order of `flight.dynamics.state.Commands`; they act in the next step."""
@@ -496,8 +498,7 @@ class Fdm:
         if self._engine:
             self._engine.settle(spin=settle)
             self._exec.run_ic()
-        rates: Floats = np.array([rate() for rate in self._rates]) * RATE_FACTORS
-        return rates
+        return np.array([rate() for rate in self._rates]) * RATE_FACTORS
 
 
 def _apply_variation(properties: PropertyAccess, aircraft: Aircraft, variation: Variation) -> None:

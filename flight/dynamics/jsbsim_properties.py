@@ -115,13 +115,11 @@ class PropertyAccess:
         """Return a function that reads a property; "" reads as zero. Raise FlightError if it is undefined."""
         if not name:
             return _read_zero
-        getter: Getter = self._node(name).get_double_value
-        return getter
+        return self._node(name).get_double_value
 
     def setter(self, name: str) -> Setter:
         """Return a function that sets a property. Raise FlightError if it is undefined."""
-        setter: Setter = self._node(name).set_double_value
-        return setter
+        return self._node(name).set_double_value
 
     def command_setter(self, command: CommandProperty) -> Setter:
         """Return a function that sets a command in rad, or a throttle, scaled to the property's units."""

@@ -241,8 +241,11 @@ def _try(folder: str, _version: str) -> int | None:
     try:
         done = subprocess.run(
             [sys.executable, "-c", _TRIAL_PROGRAM, folder],
-            env=os.environ | {"PYTHONPATH": paths}, capture_output=True, check=False, timeout=_TIMEOUT_S,
-        )  # fmt: skip
+            env=os.environ | {"PYTHONPATH": paths},
+            capture_output=True,
+            check=False,
+            timeout=_TIMEOUT_S,
+        )
     except subprocess.TimeoutExpired:
         return None
     return done.returncode

@@ -10,15 +10,12 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.dynamics.jsbsim_properties import RATES
 from flight.dynamics.state import Commands
+from world.arrays import Floats
 from world.errors import FlightError
 from world.least_squares import least_squares
-
-Floats = NDArray[np.float64]
-
 
 # ----------------------------------------------------------------------
 # Running engine in a JSBSim model: its speed is a state of its own, which must settle before a measurement.
@@ -361,7 +358,7 @@ def air_velocity(course: float, climb: float, airspeed: float, wind: Floats) -> 
         raise FlightError(
             f"no way made along the course of {math.degrees(course):.0f} degrees:"
             f" airspeed {airspeed:.1f} m/s in {float(np.hypot(wind[0], wind[1])):.1f} m/s of wind",
-            field="airspeed", value=airspeed,
-        )  # fmt: skip
-    velocity: Floats = speed * along - wind
-    return velocity
+            field="airspeed",
+            value=airspeed,
+        )
+    return speed * along - wind

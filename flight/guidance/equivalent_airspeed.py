@@ -11,10 +11,9 @@ _MAX_ALTITUDE_M = 11_000.0
 
 
 @compiled
-def true_by_equivalent(amsl: float) -> float:  # pragma: no cover - compiled
+def true_by_equivalent(amsl: float) -> float:
     """Return the ratio of true to equivalent airspeed in the standard atmosphere at an altitude, m.
 
     It is 1.05 at 1,000 m.
     """
-    ratio: float = (1.0 - _LAPSE_PER_M * min(_MAX_ALTITUDE_M, amsl)) ** (-0.5 * _DENSITY_POWER)
-    return ratio
+    return (1.0 - _LAPSE_PER_M * min(_MAX_ALTITUDE_M, amsl)) ** (-0.5 * _DENSITY_POWER)

@@ -63,7 +63,7 @@ GUIDANCE_MEMORY = record_dtype(
 @inner
 def steer_elevator(
     state: Record, gains: Record, memory: Record, commands: Record, climb_rate: float, push: float
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Set the elevator for an upward acceleration ``push`` (m/s^2), by load factor and angle of attack.
 
     climb_rate: m/s.
@@ -90,9 +90,7 @@ def steer_elevator(
 
 
 @inner
-def roll_model(
-    wanted: float, bank: float, rate: float, gains: Record, dt: float
-) -> tuple[float, float, float]:  # pragma: no cover - compiled
+def roll_model(wanted: float, bank: float, rate: float, gains: Record, dt: float) -> tuple[float, float, float]:
     """Return bank (rad), roll rate and roll acceleration of the model roll one tick later.
 
     The model is a critically damped oscillator with limits of roll rate and roll acceleration.
@@ -109,7 +107,7 @@ def roll_model(
 @inner
 def follow_roll(
     state: Record, gains: Record, memory: Record, commands: Record, bank: float, rate: float, turn: float, dt: float
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Set aileron and rudder to follow a given roll.
 
     bank: rad.

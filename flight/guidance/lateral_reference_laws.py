@@ -65,7 +65,7 @@ _PASSED_TIME_S = 3.0
 
 
 @inner
-def l1_length(speed: float, period: float, damping: float) -> float:  # pragma: no cover - compiled
+def l1_length(speed: float, period: float, damping: float) -> float:
     """Return the L1 distance, m, at a ground speed (m/s)."""
     return period * damping * speed / math.pi
 
@@ -73,7 +73,7 @@ def l1_length(speed: float, period: float, damping: float) -> float:  # pragma: 
 @inner
 def l1_angles(
     estimated: Record, a_east: float, a_north: float, b_east: float, b_north: float, length: float
-) -> tuple[float, float]:  # pragma: no cover - compiled
+) -> tuple[float, float]:
     """Return the angles from ground velocity to leg or waypoint, and from there to the aim point, rad.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
@@ -98,7 +98,7 @@ def l1_angles(
 
 
 @inner
-def l1_integrate(aim: float, total: float, gain: float, dt: float) -> float:  # pragma: no cover - compiled
+def l1_integrate(aim: float, total: float, gain: float, dt: float) -> float:
     """Return the cross-track integrator after a tick, rad."""
     if math.isnan(aim) or abs(aim) >= _INTEGRATION_LIMIT_RAD:
         return total
@@ -106,7 +106,7 @@ def l1_integrate(aim: float, total: float, gain: float, dt: float) -> float:  # 
 
 
 @inner
-def l1_acceleration(angle: float, speed: float, length: float, damping: float) -> float:  # pragma: no cover - compiled
+def l1_acceleration(angle: float, speed: float, length: float, damping: float) -> float:
     """Return the acceleration to the right, m/s^2.
 
     angle: angle of the velocity to the right of the aim, rad.
@@ -116,9 +116,7 @@ def l1_acceleration(angle: float, speed: float, length: float, damping: float) -
 
 
 @inner
-def l1_reached(
-    estimated: Record, a: Record, b: Record, length: float, radius: float
-) -> bool:  # pragma: no cover - compiled
+def l1_reached(estimated: Record, a: Record, b: Record, length: float, radius: float) -> bool:
     """Return True if L1 switches to the next leg.
 
     It switches within the turn distance of b, or past the line through b across the leg.
@@ -132,14 +130,13 @@ def l1_reached(
     if to_e * leg_e + to_n * leg_n <= 0.0:
         return True
     distance = min(radius, length) * min(1.0, b.turn / (0.5 * math.pi))
-    within: bool = not b.fly_over and math.hypot(to_e, to_n) <= distance
-    return within
+    return not b.fly_over and math.hypot(to_e, to_n) <= distance
 
 
 @inner
 def field_course(
     course: float, cross: float, curvature: float, approach: float, path_gain: float, orbit_gain: float
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the course that the vector field commands next to a path, rad.
 
     course: course of the path here, rad.

@@ -11,8 +11,9 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import Floats, Trim, linearise, straight
+from flight.dynamics.trim import Trim, linearise, straight
 from flight.guidance.gains import Gains
+from world.arrays import Floats
 from world.errors import FlightError
 from world.least_squares import least_squares
 
@@ -179,16 +180,41 @@ def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
 
 # Unit suffixes of the keys in a file, by gain; gains without one are plain numbers.
 _UNIT_SUFFIXES = {
-    "reference_airspeed": "_mps", "cross_track_frequency": "_rad_s", "cross_track_integral": "_1_s3",
-    "turn_lead": "_s", "turn_smoothing": "_s", "aside_frequency": "_rad_s", "side_lag": "_s", "push_lead": "_s",
-    "push_smoothing": "_s", "height_frequency": "_rad_s", "height_integral": "_1_s3", "slope_lead": "_s",
-    "load_lead": "_s", "speed_gain": "_1_s", "speed_integral": "_1_s2", "roll_frequency": "_rad_s",
-    "roll_rate_gain": "_s", "roll_disturbance_lag": "_s", "aileron_lead": "_s", "pitch_rate_gain": "_s",
-    "yaw_rate_gain": "_s", "elevator_per_pitch_rate": "_s", "aileron_per_roll_rate": "_s",
-    "aileron_per_roll_acceleration": "_s2", "rudder_per_yaw_rate": "_s", "side_per_sideslip": "_mps2",
-    "side_per_aileron": "_mps2", "intercept": "_deg", "slow_margin": "_mps", "roll_rate_max": "_deg_s",
-    "roll_acceleration_max": "_deg_s2", "sideslip_max": "_deg", "arc_slowing_time": "_s", "arc_slowing_max": "_mps",
-}  # fmt: skip
+    "reference_airspeed": "_mps",
+    "cross_track_frequency": "_rad_s",
+    "cross_track_integral": "_1_s3",
+    "turn_lead": "_s",
+    "turn_smoothing": "_s",
+    "aside_frequency": "_rad_s",
+    "side_lag": "_s",
+    "push_lead": "_s",
+    "push_smoothing": "_s",
+    "height_frequency": "_rad_s",
+    "height_integral": "_1_s3",
+    "slope_lead": "_s",
+    "load_lead": "_s",
+    "speed_gain": "_1_s",
+    "speed_integral": "_1_s2",
+    "roll_frequency": "_rad_s",
+    "roll_rate_gain": "_s",
+    "roll_disturbance_lag": "_s",
+    "aileron_lead": "_s",
+    "pitch_rate_gain": "_s",
+    "yaw_rate_gain": "_s",
+    "elevator_per_pitch_rate": "_s",
+    "aileron_per_roll_rate": "_s",
+    "aileron_per_roll_acceleration": "_s2",
+    "rudder_per_yaw_rate": "_s",
+    "side_per_sideslip": "_mps2",
+    "side_per_aileron": "_mps2",
+    "intercept": "_deg",
+    "slow_margin": "_mps",
+    "roll_rate_max": "_deg_s",
+    "roll_acceleration_max": "_deg_s2",
+    "sideslip_max": "_deg",
+    "arc_slowing_time": "_s",
+    "arc_slowing_max": "_mps",
+}
 
 
 def gains_text(gains: Gains) -> str:

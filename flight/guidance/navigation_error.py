@@ -8,11 +8,9 @@ import math
 
 import numpy as np
 from numba import literal_unroll
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.kernels import Record, field_names, inner, record_dtype
-
-Floats = NDArray[np.float64]
 
 # Standard deviation on each axis (m) and correlation time T (s), by `[flight] nav`.
 ERRORS = {"perfect": (0.0, 1.0), "rtk": (0.05, 5.0), "gnss": (1.5, 20.0)}
@@ -40,7 +38,7 @@ def navigate(
     sigma: float,
     time_constant: float,
     dt: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Set the estimated state to the true state plus the error, and advance the error.
 
     true, estimated: records of `MOTION`.
@@ -65,7 +63,7 @@ def navigate(
 @inner
 def _error(
     lags: Record, axis: int, noise: Floats, sigma: float, time_constant: float, dt: float
-) -> tuple[float, float]:  # pragma: no cover - compiled
+) -> tuple[float, float]:
     """Return the errors of position (m) and velocity (m/s) on one axis, one tick later."""
     decay = math.exp(-dt / time_constant)
     # The second lag's variance is half of the first lag's variance.

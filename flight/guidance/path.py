@@ -18,12 +18,12 @@ from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.itinerary import loiter_of
 from flight.mission.route import SHARPEST_FLY_BY_RAD, Route, ends_at_plain_waypoint
+from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length, wrap
 from world.kernels import Record, compiled, inner, record_dtype
 from world.terrain import Terrain
 
 Records = NDArray[np.record]
-Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
@@ -51,7 +51,7 @@ NODE = record_dtype(
 
 
 @inner
-def project(piece: Record, east: float, north: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
+def project(piece: Record, east: float, north: float) -> tuple[float, float, float]:
     """Return the distance along a piece (m), the cross-track error (m) and the path's course there (rad).
 
     The cross-track error is positive to the right.
@@ -76,7 +76,7 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
 
 
 @inner
-def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:  # pragma: no cover - compiled
+def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:
     """Update the position along the path in the memory, and return the path's course there, rad.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
@@ -98,7 +98,7 @@ def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:  
 
 
 @inner
-def leave_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:  # pragma: no cover - compiled
+def leave_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:
     """Advance the memory past sharp corners to the leg that an autopilot has turned to.
 
     The autopilot may turn back before it passes the end of the leg before. Other arguments as for `find_on_path`.
@@ -112,7 +112,7 @@ def leave_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:  # p
 
 
 @inner
-def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
+def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float:
     """Return the mean curvature of the path between two distances, both at or after piece ``k``, 1/m."""
     total = 0.0
     for i in range(k, pieces.shape[0]):
@@ -127,7 +127,7 @@ def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float: 
 
 
 @inner
-def max_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
+def max_curvature(pieces: Records, k: int, start: float, end: float) -> float:
     """Return the largest curvature of the path between two distances, 1/m, positive.
 
     Both distances are at or after piece ``k``.
@@ -143,7 +143,7 @@ def max_curvature(pieces: Records, k: int, start: float, end: float) -> float:  
 
 
 @compiled
-def profile(nodes: Records, s: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
+def profile(nodes: Records, s: float) -> tuple[float, float, float]:
     """Return altitude (m), slope (tangent) and slope change per meter of the altitude profile at ``s``."""
     k = 0
     while k + 1 < nodes.shape[0] and nodes[k + 1].distance <= s:

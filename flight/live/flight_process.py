@@ -31,9 +31,6 @@ from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from aircraft.catalog import Aircraft
 from flight.live.telemetry import AUTO, CRITICAL, GUIDED, LOITER, MODE_NAMES, Snapshot, SnapshotMaker, StatusText
 from flight.mission.items import Frame, Home, Mission
@@ -41,9 +38,8 @@ from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import TICK, Flight
 from flight.simulation.track import Rows, Track, as_track, join_rows
+from world.arrays import Floats
 from world.errors import PlanflyError
-
-Floats = NDArray[np.float64]
 
 # Rate of the snapshots, 1/s.
 SNAPSHOT_RATE = 60.0
@@ -278,8 +274,7 @@ def read_event(data: bytes) -> Snapshot | Event:
     """Read an event from the flight process."""
     if data[:1] == _PACKED_MARK:
         return Snapshot.unpack(data[1:])
-    found: Event = pickle.loads(data[1:])
-    return found
+    return pickle.loads(data[1:])
 
 
 class _RequestQueue:

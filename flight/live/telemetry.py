@@ -6,18 +6,15 @@ from dataclasses import astuple, dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.mission.items import Home
 from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import THROTTLE, TRACK_ROW
+from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
 from world.kernels import Record
-
-Floats = NDArray[np.float64]
-
 
 # ----------------------------------------------------------------------
 # State snapshot of a flight for ground stations, packed to pass between processes.
@@ -382,19 +379,36 @@ def _sys_status(status: Status) -> Any:
     share = max(0.0, 1.0 - status.snapshot.energy / status.battery)
     present = _SENSORS | _PREARM
     return mavlink.MAVLink_sys_status_message(
-        present, present, health, min(1000, round(status.load * 1000)), 44_400,
-        _to_int16(status.snapshot.current * 100), round(share * 100), 0, 0, 0, 0, 0, 0,
-    )  # fmt: skip
+        present,
+        present,
+        health,
+        min(1000, round(status.load * 1000)),
+        44_400,
+        _to_int16(status.snapshot.current * 100),
+        round(share * 100),
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+    )
 
 
 def _gps(status: Status) -> Any:
     now = status.snapshot
     return mavlink.MAVLink_gps_raw_int_message(
-        int(status.boot * 1e6), mavlink.GPS_FIX_TYPE_RTK_FIXED,
-        round(now.lat_deg * 1e7), round(now.lon_deg * 1e7), round(now.amsl * 1e3), 50, 80,
+        int(status.boot * 1e6),
+        mavlink.GPS_FIX_TYPE_RTK_FIXED,
+        round(now.lat_deg * 1e7),
+        round(now.lon_deg * 1e7),
+        round(now.amsl * 1e3),
+        50,
+        80,
         min(65534, round(math.hypot(now.v_north, now.v_east) * 100)),
-        round(_degrees(math.atan2(now.v_east, now.v_north)) * 100) % 36000, 16,
-    )  # fmt: skip
+        round(_degrees(math.atan2(now.v_east, now.v_north)) * 100) % 36000,
+        16,
+    )
 
 
 def _wind(status: Status) -> Any:
@@ -420,9 +434,18 @@ def _extended_state(status: Status) -> Any:
 def _home(status: Status) -> Any:
     home = status.home
     return mavlink.MAVLink_home_position_message(
-        round(home.lat_deg * 1e7), round(home.lon_deg * 1e7), round(home.alt * 1e3),
-        0.0, 0.0, 0.0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, int(status.boot * 1e6),
-    )  # fmt: skip
+        round(home.lat_deg * 1e7),
+        round(home.lon_deg * 1e7),
+        round(home.alt * 1e3),
+        0.0,
+        0.0,
+        0.0,
+        [1.0, 0.0, 0.0, 0.0],
+        0.0,
+        0.0,
+        0.0,
+        int(status.boot * 1e6),
+    )
 
 
 def _autopilot_version(_status: Status) -> Any:

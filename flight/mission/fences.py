@@ -5,17 +5,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import Command, Frame, Home, ItemProblem, Mission, MissionItem, on_grid
 from world.airspace.zones import Cylinder, Polygon, Ring, Zone, ZoneKind, is_hole, make_cylinder, make_polygon
 from world.airspace.zones_on_map import ring_on_map
+from world.arrays import Floats
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
-
 
 # ----------------------------------------------------------------------
 # A scenario's zones as fence items, and notes on what a fence cannot represent.
@@ -253,11 +250,16 @@ def _rally(mission: Mission) -> list[MissionItem]:
     ends = [positions[0], positions[-1]] if len(positions) > 1 else positions
     return [
         MissionItem(
-            0, int(Command.NAV_RALLY_POINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4, end.lat_deg, end.lon_deg,
+            0,
+            int(Command.NAV_RALLY_POINT),
+            int(Frame.GLOBAL_RELATIVE_ALT),
+            (0.0,) * 4,
+            end.lat_deg,
+            end.lon_deg,
             round(end.alt - _home_offset(end, home), 3),
         )
         for end in ends
-    ]  # fmt: skip
+    ]
 
 
 def _home_offset(item: MissionItem, home: Home) -> float:

@@ -4,19 +4,17 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, ground_speed
 from aircraft.tracking import TrackingError, air_density_factor
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
 from planner.ground_ways import GroundWays
 from planner.plan import Plan
+from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
 from world.geometry import leg_courses, turning_angles, wrap
 from world.scenario import Scenario
 from world.wind import W20
-
-Floats = NDArray[np.float64]
 
 # Margin added to the fly-by offset of a waypoint, m: the tolerance of the verdict's waypoint rule.
 ACCEPTANCE_TOLERANCE = 10.0

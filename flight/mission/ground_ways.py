@@ -9,16 +9,14 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.itinerary import LANDING_NOTE
 from flight.mission.placing import home_place
 from flight.mission.route import Route, part_of_route
 from world.airfield import LandingStrip, Launch
+from world.arrays import Floats
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 # Climb pitch of a take-off item that states none, rad: ArduPlane's own where the first parameter is 0.
 USUAL_PITCH = math.radians(4.0)

@@ -6,19 +6,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import Mission
 from flight.mission.itinerary import Itinerary, ItineraryStop, make_itinerary
 from flight.mission.placing import HIGHEST, PlacedMission, on_map, place_stops, rally_stops
+from world.arrays import Floats
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import open_raster, read_terrain, tile_bounds
 from world.scenario import GROUND_BUFFER, Scenario, from_spec
 from world.scenario_tables import MAP_EXTENT, AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
 
 # Margin of the area around the mission's positions, and of the ceiling above its highest, m.
 AREA_BUFFER = 2000.0

@@ -11,14 +11,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from flight.mission.items import TAKEOFFS, Notes
 from flight.mission.itinerary import MAX_STOPS, ItineraryStop, Loiter
+from world.arrays import Floats
 from world.errors import MissionError
-
-Floats = NDArray[np.float64]
 
 # Largest course change at a corner of the polygon, rad: the corners then lie 8 % of the radius outside the circle.
 CORNER = math.pi / 4.0
@@ -209,9 +205,13 @@ def lay_circles(
 
 
 def _nodes(
-    source: str, stops: list[PlacedStop], notes: Notes, own_radius: OwnRadius, rules: LoiterRules,
+    source: str,
+    stops: list[PlacedStop],
+    notes: Notes,
+    own_radius: OwnRadius,
+    rules: LoiterRules,
     unjoined: list[Unjoined],
-) -> list[Node]:  # fmt: skip
+) -> list[Node]:
     """Return points and circles in flying order, each with a tangent to the next.
 
     ``unjoined`` gets the others.
@@ -318,9 +318,16 @@ def circle_corners(node: Node, into: float, sweep: float) -> list[tuple[float, f
 
 
 def _corners_around(
-    source: str, node: Node, into: float, onward: float | None, up: float, run: float, tightest: float,
-    slopes: SpiralSlopes, rules: LoiterRules,
-) -> list[RoutePoint]:  # fmt: skip
+    source: str,
+    node: Node,
+    into: float,
+    onward: float | None,
+    up: float,
+    run: float,
+    tightest: float,
+    slopes: SpiralSlopes,
+    rules: LoiterRules,
+) -> list[RoutePoint]:
     """Return the corners around a circle, joined on one course and left on another.
 
     into, onward: those courses, rad; ``onward`` is None at the mission's end.

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import (
     AMSL,
@@ -23,13 +22,12 @@ from flight.mission.items import (
 from flight.mission.itinerary import Itinerary, ItineraryStop, Loiter, OpenItem, loiter_of, make_itinerary
 from flight.mission.loiter_circles import PlacedStop
 from flight.mission.return_path import LandingStart, ReturnPlace
+from world.arrays import Floats
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_map
 from world.geometry import leg_courses
 from world.scenario_tables import MAP_EXTENT
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
 
 # Distance below which two positions are the same place, m.
 SAME_PLACE = 1.0

@@ -9,19 +9,17 @@ import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import Command, Mission
 from flight.mission.placing import return_places
 from flight.mission.return_path import ReturnPlace, ReturnRules
 from flight.mission.route import Route
 from world.airfield import STEEPEST_STRIP, LandingStrip, strip_slopes
+from world.arrays import Floats
 from world.errors import MissionError
 from world.frames import to_map
 from world.geometry import leg_courses
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 # Wind component below which no wind is noted, m/s.
 CALM = 0.05

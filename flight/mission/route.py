@@ -36,13 +36,12 @@ from flight.mission.return_path import (
     lay_return,
     nearest_landing,
 )
+from world.arrays import Floats
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.geometry import fly_by_offset, leg_courses, signed_turns, wrap
 from world.scenario import Scenario
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,14 +9,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import Command, Mission, MissionItem, command_name, is_navigation, on_grid, renumbered
 from flight.mission.route import Route
 from flight.mission.surveys import Survey
+from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
-
-Floats = NDArray[np.float64]
 
 # Smallest length of a survey line on another course, m.
 _MIN_LINE_LENGTH_M = 50.0

@@ -13,13 +13,11 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import Command, Mission, SurveyPlan, is_navigation
 from flight.mission.route import Route
+from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
-
-Floats = NDArray[np.float64]
 
 # Largest course difference between a leg and the first leg of its straight run, rad.
 _MAX_RUN_BEND_RAD = math.radians(3.0)

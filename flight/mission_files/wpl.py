@@ -105,8 +105,11 @@ def parse_waypoints(text: str, source: str) -> Mission:
     if header.split() != HEADER.split():
         raise MissionError(
             f"{source}:{number}: header {_shown(header)}: '{HEADER}' is expected",
-            file=source, field="header", value=header, allowed=HEADER,
-        )  # fmt: skip
+            file=source,
+            field="header",
+            value=header,
+            allowed=HEADER,
+        )
     if len(lines) - 1 > MAX_ITEMS:
         raise MissionError(f"{source}: {len(lines) - 1:,} items: at most {MAX_ITEMS:,} are read", file=source)
     rows = [_row(TextLine(source, number), line) for number, line in lines[1:]]

@@ -8,7 +8,6 @@ import math
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from aircraft.contacts import Gear
@@ -26,13 +25,11 @@ from flight.simulation.start import Start, find_start, start_trimmed
 from flight.simulation.tick import BLOCK_TICKS, ENDS, Workspace, longest_circling
 from flight.simulation.track import Rows, join_rows, quantised
 from flight.simulation.turbulence import start_gusts
+from world.arrays import Floats
 from world.geometry import leg_courses
 from world.kernels import Records
 from world.random_streams import NAVIGATION, TURBULENCE, stream
 from world.wind import W20
-
-Floats = NDArray[np.float64]
-
 
 # Time limit of a flight, as a multiple of its length at its lowest ground speed.
 PATIENCE = 1.5

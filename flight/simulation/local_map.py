@@ -7,14 +7,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
+from world.arrays import Floats, Heights
 from world.errors import FlightError
 from world.frames import GeoOrigin, PolyMap, fit_polymap, to_geo, to_map
-from world.terrain import Heights, Terrain
-
-Floats = NDArray[np.float64]
+from world.terrain import Terrain
 
 # Margin of the local map around the area and the route, m.
 MAP_BUFFER = 5000.0

@@ -6,9 +6,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
 from aircraft.tracking import corridor_half_width
@@ -19,10 +16,9 @@ from flight.mission.ground_ways import GroundWays, find_ground_ways, flown_notes
 from flight.mission.items import Mission
 from flight.mission.route import Route
 from planner.plan import Plan
+from world.arrays import Floats
 from world.scenario import Scenario
 from world.scenario_tables import Navigation
-
-Floats = NDArray[np.float64]
 
 # ----------------------------------------------------------------------
 # Source of a flight that planfly did not fly: an imported log, and its contents.

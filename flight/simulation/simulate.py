@@ -45,13 +45,39 @@ def make_loop(
     """
     # Each by its name: going through a list of them takes half as long again.
     (
-        latitude, longitude, amsl, velocity_north, velocity_east, velocity_down, roll, pitch, yaw,
-        roll_rate, pitch_rate, yaw_rate, airspeed, alpha, beta, elevator, aileron, rudder, throttle,
-        current, power, load_factor,
-    ) = getters  # fmt: skip
+        latitude,
+        longitude,
+        amsl,
+        velocity_north,
+        velocity_east,
+        velocity_down,
+        roll,
+        pitch,
+        yaw,
+        roll_rate,
+        pitch_rate,
+        yaw_rate,
+        airspeed,
+        alpha,
+        beta,
+        elevator,
+        aileron,
+        rudder,
+        throttle,
+        current,
+        power,
+        load_factor,
+    ) = getters
     (
-        set_elevator, set_aileron, set_rudder, set_throttle, set_gust_north, set_gust_east, set_gust_down, set_ground,
-    ) = setters  # fmt: skip
+        set_elevator,
+        set_aileron,
+        set_rudder,
+        set_throttle,
+        set_gust_north,
+        set_gust_east,
+        set_gust_down,
+        set_ground,
+    ) = setters
     # struct writes so many floats in half the time of a slice assignment.
     pack: Callable[..., None] = struct.Struct(f"{len(READ_FIELDS)}d").pack_into
     readings, output, repeat = workspace.readings, workspace.output.tolist, (None,) * steps
@@ -59,11 +85,31 @@ def make_loop(
     def fly(count: int) -> int:
         for _ in range(count):
             pack(
-                readings, 0,
-                latitude(), longitude(), amsl(), velocity_north(), velocity_east(), velocity_down(),
-                roll(), pitch(), yaw(), roll_rate(), pitch_rate(), yaw_rate(), airspeed(), alpha(), beta(),
-                elevator(), aileron(), rudder(), throttle(), current(), power(), load_factor(),
-            )  # fmt: skip
+                readings,
+                0,
+                latitude(),
+                longitude(),
+                amsl(),
+                velocity_north(),
+                velocity_east(),
+                velocity_down(),
+                roll(),
+                pitch(),
+                yaw(),
+                roll_rate(),
+                pitch_rate(),
+                yaw_rate(),
+                airspeed(),
+                alpha(),
+                beta(),
+                elevator(),
+                aileron(),
+                rudder(),
+                throttle(),
+                current(),
+                power(),
+                load_factor(),
+            )
             if status := tick():
                 return status
             elevator_out, aileron_out, rudder_out, throttle_out, north_out, east_out, down_out, ground_out = output()

@@ -157,9 +157,13 @@ def _to_true_north(east: float, north: float, turn: float) -> tuple[float, float
 def release(fdm: Fdm, start: Release, commands: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
     """Release the aircraft with these commands, and return them."""
     fdm.release(
-        start.place, start.attitude, start.velocity,
-        wind=start.wind, terrain_amsl=start.ground, commands=commands,
-    )  # fmt: skip
+        start.place,
+        start.attitude,
+        start.velocity,
+        wind=start.wind,
+        terrain_amsl=start.ground,
+        commands=commands,
+    )
     # Mean wind is set as part of the gust.
     fdm.set_wind(0.0, 0.0, 0.0)
     fdm.set_gust(*start.wind)

@@ -22,14 +22,12 @@ from flight.guidance.path import NODE, PIECE, FlyByPath, Records
 from flight.mission.itinerary import UNLIMITED
 from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE, TRACK_ROW
 from flight.simulation.turbulence import GUST_FILTERS, step_gusts
+from world.arrays import Floats, Heights
 from world.frames import POLYMAP, polymap
 from world.geometry import wrap
 from world.kernels import Record, compiled, field_names, inner, record_dtype
-from world.terrain import Heights, pixel_height
+from world.terrain import pixel_height
 from world.wind import mean_wind_speed
-
-Floats = NDArray[np.float64]
-
 
 # ----------------------------------------------------------------------
 # Data of the compiled tick: one record, and one table of the path.
@@ -169,8 +167,7 @@ class Workspace:
 
     def navigation_error(self) -> list[float]:
         """Return the estimated minus the true motion, in `flight.guidance.navigation_error.MOTION` order."""
-        error: list[float] = (self._estimated - self._true).tolist()
-        return error
+        return (self._estimated - self._true).tolist()
 
     def _numbers(self, field: str, count: int) -> Floats:
         """Return the first numbers of a field, as an array that shares its memory."""
@@ -234,7 +231,7 @@ _OUTPUT_FIELDS = field_names(OUTPUT)
 
 
 @inner
-def begin_tick(work: Record, heights: Heights) -> bool:  # pragma: no cover - compiled
+def begin_tick(work: Record, heights: Heights) -> bool:
     """Convert the state from JSBSim's units and estimate the motion; return False if it is not a number.
 
     work: a record of `WORKSPACE`.
@@ -244,14 +241,19 @@ def begin_tick(work: Record, heights: Heights) -> bool:  # pragma: no cover - co
     if not _sense(work, heights):
         return False
     navigate(
-        work.true, work.estimated, work.navigation, work.noise[timing.row].navigation,
-        settings.navigation_sigma, settings.navigation_time, timing.dt,
-    )  # fmt: skip
+        work.true,
+        work.estimated,
+        work.navigation,
+        work.noise[timing.row].navigation,
+        settings.navigation_sigma,
+        settings.navigation_time,
+        timing.dt,
+    )
     return True
 
 
 @inner
-def _sense(work: Record, heights: Heights) -> bool:  # pragma: no cover - compiled
+def _sense(work: Record, heights: Heights) -> bool:
     """Convert the state to SI and to the map, and look up the ground; return False if it is not a number.
 
     Fill the state, the true motion and the place of a record of `flight.simulation.tick.WORKSPACE`.
@@ -280,7 +282,7 @@ def _sense(work: Record, heights: Heights) -> bool:  # pragma: no cover - compil
 
 
 @inner
-def end_tick(work: Record) -> int:  # pragma: no cover - compiled
+def end_tick(work: Record) -> int:
     """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units.
 
     Return a key of `ENDS`, or 0 to fly on.
@@ -290,14 +292,14 @@ def end_tick(work: Record) -> int:  # pragma: no cover - compiled
 
 
 @inner
-def status_in_air(work: Record) -> int:  # pragma: no cover - compiled
+def status_in_air(work: Record) -> int:
     """Return how a flight in the air has ended: a key of `ENDS`, or 0 to fly on."""
     settings, air = work.settings, work.air
     return _status(work.state, work.memory, work.place.clearance, settings.slowest, air.energy >= settings.battery)
 
 
 @inner
-def fill_tick(work: Record) -> None:  # pragma: no cover - compiled
+def fill_tick(work: Record) -> None:
     """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units."""
     state, true, air, timing, place = work.state, work.true, work.air, work.timing, work.place
     cos, sin = place.north_cos, place.north_sin
@@ -314,7 +316,7 @@ def fill_tick(work: Record) -> None:  # pragma: no cover - compiled
 
 
 @inner
-def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:  # pragma: no cover - compiled
+def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:
     """Track the progress of a return to launch around its loiter, and end the flight after it.
 
     For an autopilot that returns by its own control law and need not follow the path: the flight ends at the path's end
@@ -341,7 +343,7 @@ def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:  #
 
 
 @inner
-def end_around(motion: Record, memory: Record, dt: float) -> None:  # pragma: no cover - compiled
+def end_around(motion: Record, memory: Record, dt: float) -> None:
     """Track the course change since the last waypoint was reached, and end the flight at `AROUND_END`.
 
     The course is used, not the bearing from the waypoint: if the loiter is narrower than the aircraft can turn, it
@@ -361,14 +363,13 @@ def end_around(motion: Record, memory: Record, dt: float) -> None:  # pragma: no
 
 
 @compiled
-def longest_circling(radius: float) -> float:  # pragma: no cover - compiled
+def longest_circling(radius: float) -> float:
     """Return the time after which a return in its loiter of a radius (m) is over in any case, s."""
-    longest: float = LOITER_TIMEOUT_FACTOR * max(UNLIMITED, 2.0 * math.pi * abs(radius) / _CIRCLING_SPEED_MPS)
-    return longest
+    return LOITER_TIMEOUT_FACTOR * max(UNLIMITED, 2.0 * math.pi * abs(radius) / _CIRCLING_SPEED_MPS)
 
 
 @inner
-def _to_si(state: Record, factors: Record) -> bool:  # pragma: no cover - compiled
+def _to_si(state: Record, factors: Record) -> bool:
     """Convert the state to SI; return False if it contains a NaN or an infinity."""
     total = 0.0
     for name in literal_unroll(_STATE_FIELDS):
@@ -379,9 +380,7 @@ def _to_si(state: Record, factors: Record) -> bool:  # pragma: no cover - compil
 
 
 @inner
-def _status(
-    state: Record, memory: Record, clearance: float, slowest: float, empty: bool
-) -> int:  # pragma: no cover - compiled
+def _status(state: Record, memory: Record, clearance: float, slowest: float, empty: bool) -> int:
     if clearance <= 0.0:
         return GROUND
     if abs(state.roll) > STEEPEST_BANK:
@@ -397,9 +396,7 @@ def _status(
 
 
 @inner
-def _set_output(
-    output: Record, commands: Record, air: Record, above: Record, below: Record
-) -> None:  # pragma: no cover - compiled
+def _set_output(output: Record, commands: Record, air: Record, above: Record, below: Record) -> None:
     """Set the outputs in JSBSim's units."""
     output.elevator, output.aileron = commands.elevator, commands.aileron
     output.rudder, output.throttle = commands.rudder, commands.throttle
@@ -412,9 +409,17 @@ def _set_output(
 
 @inner
 def _update_wind(
-    state: Record, wind: Record, gusts: Record, noise: Floats, clearance: float, up: float, turn_cos: float,
-    turn_sin: float, air: Record, dt: float,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    state: Record,
+    wind: Record,
+    gusts: Record,
+    noise: Floats,
+    clearance: float,
+    up: float,
+    turn_cos: float,
+    turn_sin: float,
+    air: Record,
+    dt: float,
+) -> None:
     """Set mean wind and the next gust at this altitude, true north, east and down, in ``air``."""
     speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, up)
     # The wind's map course minus the map course of true north.
@@ -432,9 +437,15 @@ def _update_wind(
 
 @inner
 def _fill_row(
-    row: Record, state: Record, true: Record, commands: Record, memory: Record, time: float,
-    energy: float, clearance: float,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    row: Record,
+    state: Record,
+    true: Record,
+    commands: Record,
+    memory: Record,
+    time: float,
+    energy: float,
+    clearance: float,
+) -> None:
     """Fill one row of the track except the wind, a record of `flight.simulation.track.TRACK_ROW`."""
     row.time = time
     # Element by element: assigning a whole array would check shapes.
@@ -461,7 +472,7 @@ def _fill_row(
 
 
 @inner
-def _fill_wind(row: Record, state: Record, cos: float, sin: float) -> None:  # pragma: no cover - compiled
+def _fill_wind(row: Record, state: Record, cos: float, sin: float) -> None:
     """Set the row's wind in map axes.
 
     cos, sin: of the map course of true north.

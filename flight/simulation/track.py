@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import load_aircraft
+from world.arrays import Floats, Singles
 from world.errors import FlightError
 from world.extras import need_extra
 from world.files import write_whole
 from world.html_table import html_table
 from world.kernels import compiled, field_names, record_dtype
 
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
 Ints = NDArray[np.int32]
 Rows = NDArray[np.record]
 
@@ -211,7 +210,7 @@ def _numbers(rows: Rows) -> Floats:
 
 
 @compiled
-def _round_to_steps(values: Floats, steps: Floats) -> None:  # pragma: no cover - compiled
+def _round_to_steps(values: Floats, steps: Floats) -> None:
     """Round values (t, n) to whole steps; ``steps`` (n,) is the number of steps per unit."""
     for row in range(values.shape[0]):
         for k in range(steps.size):

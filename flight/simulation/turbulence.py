@@ -7,20 +7,16 @@ relative to the scales.
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from flight.dynamics.jsbsim_properties import FOOT
+from world.arrays import Floats
 from world.kernels import Record, inner, record_dtype
-
-Floats = NDArray[np.float64]
 
 # State of the five first-order filters of unit variance: one along the wind, two in series across and down.
 GUST_FILTERS = record_dtype("along", "across_first", "across_second", "down_first", "down_second")
 
 
 @inner
-def dryden_scales(height: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
+def dryden_scales(height: float) -> tuple[float, float, float]:
     """Return length scales L_u = L_v and L_w (m), and sigma_u / sigma_w, at a height above ground (m).
 
     MIL-F-8785C 3.7.3.4 with heights in feet: L_w = h, L_u = h / (0.177 + 0.000823 h)^1.2, sigma_u / sigma_w = 1 /
@@ -44,7 +40,7 @@ def start_gusts(noise: Floats, filters: Record) -> None:
 @inner
 def step_gusts(
     filters: Record, noise: Floats, w20: float, height: float, airspeed: float, dt: float
-) -> tuple[float, float, float]:  # pragma: no cover - compiled
+) -> tuple[float, float, float]:
     """Advance by dt and return the gust along the mean wind, across it to the right, and down, m/s.
 
     filters: a record of `GUST_FILTERS`.
@@ -70,9 +66,7 @@ def step_gusts(
 
 
 @inner
-def _transverse(
-    first: float, second: float, noise: float, decay: float
-) -> tuple[float, float, float]:  # pragma: no cover - compiled
+def _transverse(first: float, second: float, noise: float, decay: float) -> tuple[float, float, float]:
     """Return both lags after a step, and the gust in standard deviations."""
     before = first
     first = decay * before + math.sqrt(1.0 - decay * decay) * noise

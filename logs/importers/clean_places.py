@@ -7,16 +7,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.simulation.setup import Gap, RowFaults
 from flight.simulation.track import LATEST
 from logs.importers.raw_log import LogSeries
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-
+from world.arrays import Flags, Floats, Ints
 
 # ----------------------------------------------------------------------
 # The clock: permanent jumps back are removed, and late rows are sorted.

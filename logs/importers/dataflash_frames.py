@@ -17,12 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.setup import Damage
+from world.arrays import Bytes, Floats, Ints
 from world.kernels import compiled, copy_into, read_only
-
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 
 # ----------------------------------------------------------------------
 # Bytes of a log without its size in memory: mapped, and released piece by piece.
@@ -80,11 +76,28 @@ TRAILING = 528
 # Format letters: numpy type, and the factor that stored numbers are multiplied by (ArduPilot,
 # libraries/AP_Logger/LogStructure.h, "Format characters in the format string").
 FIELDS: dict[str, tuple[str, int]] = {
-    "a": ("S64", 1), "b": ("i1", 1), "B": ("u1", 1), "h": ("<i2", 1), "H": ("<u2", 1), "i": ("<i4", 1), "I": ("<u4", 1),
-    "f": ("<f4", 1), "d": ("<f8", 1), "g": ("<f2", 1), "n": ("S4", 1), "N": ("S16", 1), "Z": ("S64", 1),
-    "c": ("<i2", 100), "C": ("<u2", 100), "e": ("<i4", 100), "E": ("<u4", 100), "L": ("<i4", 10_000_000),
-    "M": ("u1", 1), "q": ("<i8", 1), "Q": ("<u8", 1),
-}  # fmt: skip
+    "a": ("S64", 1),
+    "b": ("i1", 1),
+    "B": ("u1", 1),
+    "h": ("<i2", 1),
+    "H": ("<u2", 1),
+    "i": ("<i4", 1),
+    "I": ("<u4", 1),
+    "f": ("<f4", 1),
+    "d": ("<f8", 1),
+    "g": ("<f2", 1),
+    "n": ("S4", 1),
+    "N": ("S16", 1),
+    "Z": ("S64", 1),
+    "c": ("<i2", 100),
+    "C": ("<u2", 100),
+    "e": ("<i4", 100),
+    "E": ("<u4", 100),
+    "L": ("<i4", 10_000_000),
+    "M": ("u1", 1),
+    "q": ("<i8", 1),
+    "Q": ("<u8", 1),
+}
 
 
 class MessageFormat(NamedTuple):
@@ -292,7 +305,7 @@ def _walk_messages(
     fmt: int,
     trailing: int,
     wanted: NDArray[np.bool_],
-) -> tuple[Ints, Bytes]:  # pragma: no cover - compiled
+) -> tuple[Ints, Bytes]:
     """Return starts and types of wanted messages before a byte, continuing from the state."""
     at, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
     count, end = 0, data.size

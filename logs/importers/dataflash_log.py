@@ -19,10 +19,8 @@ from logs.importers.clean_places import steady_clock
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
 from logs.importers.logged_missions import Item, gather_items, logged_mission, plane_mode
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
+from world.arrays import Floats
 from world.errors import LogError
-
-Floats = NDArray[np.float64]
-
 
 # Missions: the messages CMD, and home from ORGN where they hold none.
 
@@ -82,8 +80,14 @@ def logged_home(origins: Messages) -> Home | None:
 FORMAT = "ArduPilot dataflash log"
 # Vehicle by VER.BT, the vehicle that the program was built for.
 _BUILDS: dict[int, VehicleKind] = {
-    1: "rover", 2: "copter", 3: "plane", 4: "tracker", 7: "submarine", 12: "blimp", 13: "copter"
-}  # fmt: skip
+    1: "rover",
+    2: "copter",
+    3: "plane",
+    4: "tracker",
+    7: "submarine",
+    12: "blimp",
+    13: "copter",
+}
 _PROGRAMS: dict[str, VehicleKind] = {
     "ArduPlane": "plane",
     "ArduCopter": "copter",
@@ -356,9 +360,28 @@ class _Reader:
 
 _DEGREE = math.pi / 180.0
 _READ = (
-    "POS", "AHR2", "GPS", "ATT", "XKF1", "NKF1", "EKF1", "XKF2", "NKF2", "EKF2", "ARSP", "CTUN", "BAT", "CURR",
-    "BARO", "MODE", "CMD", "PARM", "MSG", "VER", "ORGN",
-)  # fmt: skip
+    "POS",
+    "AHR2",
+    "GPS",
+    "ATT",
+    "XKF1",
+    "NKF1",
+    "EKF1",
+    "XKF2",
+    "NKF2",
+    "EKF2",
+    "ARSP",
+    "CTUN",
+    "BAT",
+    "CURR",
+    "BARO",
+    "MODE",
+    "CMD",
+    "PARM",
+    "MSG",
+    "VER",
+    "ORGN",
+)
 _WITH_INSTANCES = frozenset({"GPS", "BARO", "ARSP", "BAT", "XKF1", "XKF2", "NKF1", "NKF2", "EKF1", "EKF2"})
 
 

@@ -9,18 +9,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import Mission
-from flight.simulation.setup import Gap, HeightOffset, Heights, MissionStretch, Quantity, RowFaults
+from flight.simulation.setup import Gap, HeightOffset, MissionStretch, Quantity, RowFaults
 from flight.simulation.track import THROTTLE, Track
 from logs.importers.clean_places import DEGREE, Places, clean_places, find_gaps, metres_between
 from logs.importers.raw_log import COLUMNS, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
+from world.arrays import Floats, Heights
 from world.errors import LogError
 from world.frames import GeoOrigin, to_map
-
-Floats = NDArray[np.float64]
-
 
 # ----------------------------------------------------------------------
 # Flights of a log, and the parts of them that were flown along a mission.
@@ -153,9 +150,13 @@ _MAX_INTERPOLATED_STEPS = 2.5
 # Time at the start over which altitudes are compared, s.
 _COMPARED_TIME_S = 5.0
 _REFUSED: dict[VehicleKind, str] = {
-    "copter": "a copter's", "rover": "a rover's", "boat": "a boat's", "submarine": "a submarine's",
-    "tracker": "an antenna tracker's", "blimp": "a blimp's",
-}  # fmt: skip
+    "copter": "a copter's",
+    "rover": "a rover's",
+    "boat": "a boat's",
+    "submarine": "a submarine's",
+    "tracker": "an antenna tracker's",
+    "blimp": "a blimp's",
+}
 _OPTIONAL_QUANTITIES: tuple[Quantity, ...] = ("velocity", "attitude", "airspeed", "wind", "battery", "throttle")
 _MAX_ROWS = 4_000_000
 

@@ -196,17 +196,52 @@ def _before_jump_out(run: Sequence[MissionItem]) -> Sequence[MissionItem]:
 _PLANE_AUTO = 10
 # ArduPilot, ArduPlane/mode.h, "enum Number"; names as ground stations show them.
 _PLANE_MODES = {
-    0: "MANUAL", 1: "CIRCLE", 2: "STABILIZE", 3: "TRAINING", 4: "ACRO", 5: "FBWA", 6: "FBWB", 7: "CRUISE",
-    8: "AUTOTUNE", 10: "AUTO", 11: "RTL", 12: "LOITER", 13: "TAKEOFF", 14: "AVOID_ADSB", 15: "GUIDED",
-    16: "INITIALISING", 17: "QSTABILIZE", 18: "QHOVER", 19: "QLOITER", 20: "QLAND", 21: "QRTL", 22: "QAUTOTUNE",
-    23: "QACRO", 24: "THERMAL", 25: "LOITERALTQLAND", 26: "AUTOLAND",
-}  # fmt: skip
+    0: "MANUAL",
+    1: "CIRCLE",
+    2: "STABILIZE",
+    3: "TRAINING",
+    4: "ACRO",
+    5: "FBWA",
+    6: "FBWB",
+    7: "CRUISE",
+    8: "AUTOTUNE",
+    10: "AUTO",
+    11: "RTL",
+    12: "LOITER",
+    13: "TAKEOFF",
+    14: "AVOID_ADSB",
+    15: "GUIDED",
+    16: "INITIALISING",
+    17: "QSTABILIZE",
+    18: "QHOVER",
+    19: "QLOITER",
+    20: "QLAND",
+    21: "QRTL",
+    22: "QAUTOTUNE",
+    23: "QACRO",
+    24: "THERMAL",
+    25: "LOITERALTQLAND",
+    26: "AUTOLAND",
+}
 # PX4's vehicle_status.nav_state (PX4, msg/VehicleStatus.msg).
 _PX4_MISSION = 3
 _PX4_STATES = {
-    0: "MANUAL", 1: "ALTCTL", 2: "POSCTL", 3: "MISSION", 4: "LOITER", 5: "RTL", 8: "FREE", 10: "ACRO",
-    12: "DESCEND", 13: "TERMINATION", 14: "OFFBOARD", 15: "STAB", 17: "TAKEOFF", 18: "LAND", 21: "ORBIT",
-}  # fmt: skip
+    0: "MANUAL",
+    1: "ALTCTL",
+    2: "POSCTL",
+    3: "MISSION",
+    4: "LOITER",
+    5: "RTL",
+    8: "FREE",
+    10: "ACRO",
+    12: "DESCEND",
+    13: "TERMINATION",
+    14: "OFFBOARD",
+    15: "STAB",
+    17: "TAKEOFF",
+    18: "LAND",
+    21: "ORBIT",
+}
 # Main modes of PX4's custom_mode, and the sub-modes of AUTO (PX4, src/modules/commander/px4_custom_mode.h).
 _PX4_AUTO = 4
 _PX4_AUTO_MISSION = 4

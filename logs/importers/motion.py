@@ -9,11 +9,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from logs.importers.raw_log import VehicleKind
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Number of servo outputs of `MotionLog.outputs`.
 OUTPUTS = 14

@@ -15,9 +15,24 @@ from world.extras import need_extra
 
 _DEGREE = math.pi / 180.0
 _NAMES = (
-    "IMU", "RCOU", "ATT", "XKF1", "NKF1", "XKF2", "NKF2", "ARSP", "CTUN", "POS", "BAT", "CURR", "MODE", "PARM", "MSG",
-    "VER", "ORGN",
-)  # fmt: skip
+    "IMU",
+    "RCOU",
+    "ATT",
+    "XKF1",
+    "NKF1",
+    "XKF2",
+    "NKF2",
+    "ARSP",
+    "CTUN",
+    "POS",
+    "BAT",
+    "CURR",
+    "MODE",
+    "PARM",
+    "MSG",
+    "VER",
+    "ORGN",
+)
 _INSTANCES = ("I", "C", "Inst", "Instance")
 
 

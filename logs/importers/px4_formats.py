@@ -13,8 +13,11 @@ from world.errors import LogError
 MAX_FIELDS = 300_000
 _FIELD = re.compile(r"(\w+)(?:\[(\d{1,9})\])? ")
 _PLAIN = frozenset(f"{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16, 32, 64)) | {
-    "float", "double", "bool", "char",
-}  # fmt: skip
+    "float",
+    "double",
+    "bool",
+    "char",
+}
 
 
 class MessageFormats:

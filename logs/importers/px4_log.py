@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 from pyulog import ULog
 
 from flight.mission.items import Home, Mission, MissionItem, item_problem, on_grid
@@ -23,12 +22,9 @@ from logs.importers.logged_missions import px4_items, px4_state, without_gaps
 from logs.importers.px4_formats import MessageFormats
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from world.address_space import AddressSpaceError
+from world.arrays import Bytes, Ints
 from world.errors import LogError
 from world.kernels import compiled, read_only
-
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 FORMAT = "PX4 log"
 # Bytes before the first record.
@@ -36,13 +32,28 @@ _HEADER = 16
 # Letters of all records (PX4, "ULog File Format").
 _LETTERS = b"BFIMPQARDLCSO"
 _TOPICS = [
-    "vehicle_global_position", "vehicle_local_position", "vehicle_attitude", "airspeed_validated", "airspeed", "wind",
-    "wind_estimate", "battery_status", "vehicle_status", "navigator_mission_item", "vehicle_gps_position", "sensor_gps",
-    "vehicle_air_data", "actuator_controls_0", "vehicle_thrust_setpoint", "home_position", "mission_result",
-]  # fmt: skip
+    "vehicle_global_position",
+    "vehicle_local_position",
+    "vehicle_attitude",
+    "airspeed_validated",
+    "airspeed",
+    "wind",
+    "wind_estimate",
+    "battery_status",
+    "vehicle_status",
+    "navigator_mission_item",
+    "vehicle_gps_position",
+    "sensor_gps",
+    "vehicle_air_data",
+    "actuator_controls_0",
+    "vehicle_thrust_setpoint",
+    "home_position",
+    "mission_result",
+]
 # Vehicle by vehicle_status.vehicle_type.
 _TYPES: dict[int, VehicleKind] = {1: "copter", 2: "plane", 3: "rover", 4: "blimp"}
-_AMSL, _OVER_HOME = 0, 3
+_AMSL = 0
+_OVER_HOME = 3
 # Limits of degrees and m beyond which a home is invalid; each is checked again where the mission is placed.
 _PLACE = np.array([90.0, 180.0, 10_000.0])
 # Numbers of items are 16 bits.
@@ -135,7 +146,7 @@ _CUT = 4
 
 
 @compiled
-def _walk(data: Bytes, until: int, state: Ints, letters: Bytes) -> None:  # pragma: no cover - compiled
+def _walk(data: Bytes, until: int, state: Ints, letters: Bytes) -> None:
     """Continue a walk from its state up to a byte."""
     known = np.zeros(256, np.bool_)
     for letter in letters:

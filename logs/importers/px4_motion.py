@@ -9,29 +9,46 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from logs.importers.motion import MotionLog, Samples, first_on_ground, rising
 from logs.importers.px4_log import Topics, open_topics
+from world.arrays import Flags, Floats
 from world.errors import LogError
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
 _TOPICS = [
-    "sensor_combined", "vehicle_angular_velocity", "vehicle_acceleration", "vehicle_attitude", "vehicle_local_position",
-    "vehicle_global_position", "airspeed_validated", "wind", "wind_estimate", "actuator_servos", "actuator_motors",
-    "actuator_controls_0", "battery_status", "vehicle_status", "home_position", "flaps_setpoint", "spoilers_setpoint",
-]  # fmt: skip
+    "sensor_combined",
+    "vehicle_angular_velocity",
+    "vehicle_acceleration",
+    "vehicle_attitude",
+    "vehicle_local_position",
+    "vehicle_global_position",
+    "airspeed_validated",
+    "wind",
+    "wind_estimate",
+    "actuator_servos",
+    "actuator_motors",
+    "actuator_controls_0",
+    "battery_status",
+    "vehicle_status",
+    "home_position",
+    "flaps_setpoint",
+    "spoilers_setpoint",
+]
 NONE = Samples(np.zeros(0), np.zeros((0, 1)))
 # CA_AIRFRAME of a fixed wing.
 _WING = 1
 # CA_AIRFRAME of a fixed wing with additional lifting motors, which are its first rotors.
 _STANDARD_VTOL = 2
 _AIRFRAMES = {
-    0: "a multirotor", 3: "a tiltrotor", 4: "a tailsitter", 5: "a rover", 6: "a rover", 7: "a craft without wings",
-    8: "a multirotor", 9: "a custom airframe",
-}  # fmt: skip
+    0: "a multirotor",
+    3: "a tiltrotor",
+    4: "a tailsitter",
+    5: "a rover",
+    6: "a rover",
+    7: "a craft without wings",
+    8: "a multirotor",
+    9: "a custom airframe",
+}
 # CA_SV_CSn_TYPE.
 _MODELLED = frozenset({1, 2, 3, 4, 5, 6, 15})
 _ELEVONS = frozenset({5, 6})
@@ -52,10 +69,12 @@ _SERVOS = 8
 _MOTORS = 12
 # ArduPlane's parameters by PX4's names, with conversion factors.
 _PARAMETERS: Mapping[str, tuple[str, float]] = {
-    "FW_AIRSPD_MIN": ("AIRSPEED_MIN", 1.0), "FW_AIRSPD_TRIM": ("AIRSPEED_CRUISE", 1.0),
-    "FW_AIRSPD_MAX": ("AIRSPEED_MAX", 1.0), "FW_R_LIM": ("ROLL_LIMIT_DEG", 1.0),
+    "FW_AIRSPD_MIN": ("AIRSPEED_MIN", 1.0),
+    "FW_AIRSPD_TRIM": ("AIRSPEED_CRUISE", 1.0),
+    "FW_AIRSPD_MAX": ("AIRSPEED_MAX", 1.0),
+    "FW_R_LIM": ("ROLL_LIMIT_DEG", 1.0),
     "FW_THR_TRIM": ("TRIM_THROTTLE", 100.0),
-}  # fmt: skip
+}
 
 
 def read_px4_motion(path: Path, digest: str) -> MotionLog:
@@ -217,8 +236,10 @@ def _pushers(topics: Topics, airframe: int, parameters: Mapping[str, float], mot
     count = int(np.clip(parameters.get("CA_ROTOR_COUNT", 0.0), 0.0, _MOTORS))
     if airframe == _STANDARD_VTOL:
         # The axis of a rotor is up by default.
-        axes = [[abs(parameters.get(f"CA_ROTOR{k}_A{axis}", up)) for axis, up in (("X", 0.0), ("Z", 1.0))]
-                for k in range(count)]  # fmt: skip
+        axes = [
+            [abs(parameters.get(f"CA_ROTOR{k}_A{axis}", up)) for axis, up in (("X", 0.0), ("Z", 1.0))]
+            for k in range(count)
+        ]
         ahead = [k for k, (x, z) in enumerate(axes) if x > z]
         if not ahead:
             allowed = "one with |CA_ROTORn_AX| over |CA_ROTORn_AZ| is expected"

@@ -6,13 +6,11 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
 from flight.simulation.setup import Damage, MissingItems, VerticalDatum
+from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
-
-Floats = NDArray[np.float64]
 
 # Kind of the vehicle; "unknown" if not logged.
 VehicleKind = Literal["plane", "copter", "rover", "boat", "submarine", "tracker", "blimp", "unknown"]

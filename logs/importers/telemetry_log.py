@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flight.guidance.equivalent_airspeed import true_by_equivalent
@@ -32,10 +31,8 @@ from logs.importers.logged_missions import (
     without_gaps,
 )
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
+from world.arrays import Floats
 from world.errors import LogError
-
-Floats = NDArray[np.float64]
-
 
 # ----------------------------------------------------------------------
 # The messages of a telemetry log (`.tlog`): each a time of eight bytes, and a MAVLink packet as it was received.
@@ -232,10 +229,29 @@ _NUMBERS = frozenset(number for number, kind in dialect.mavlink_map.items() if k
 _MAX_ITEMS = 200_000
 # Vehicle kinds by MAV_TYPE; a type that is not listed is unknown.
 _TYPES: dict[int, VehicleKind] = {
-    1: "plane", 16: "plane", 19: "plane", 20: "plane", 21: "plane", 22: "plane", 23: "plane", 24: "plane", 25: "plane",
-    2: "copter", 3: "copter", 4: "copter", 13: "copter", 14: "copter", 15: "copter", 29: "copter", 35: "copter",
-    5: "tracker", 7: "blimp", 10: "rover", 11: "boat", 12: "submarine",
-}  # fmt: skip
+    1: "plane",
+    16: "plane",
+    19: "plane",
+    20: "plane",
+    21: "plane",
+    22: "plane",
+    23: "plane",
+    24: "plane",
+    25: "plane",
+    2: "copter",
+    3: "copter",
+    4: "copter",
+    13: "copter",
+    14: "copter",
+    15: "copter",
+    29: "copter",
+    35: "copter",
+    5: "tracker",
+    7: "blimp",
+    10: "rover",
+    11: "boat",
+    12: "submarine",
+}
 # MAV_TYPE of ground stations, onboard computers, gimbals, receivers for other traffic.
 _NO_VEHICLES = (6, 18, 26, 27)
 _NOT_AUTOPILOTS = (8, 18)

@@ -130,11 +130,16 @@ def _routes(found: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
         heights = all(point.elevation is not None for point in route.points)
         items = tuple(
             MissionItem(
-                number, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4,
-                on_grid(point.latitude), on_grid(point.longitude), float(point.elevation or 0.0),
+                number,
+                int(Command.NAV_WAYPOINT),
+                int(Frame.GLOBAL),
+                (0.0,) * 4,
+                on_grid(point.latitude),
+                on_grid(point.longitude),
+                float(point.elevation or 0.0),
             )
             for number, point in enumerate(route.points, 1)
-        )  # fmt: skip
+        )
         if len(items) > 1:
             mission = Mission(None, items, source=f"{source}: route {route.name or ''}".rstrip())
             made.append(LoggedMission(0.0, mission, "route", heights))

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import Envelope
 from flight.mission.items import Command, Mission, MissionItem
@@ -13,14 +12,15 @@ from flight.simulation.track import COLUMNS, Track
 from logs.recording.reader import FlightLog, LogEvent
 from logs.recording.recorder import Recorder
 from logs.recording.setup_attachments import package_versions
+from world.arrays import Floats
 from world.frames import to_geo
 from world.scenario import Scenario, from_spec
 
-Floats = NDArray[np.float64]
-
 # Two legs and a turn of 14 degrees between them, east, north, up in m.
 _WAYPOINTS = np.array([[-500.0, 0.0, 200.0], [0.0, 0.0, 200.0], [400.0, 100.0, 220.0]])
-_AIRSPEED, _RATE_HZ = 25.0, 10.0  # m/s
+# m/s
+_AIRSPEED = 25.0
+_RATE_HZ = 10.0
 _SCENARIO = {
     "name": "example",
     "terrain": {"kind": "flat", "amsl_m": 100.0},

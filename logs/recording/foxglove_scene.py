@@ -31,19 +31,19 @@ from logs.recording.state_channel import length_delimited, repeated_submessages
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.returns.glide_footprint import BAND_ROLES, Part
 from world.airspace.zones_on_map import zone_walls
+from world.arrays import Floats, Singles
 from world.scenario import Scenario
 from world.terrain import Terrain
 from world.threats import Threats
 
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
-
-MAP, AIRCRAFT = "map", "aircraft"
+MAP = "map"
+AIRCRAFT = "aircraft"
 LEVELS = {"debug": Log.DEBUG, "info": Log.INFO, "warning": Log.WARNING, "error": Log.ERROR, "fatal": Log.FATAL}
 MAX_VERTICES = 80  # a side of the terrain mesh
 
 
-_XYZ, _RGBA = "xyz", "rgba"
+_XYZ = "xyz"
+_RGBA = "rgba"
 # Fields of SceneEntity, LinePrimitive and TriangleListPrimitive.
 _ENTITY_LINES = SceneEntity.LINES_FIELD_NUMBER
 _ENTITY_TRIANGLES = SceneEntity.TRIANGLES_FIELD_NUMBER
@@ -51,15 +51,21 @@ _LINE_POINTS = LinePrimitive.POINTS_FIELD_NUMBER
 _MESH_POINTS = TriangleListPrimitive.POINTS_FIELD_NUMBER
 _MESH_COLOURS = TriangleListPrimitive.COLORS_FIELD_NUMBER
 
-_LOW, _HIGH = (np.array(theme.rgb(text)) for text in (theme.GROUND[0], theme.GROUND[-2]))
+_LOW = np.array(theme.rgb(theme.GROUND[0]))
+_HIGH = np.array(theme.rgb(theme.GROUND[-2]))
 # Scenes stand on black: the theme's colours for dark ground.
-_KILL, _DETECTION = theme.rgba("missile", 0.35, dark=True), theme.rgba("radar", 0.15, dark=True)
-_PLAN, _TRACK = theme.rgba("planned", dark=True), theme.rgba("flown", dark=True)
-_KEEP_OUT, _STAY_IN = theme.rgba("zone", dark=True), theme.rgba("highlight", dark=True)
+_KILL = theme.rgba("missile", 0.35, dark=True)
+_DETECTION = theme.rgba("radar", 0.15, dark=True)
+_PLAN = theme.rgba("planned", dark=True)
+_TRACK = theme.rgba("flown", dark=True)
+_KEEP_OUT = theme.rgba("zone", dark=True)
+_STAY_IN = theme.rgba("highlight", dark=True)
 # A name stands so far above the ground within this of its place, m.
-_LIFT, _NEAR = 40.0, 300.0
+_LIFT = 40.0
+_NEAR = 300.0
 # The way's colour lies so far below the flight, an outline on the ground so far above it, m.
-_BELOW, _OVER_GROUND = 6.0, 4.0
+_BELOW = 6.0
+_OVER_GROUND = 4.0
 # Upright lines of one outline of a zone, about.
 MAX_POSTS = 24
 
@@ -198,8 +204,7 @@ def track_scene(time_ns: int, positions: Floats) -> bytes:
 
 
 def _update(entity: SceneEntity) -> bytes:
-    data: bytes = SceneUpdate(entities=[entity]).SerializeToString(deterministic=True)
-    return data
+    return SceneUpdate(entities=[entity]).SerializeToString(deterministic=True)
 
 
 def _entity(time_ns: int, name: str) -> SceneEntity:
@@ -296,7 +301,8 @@ SPAN = 100.0
 MEDIA_TYPE = "model/gltf-binary"
 
 # Forward, left, up in spans.
-_NOSE, _TAIL = (0.45, 0.0, 0.0), (-0.46, 0.0, 0.03)
+_NOSE = (0.45, 0.0, 0.0)
+_TAIL = (-0.46, 0.0, 0.03)
 _RING = ((0.12, 0.05, 0.0), (0.12, 0.0, 0.06), (0.12, -0.05, 0.0), (0.12, 0.0, -0.05))
 _BODY = [
     *([_NOSE, _RING[k], _RING[(k + 1) % 4]] for k in range(4)),
@@ -313,7 +319,10 @@ _PARTS = tuple(
     for triangles, text in zip((_BODY, _LEFT, _RIGHT), theme.AIRCRAFT_PARTS, strict=True)
 )
 # Chunk types of a .glb, and glTF's numbers for float32 and for what a buffer's view is used for.
-_JSON, _BIN, _FLOAT, _VERTICES = b"JSON", b"BIN\0", 5126, 34962
+_JSON = b"JSON"
+_BIN = b"BIN\0"
+_FLOAT = 5126
+_VERTICES = 34962
 
 
 def model_corners() -> Singles:
@@ -339,10 +348,14 @@ def aircraft_glb() -> bytes:
         views.append({"buffer": 0, "byteOffset": len(pieces), "byteLength": len(data), "target": _VERTICES})
         accessors.append(
             {
-                "bufferView": number, "componentType": _FLOAT, "count": len(points), "type": "VEC3",
-                "min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist(),
+                "bufferView": number,
+                "componentType": _FLOAT,
+                "count": len(points),
+                "type": "VEC3",
+                "min": points.min(axis=0).tolist(),
+                "max": points.max(axis=0).tolist(),
             }
-        )  # fmt: skip
+        )
         primitives.append({"attributes": {"POSITION": number}, "material": number, "mode": 4})
         surface = {"baseColorFactor": list(colour), "metallicFactor": 0.0, "roughnessFactor": 0.9}
         materials.append({"pbrMetallicRoughness": surface, "doubleSided": True})
@@ -376,8 +389,7 @@ def aircraft_scene(time_ns: int) -> bytes:
     entity = SceneEntity(
         timestamp=timestamp(time_ns), frame_id=AIRCRAFT, id="aircraft", frame_locked=True, models=[model]
     )
-    data: bytes = SceneUpdate(entities=[entity]).SerializeToString(deterministic=True)
-    return data
+    return SceneUpdate(entities=[entity]).SerializeToString(deterministic=True)
 
 
 # ----------------------------------------------------------------------

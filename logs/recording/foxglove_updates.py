@@ -27,12 +27,10 @@ from logs.recording.state_channel import (
     submessage,
     tagged_doubles,
 )
+from world.arrays import Floats, Ints
 from world.frames import GeoOrigin, to_geo
 from world.scenario import Scenario
 from world.threats import Threats
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # ----------------------------------------------------------------------
 # The flown track as a growing line: every 2 s the whole track, in a bounded number of points.
@@ -169,8 +167,11 @@ def _bytes(role: str) -> Colour:
     return red, green, blue, opacity
 
 
-_PLAN, _TRACK, _AIRCRAFT = _bytes("planned"), _bytes("flown"), _bytes("highlight")
-_KILL, _DETECTION = _bytes("missile"), _bytes("radar")
+_PLAN = _bytes("planned")
+_TRACK = _bytes("flown")
+_AIRCRAFT = _bytes("highlight")
+_KILL = _bytes("missile")
+_DETECTION = _bytes("radar")
 # Distance between points of a line, m.
 _POINT_SPACING_M = 30.0
 # Greatest number of points of a line.
@@ -205,8 +206,7 @@ def cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.uint8] |
         ],
         data=packed.tobytes(),
     )
-    data: bytes = message.SerializeToString(deterministic=True)
-    return data
+    return message.SerializeToString(deterministic=True)
 
 
 def ground_cloud(time_ns: int, scenario: Scenario) -> bytes:
@@ -267,10 +267,15 @@ def along(waypoints: Floats) -> Floats:
 # ----------------------------------------------------------------------
 # The moving part of views: the pose five times a second, a fix each second, and the track.
 
-TF_TOPIC, FIX_TOPIC, TRACK_TOPIC, TRACK_POINTS = "/tf", "/fix", "/scene/track", "/points/track"
+TF_TOPIC = "/tf"
+FIX_TOPIC = "/fix"
+TRACK_TOPIC = "/scene/track"
+TRACK_POINTS = "/points/track"
 
 _SLOT_NS = 200_000_000  # one transform in each, 5 Hz; one fix a second
-_XYZ, _XYZW, _GEO = "xyz", "xyzw", ("latitude", "longitude", "altitude")
+_XYZ = "xyz"
+_XYZW = "xyzw"
+_GEO = ("latitude", "longitude", "altitude")
 # The points of the track: least time between messages, s, and ratio of their times, which limits their number.
 _MIN_CLOUD_INTERVAL_S = 10.0
 _CLOUD_RATIO = 1.05

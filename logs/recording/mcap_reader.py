@@ -183,8 +183,7 @@ def _decompressed(chunk: Chunk, size: int) -> bytes:
     """Return the bytes of a chunk, at most one more than ``size``: decompress() would trust the size in the frame."""
     if chunk.compression == "zstd":
         reader = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(chunk.data, read_across_frames=True)
-        found: bytes = reader.read(size + 1)
-        return found
+        return reader.read(size + 1)
     if chunk.compression == "lz4" and chunk.data:
         found = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
         return found

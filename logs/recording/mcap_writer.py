@@ -31,12 +31,10 @@ from mcap.records import (
 from numpy.typing import NDArray
 
 from logs.recording.mcap_reader import FRAME, MAGIC, record_stream, records
+from world.arrays import Bytes, Floats, Ints
 from world.kernels import compiled, copy_into, inner
 
 Index = NDArray[np.uint64]
-Bytes = NDArray[np.uint8]
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 Entries = NDArray[np.void]  # of ENTRY
 Chunks = NDArray[np.void]  # of CHUNK
 ChannelIndexes = NDArray[np.void]  # of CHANNEL_INDEX
@@ -45,7 +43,9 @@ _MESSAGE = struct.Struct("<HIQ")
 # Before a chunk's compression: its times, size and CRC.
 _CHUNK = struct.Struct("<QQQI")
 # Times, offset and length of a chunk, and the length of its table of message indexes; a line of that; its sizes.
-_CHUNK_INDEX, _OFFSET, _SIZES = struct.Struct("<QQQQI"), struct.Struct("<HQ"), struct.Struct("<QQ")
+_CHUNK_INDEX = struct.Struct("<QQQQI")
+_OFFSET = struct.Struct("<HQ")
+_SIZES = struct.Struct("<QQ")
 _COMPRESSION = b"\x04\x00\x00\x00zstd"
 _PAIRS_HEAD = 6  # channel and length, before a message index's pairs
 

@@ -17,7 +17,6 @@ from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
-from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import COLUMNS, LATEST, TRACK_ROW, Rows, Track, join_rows, track_rows
@@ -56,6 +55,7 @@ from logs.verdict.places import ReferenceFlights
 from logs.verdict.reference_flights import reference_flights_json
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict, verdict_json
+from world.arrays import Ints
 
 CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"
@@ -77,9 +77,6 @@ _CHANNELS: dict[str, Any] = {
     **{f"/points/{name}": PointCloud for name in ("terrain", "threats", "plan", "aircraft")},
     TRACK_POINTS: PointCloud,
 }
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Recorder:

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from flight.simulation.track import COLUMN_NAMES, COLUMNS, Track
 from logs.recording.mcap_writer import MESSAGE_HEADER, MESSAGE_OPCODE
+from world.arrays import Bytes, Floats
 from world.kernels import compiled
 
-Floats = NDArray[np.float64]
 Encoded = NDArray[np.void]
-Bytes = NDArray[np.uint8]
 StateRecords = NDArray[np.void]
 
 
@@ -33,7 +32,9 @@ if TYPE_CHECKING:
 # Message objects of the protobuf library cost some microseconds each: ten thousand of them as much as minutes of
 # flight.
 
-_FIXED64, _LENGTH_DELIMITED = 1, 2  # wire types
+# wire types
+_FIXED64 = 1
+_LENGTH_DELIMITED = 2
 
 
 def tagged_doubles(names: Sequence[str]) -> list[tuple[str, str]]:

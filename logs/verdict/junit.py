@@ -23,9 +23,14 @@ def junit_text(verdicts: Mapping[str, Presentation]) -> str:
         cases = [_answer_case(verdict), *_finding_cases(verdict.findings)]
         counts = Counter(child.tag for case in cases for child in case)
         suite = ElementTree.SubElement(
-            root, "testsuite", name=_plain(name), tests=str(len(cases)), failures=str(counts["failure"]),
-            errors="0", skipped=str(counts["skipped"]),
-        )  # fmt: skip
+            root,
+            "testsuite",
+            name=_plain(name),
+            tests=str(len(cases)),
+            failures=str(counts["failure"]),
+            errors="0",
+            skipped=str(counts["skipped"]),
+        )
         suite.extend(cases)
         ElementTree.SubElement(suite, "system-out").text = _plain(
             "\n".join([verdict.headline, *verdict.details]), keep="\n"

@@ -12,9 +12,7 @@ from world.json_schema import DocumentConfig
 
 # "flight", "mission" and "plan" are the whole of each; "missile" and "radar" are a threat's two spheres; "exclusion"
 # and "inclusion" are zones of airspace.
-PlaceKind = Literal[
-    "flight", "mission", "plan", "leg", "waypoint", "missile", "radar", "exclusion", "inclusion"
-]  # fmt: skip
+PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "radar", "exclusion", "inclusion"]
 
 # Quantity of a change.  To another value: a leg's "length", its "rise" (negative: it falls), "airspeed", the largest
 # "turn".  By a step: "height" or "descent" (higher, lower) of a leg, or of the path at a zone; "inset" of the path from
@@ -22,9 +20,24 @@ PlaceKind = Literal[
 # By a factor: the "battery" or the "tank".  Not of a plan, but of the knowledge about the aircraft: the duration of a
 # flight at "full throttle" or with "no throttle" that measures its ability.
 Quantity = Literal[
-    "length", "rise", "airspeed", "turn", "height", "descent", "inset", "distance", "north", "east", "south", "west",
-    "duration", "battery", "tank", "full throttle", "no throttle",
-]  # fmt: skip
+    "length",
+    "rise",
+    "airspeed",
+    "turn",
+    "height",
+    "descent",
+    "inset",
+    "distance",
+    "north",
+    "east",
+    "south",
+    "west",
+    "duration",
+    "battery",
+    "tank",
+    "full throttle",
+    "no throttle",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +60,9 @@ class Place(DocumentConfig):
     """Of a leg or waypoint, as the text counts them: corners of one loiter are one stop."""
 
 
-FLIGHT, MISSION, PLAN = Place("flight"), Place("mission"), Place("plan")
+FLIGHT = Place("flight")
+MISSION = Place("mission")
+PLAN = Place("plan")
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import aircraft_slopes, turn_radius_between
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding
@@ -44,9 +43,6 @@ from logs.verdict.tolerances import (
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.kernels import Records
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
-
 
 # ----------------------------------------------------------------------
 # The side on which a path should pass a zone: the least shift of its legs there that ends the violation.

@@ -7,15 +7,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from aircraft.envelope import Envelope, turn_radius
 from flight.dynamics.characteristics import TRIM_AMSL, Mode, StepResponse, TrimRow
 from logs import theme
 from logs.views.drawing import clean_style, new_figure
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 _BANKS_DEG = (15, 20, 30, 40)
 _WINDS = (-10.0, -5.0, 0.0, 5.0, 10.0)
@@ -190,10 +188,14 @@ def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool)
                 continue
             # Filled at the fastest speed, so that the way over speed can be followed.
             axes.plot(
-                mode.root.real, mode.root.imag, _MARKS[mode.name], color=_MODE_COLORS[mode.name], markersize=5,
+                mode.root.real,
+                mode.root.imag,
+                _MARKS[mode.name],
+                color=_MODE_COLORS[mode.name],
+                markersize=5,
                 markerfacecolor=_MODE_COLORS[mode.name] if fastest else theme.colour("paper"),
                 label=None if mode.name in labelled else mode.name,
-            )  # fmt: skip
+            )
             labelled.add(mode.name)
     axes.axvline(0.0, color=theme.colour("area"), linewidth=0.8)
     slow_or_fast = f"from {min(modes):g} m/s (hollow) to {max(modes):g} m/s (filled)" if modes else ""

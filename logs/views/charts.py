@@ -12,7 +12,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
+from world.arrays import Floats
+
 Indices = NDArray[np.intp]
 Json = dict[str, Any]
 

@@ -9,9 +9,10 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.measures.route_requirements import with_fence_zones
-from logs.views.charts import Chart, Floats, Layer, Panel, filled_series, leg_marks, series, shorten
+from logs.views.charts import Chart, Layer, Panel, filled_series, leg_marks, series, shorten
 from logs.views.map import DrawnTrack, MapChart, NamedWind, map_chart
 from logs.views.time_series import doubles
+from world.arrays import Floats
 
 # Roles of the first and the second flight.
 ROLES = ("flown", "other")

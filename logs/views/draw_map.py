@@ -12,14 +12,20 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import FuncFormatter, MultipleLocator
 
 from logs import theme
-from logs.views.charts import Floats, legend_entries, nice_step, shorten
+from logs.views.charts import legend_entries, nice_step, shorten
 from logs.views.drawing import WIDTH, clean_style, draw_layers, draw_legend, legend_handle, new_figure, write_labels
 from logs.views.map import MapChart, NamedWind
 from logs.views.relief import relief
+from world.arrays import Floats
 from world.terrain import Terrain
 
 # Inches: the map's own width, what stands around it, its legend, and the column beside it.
-_LEFT, _MAP_WIDTH, _TOP, _BOTTOM, _LEGEND, _COLUMN = 0.72, 7.72, 0.5, 0.55, 1.0, 8.72
+_LEFT = 0.72
+_MAP_WIDTH = 7.72
+_TOP = 0.5
+_BOTTOM = 0.55
+_LEGEND = 1.0
+_COLUMN = 8.72
 # Inches of a line of the legend.
 _LEGEND_LINE = 0.165
 _MIN_HEIGHT = 3.6

@@ -14,21 +14,28 @@ from numpy.typing import NDArray
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs import theme
-from logs.views.charts import Floats, Label, LabelRank, Layer, LayerKind, LegendEntry, shorten
+from logs.views.charts import Label, LabelRank, Layer, LayerKind, LegendEntry, shorten
 from logs.views.drawing import WIDTH, clean_style, draw_legend, legend_handle, new_figure, write_label
 from logs.views.failures import Failures, route_distance, route_samples
 from logs.views.labels import LabelPlacer
 from logs.views.scene import GroundGrid, SceneView, drawn_rows, exaggeration, ground_grid, scene_bounds
 from world.airspace.zones_on_map import zone_walls
+from world.arrays import Floats
 from world.terrain import Terrain
 
-_LEFT, _RIGHT, _TOP, _BOTTOM = 0.15, 0.15, 0.5, 0.8
+_LEFT = 0.15
+_RIGHT = 0.15
+_TOP = 0.5
+_BOTTOM = 0.8
 _ELEVATION = math.radians(36.0)
-_MAX_CELLS, _MAX_TRACK = 130, 1600
+_MAX_CELLS = 130
+_MAX_TRACK = 1600
 # Of the ground drawn, the shorter side of the longer one, at least; what is narrower is seen from this much further
 # round, rad.
-_MIN_SIDE, _ASLANT = 0.3, math.radians(45.0)
-_MAX_NUMBERS, _MAX_NAMES = 40, 30
+_MIN_SIDE = 0.3
+_ASLANT = math.radians(45.0)
+_MAX_NUMBERS = 40
+_MAX_NAMES = 30
 
 
 @dataclass(frozen=True, slots=True)

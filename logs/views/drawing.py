@@ -56,9 +56,18 @@ _SETTINGS: Any = {
     "svg.hashsalt": "planfly",
 }
 # Inches around the panels and between them; right of panels that have legends of their own there.
-_LEFT, _RIGHT, _TOP, _PLAIN_TOP, _BOTTOM, _GAP, _OWN_AXIS_GAP, _LEGENDS = 0.85, 0.25, 0.72, 0.58, 0.6, 0.2, 0.62, 2.15
+_LEFT = 0.85
+_RIGHT = 0.25
+_TOP = 0.72
+_PLAIN_TOP = 0.58
+_BOTTOM = 0.6
+_GAP = 0.2
+_OWN_AXIS_GAP = 0.62
+_LEGENDS = 2.15
 # Inches: the legend above panels that share it, a line of one below them, and from a panel to the middle of its label.
-_SHARED_LEGEND, _LEGEND_LINE, _LABEL = 0.28, 0.2, 0.44
+_SHARED_LEGEND = 0.28
+_LEGEND_LINE = 0.2
+_LABEL = 0.44
 _MARKERS = {"circle": "o", "triangle": "^", "star": "*", "cross": "x"}
 # Waypoints and legs that an axis can number.
 _MAX_TICKS = 45
@@ -344,9 +353,15 @@ def _draw_line(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
     blot = layer.role == "failing-leg" and np.hypot(np.ptp(layer.x), np.ptp(layer.y)) < 0.02 * np.ptp(axes.get_xlim())
     cap = "round" if blot or layer.role in ("planned", "inside") else "butt"
     (line,) = axes.plot(
-        layer.x, layer.y, color=look.light, linewidth=look.width, linestyle=_dashes(look, layer.dashed),
-        solid_capstyle=cap, solid_joinstyle="round", **more,
-    )  # fmt: skip
+        layer.x,
+        layer.y,
+        color=look.light,
+        linewidth=look.width,
+        linestyle=_dashes(look, layer.dashed),
+        solid_capstyle=cap,
+        solid_joinstyle="round",
+        **more,
+    )
     if look.halo:
         rim = patheffects.Stroke(linewidth=look.width + 1.2, foreground=theme.colour("paper"), alpha=0.8)
         line.set_path_effects([rim, patheffects.Normal()])
@@ -366,9 +381,12 @@ def _draw_band(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
 def _area_look(look: theme.Look) -> dict[str, Any]:
     edge = (theme.colour(look.edge) if look.edge else look.light) if look.width or look.hatch else "none"
     return {
-        "facecolor": (*theme.rgb(look.light), look.fill), "edgecolor": edge, "linewidth": look.width,
-        "linestyle": _dashes(look), "hatch": look.hatch or None,
-    }  # fmt: skip
+        "facecolor": (*theme.rgb(look.light), look.fill),
+        "edgecolor": edge,
+        "linewidth": look.width,
+        "linestyle": _dashes(look),
+        "hatch": look.hatch or None,
+    }
 
 
 def _draw_area(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
@@ -403,9 +421,15 @@ def _draw_rings(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
 
 def _ring_look(look: theme.Look) -> dict[str, Any]:
     return {
-        "marker": "o", "linestyle": "", "markersize": look.size, "mfc": "none", "mec": look.light, "mew": look.width,
-        "color": look.light, "clip_on": False,
-    }  # fmt: skip
+        "marker": "o",
+        "linestyle": "",
+        "markersize": look.size,
+        "mfc": "none",
+        "mec": look.light,
+        "mew": look.width,
+        "color": look.light,
+        "clip_on": False,
+    }
 
 
 def _draw_dashes(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
@@ -413,9 +437,14 @@ def _draw_dashes(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None
 
 
 _DRAWERS: dict[str, Any] = {
-    "line": _draw_line, "band": _draw_band, "area": _draw_area, "bars": _draw_bars, "dots": _draw_dots,
-    "rings": _draw_rings, "dashes": _draw_dashes,
-}  # fmt: skip
+    "line": _draw_line,
+    "band": _draw_band,
+    "area": _draw_area,
+    "bars": _draw_bars,
+    "dots": _draw_dots,
+    "rings": _draw_rings,
+    "dashes": _draw_dashes,
+}
 
 
 # Names and legends.

@@ -7,7 +7,8 @@ import numpy as np
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.views.charts import Chart, Floats, Layer, Panel, shorten
+from logs.views.charts import Chart, Layer, Panel, shorten
+from world.arrays import Floats
 from world.geometry import leg_slopes
 
 _MAX_DOTS = 2000

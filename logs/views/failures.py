@@ -12,7 +12,8 @@ from logs.verdict.places import Place, PlaceKind
 from logs.verdict.rule_words import rule_word
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import place_text
-from logs.views.charts import Floats, Label
+from logs.views.charts import Label
+from world.arrays import Floats
 from world.geometry import leg_runs
 from world.threats import Threats
 

@@ -148,12 +148,16 @@ def _map_caption(subject: Subject) -> str:
 # In the page's order.
 FIGURES = (
     FigureEntry(
-        "map", "Map", _map,
+        "map",
+        "Map",
+        _map,
         alternative=lambda subject: f"Map, north up: {subject.things}",
         caption=_map_caption,
     ),
     FigureEntry(
-        "profile", "Profile", lambda subject: profile_chart(
+        "profile",
+        "Profile",
+        lambda subject: profile_chart(
             subject.setup.scenario, **_paths(subject), above_ground=subject.setup.route.above_ground
         ),
         alternative=lambda subject: (
@@ -167,7 +171,9 @@ FIGURES = (
         ),
     ),
     FigureEntry(
-        "scene", "3-D view", _scene,
+        "scene",
+        "3-D view",
+        _scene,
         alternative=lambda subject: f"View from aside: {subject.things}",
         caption=_text(
             "Domes are the missiles' reach, dashed the radars'; thin poles stand from the ground to the waypoints. "
@@ -175,7 +181,9 @@ FIGURES = (
         ),
     ),
     FigureEntry(
-        "turns", "Turn by turn, leg by leg", lambda subject: turn_chart(subject.setup.scenario.name, subject.verdict),
+        "turns",
+        "Turn by turn, leg by leg",
+        lambda subject: turn_chart(subject.setup.scenario.name, subject.verdict),
         alternative=_text(
             "Bars, dots and dashes: planned, flown and limit of each turn, slope, height above ground, waypoint, and "
             "of the distance from the legs."
@@ -186,7 +194,10 @@ FIGURES = (
         ),
     ),
     FigureEntry(
-        "returns", "Returns to launch", _of_returns("returns"), file=False,
+        "returns",
+        "Returns to launch",
+        _of_returns("returns"),
+        file=False,
         alternative=_text("Map, north up: the way coloured by what comes of a return from there; the worst returns."),
         caption=lambda subject: (
             ("" if subject.returns is None else _sentence(headline(subject.returns.returns)))
@@ -194,12 +205,18 @@ FIGURES = (
         ),
     ),
     FigureEntry(
-        "worst-returns", "The worst returns", _of_returns("worst-returns"), file=False,
+        "worst-returns",
+        "The worst returns",
+        _of_returns("worst-returns"),
+        file=False,
         alternative=_text("Heights of the worst returns along their ways: terrain, required clearance and spheres."),
         caption=_text("Flown on a point mass by ArduPlane's law, in the mean wind, from where each turns back."),
     ),
     FigureEntry(
-        "return-heights", "Called home, or without its engine", _of_returns("return-heights"), file=False,
+        "return-heights",
+        "Called home, or without its engine",
+        _of_returns("return-heights"),
+        file=False,
         alternative=_text(
             "Over time: the flight's height by what comes of a return, the least height from which one is safe, and "
             "the height that a glide without the engine has left over."
@@ -211,7 +228,10 @@ FIGURES = (
         ),
     ),
     FigureEntry(
-        "glide", "Without its engine", _of_returns("glide"), file=False,
+        "glide",
+        "Without its engine",
+        _of_returns("glide"),
+        file=False,
         alternative=_text(
             "Map, north up: from how low above ground home is in reach of a glide, flat ground, and the way coloured "
             "by what is in reach from there."
@@ -223,10 +243,12 @@ FIGURES = (
         ),
     ),
     FigureEntry(
-        "survey", "Photo lines", _of_flight(survey_chart), file=False,
+        "survey",
+        "Photo lines",
+        _of_flight(survey_chart),
+        file=False,
         alternative=_text(
-            "Each survey's photo lines from above, laid level: what can be used, what is lost, and "
-            "the flown track."
+            "Each survey's photo lines from above, laid level: what can be used, what is lost, and the flown track."
         ),
         caption=_text(
             "Broad: flown on the line, level, at its height over ground and with the camera on. Marked: lost. The axes "
@@ -234,7 +256,10 @@ FIGURES = (
         ),
     ),
     FigureEntry(
-        "time", "Over time", _of_flight(time_chart), file=False,
+        "time",
+        "Over time",
+        _of_flight(time_chart),
+        file=False,
         alternative=_text(
             "Plots over time: airspeed, bank, load factor, cross-track error, height error, height above ground."
         ),
@@ -244,7 +269,10 @@ FIGURES = (
         ),
     ),
     FigureEntry(
-        "exposure", "Exposure", _of_flight(exposure_chart), file=False,
+        "exposure",
+        "Exposure",
+        _of_flight(exposure_chart),
+        file=False,
         alternative=_text(
             "Plots along the flown distance: strength and sum of the exposure to missiles and to radars."
         ),
@@ -254,21 +282,29 @@ FIGURES = (
         ),
     ),
     FigureEntry(
-        "controls", "Controls", _of_flight(control_chart), file=False,
+        "controls",
+        "Controls",
+        _of_flight(control_chart),
+        file=False,
         alternative=_text(
             "Plots over time: elevator, aileron, rudder and throttle, commanded and as they stood, with their limits."
         ),
         caption=_text("Shaded: the command stands at the control's limit, and the aircraft can give no more."),
     ),
     FigureEntry(
-        "energy", "Energy", _of_flight(energy_chart), file=False,
+        "energy",
+        "Energy",
+        _of_flight(energy_chart),
+        file=False,
         alternative=_text(
             "Plots over time: battery energy used, power, current, and the aircraft's energy as a height."
         ),
         caption=_text("Energy as height: height and airspeed²/2g. Its slope is climb that the motor pays for."),
     ),
     FigureEntry(
-        "envelope", "Envelope", lambda subject: envelope_chart(subject.setup, subject.track),
+        "envelope",
+        "Envelope",
+        lambda subject: envelope_chart(subject.setup, subject.track),
         alternative=_text(
             "Path angle over airspeed with the steepest climbs and descents, and bank over airspeed with its limit."
         ),
@@ -277,7 +313,7 @@ FIGURES = (
             "outside for a moment, in a gust or a pull-up; a leg may not."
         ),
     ),
-)  # fmt: skip
+)
 
 
 def subject_of(

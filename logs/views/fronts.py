@@ -11,7 +11,8 @@ from planner.search.plan_front import Front
 
 _WATT_HOUR = 3600.0
 # What axes span at least: in s, m and Wh, and of the length as a share. Plans that are closer are alike.
-LEAST_SPAN, LEAST_LENGTH = 1.0, 0.01
+LEAST_SPAN = 1.0
+LEAST_LENGTH = 0.01
 
 
 @dataclass(frozen=True, slots=True)

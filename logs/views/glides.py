@@ -34,9 +34,14 @@ def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
         Label(name, site.east, site.north, "end", "waypoint") for name, site in zip(names, glides.sites, strict=True)
     ]
     return world_map(
-        scenario, "without its engine", layers, [*labels, *end_labels(scenario, route)], extent,
-        route=route, winds=(NamedWind(scenario.wind),),
-    )  # fmt: skip
+        scenario,
+        "without its engine",
+        layers,
+        [*labels, *end_labels(scenario, route)],
+        extent,
+        route=route,
+        winds=(NamedWind(scenario.wind),),
+    )
 
 
 def _said(one: Glide, drawn: DrawnReturns) -> str:

@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.identification.estimate import Equation
 from logs.views.charts import Chart, Panel, filled_series, series
+from world.arrays import Floats
 
-Floats = NDArray[np.float64]
 # Degrees in place of radians, by unit.
 _SHOWN = {"rad": ("°", 180.0 / np.pi), "rad/s2": ("°/s²", 180.0 / np.pi), "m/s2": ("m/s²", 1.0)}
 

@@ -9,7 +9,7 @@ from matplotlib import patheffects
 from numpy.typing import ArrayLike
 
 from logs import theme
-from logs.views.charts import Floats
+from world.arrays import Floats
 
 DPI = 150
 
@@ -20,7 +20,8 @@ _OVERLAP = 200.0
 # How far from its gap a label may move, in its own heights: a framed one has a line to its point, however far it is;
 # one that may be left out stays close.
 _RINGS_FRAMED = (0.0, 1.0, 2.2, 3.4, 4.6, 6.0, 7.5, 9.0, 11.0)
-_RINGS, _RINGS_OPTIONAL = _RINGS_FRAMED[:3], _RINGS_FRAMED[:2]
+_RINGS = _RINGS_FRAMED[:3]
+_RINGS_OPTIONAL = _RINGS_FRAMED[:2]
 # Directions that are tried for a label, best first: right-up, left-up, right-down, left-down, up, down, right, left.
 _DIRECTIONS = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
 

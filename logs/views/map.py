@@ -8,19 +8,24 @@ import numpy as np
 
 from flight.simulation.track import Track
 from logs.verdict.verdict import Verdict
-from logs.views.charts import Floats, Json, Label, Layer, Panel, numbers, panel_json, shorten
+from logs.views.charts import Json, Label, Layer, Panel, numbers, panel_json, shorten
 from logs.views.failures import Failures, fail_labels, failures, inside_threats, paths_differ, stop_rows
 from logs.views.threats_and_zones import threat_circles, threat_names, zone_names, zone_shapes
 from world.airspace.zones_on_map import zone_rings
+from world.arrays import Floats
 from world.scenario import Scenario
 from world.terrain import Terrain
 from world.wind import Wind
 
 # Height over width of the map: a longer or flatter area is drawn with ground around it.  The rim, of the longer side:
 # of an area, and of a mission that has none.
-_ASPECTS, _RIM, _MISSION_RIM = (0.4, 1.25), 0.015, 0.1
+_ASPECTS = (0.4, 1.25)
+_RIM = 0.015
+_MISSION_RIM = 0.1
 # Beyond these numbers waypoints are numbered in steps, and their dots are small; points of a track.
-_MAX_NUMBERS, _MAX_DOTS, _MAX_POINTS = 40, 80, 6000
+_MAX_NUMBERS = 40
+_MAX_DOTS = 80
+_MAX_POINTS = 6000
 
 # East and north range, m.
 Extent = tuple[tuple[float, float], tuple[float, float]]

@@ -11,19 +11,29 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from logs import theme
-from logs.views.charts import Floats, Label, Layer, Panel, legend_entries
+from logs.views.charts import Label, Layer, Panel, legend_entries
 from logs.views.draw_map import draw_ground, map_frame
 from logs.views.drawing import clean_style, draw_layers, draw_legend, legend_handle, new_figure, write_label
 from logs.views.labels import LabelPlacer
 from logs.views.threats_and_zones import threat_circles
+from world.arrays import Floats
 from world.scenario import Scenario
 
 # Inches: left of the map, height of the legend, of one with a line pair for each encoding, and the column beside.
-_LEFT, _TOP, _LEGEND, _TALL_LEGEND, _COLUMN = 0.72, 0.5, 0.85, 1.2, 8.72
+_LEFT = 0.72
+_TOP = 0.5
+_LEGEND = 0.85
+_TALL_LEGEND = 1.2
+_COLUMN = 8.72
 # One look for each algorithm of a figure, distinct without colour too.
 _DASHES: tuple[Any, ...] = (
-    "-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (4, 1.2, 1, 1.2)), (0, (7, 2)), (0, (2.5, 1.5)),
-)  # fmt: skip
+    "-",
+    (0, (5, 1.5)),
+    (0, (1.2, 1.2)),
+    (0, (4, 1.2, 1, 1.2)),
+    (0, (7, 2)),
+    (0, (2.5, 1.5)),
+)
 _LOOKS: tuple[dict[str, Any], ...] = tuple(
     {"color": shade, "linestyle": dashes} for shade, dashes in zip(theme.SERIES, _DASHES, strict=True)
 )

@@ -6,7 +6,7 @@ import numpy as np
 
 from flight.simulation.track import Track
 from logs.verdict.verdict import Verdict
-from logs.views.charts import Chart, Floats, Label, Layer, Panel, outline_rows, shorten
+from logs.views.charts import Chart, Label, Layer, Panel, outline_rows, shorten
 from logs.views.failures import (
     Failures,
     fail_labels,
@@ -18,11 +18,15 @@ from logs.views.failures import (
     track_distance,
 )
 from logs.views.threats_and_zones import PathPlane, entered_cuts, threat_cuts, zone_bands
+from world.arrays import Floats
 from world.scenario import Scenario
 
 # Samples along the path and of the flight, and the smallest range of heights that is shown, m.
-_SAMPLES, _BLOCKS, _MIN_SPAN = 1200, 800, 50.0
-_MAX_NUMBERS, _MAX_DOTS = 40, 80
+_SAMPLES = 1200
+_BLOCKS = 800
+_MIN_SPAN = 50.0
+_MAX_NUMBERS = 40
+_MAX_DOTS = 80
 
 
 def profile_chart(
@@ -195,11 +199,9 @@ def _flown(
 
 def _failing_legs(at: Floats, route: Floats, failed: Failures) -> list[Layer]:
     return [
-        Layer(
-            "line", "leg that fails a rule", "failing-leg", at[k : k + 2] / 1000.0, route[k : k + 2, 2], quiet=True
-        )
+        Layer("line", "leg that fails a rule", "failing-leg", at[k : k + 2] / 1000.0, route[k : k + 2, 2], quiet=True)
         for k in failed.legs
-    ]  # fmt: skip
+    ]
 
 
 def _failing_waypoints(at: Floats, route: Floats, failed: Failures) -> list[Layer]:

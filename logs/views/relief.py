@@ -1,9 +1,8 @@
 """Brightness of ground under light from the north-west, by which relief is seen on a map."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 
 def relief(heights: Floats, pitch: float, span: float) -> Floats:

@@ -11,16 +11,18 @@ from logs.verdict.returns.drawn_returns import DrawnReturns, WorstReturn
 from logs.verdict.returns.judge_glides import Glides
 from logs.verdict.returns.judge_returns import KINDS, Kind, ReturnFlown
 from logs.verdict.returns.returns_text import outcome_text, way_text
-from logs.views.charts import Chart, Floats, Label, Layer, Panel, parted, series, shorten
+from logs.views.charts import Chart, Label, Layer, Panel, parted, series, shorten
 from logs.views.map import MapChart, NamedWind, end_labels, map_extent, world_map
 from logs.views.profile import ground_bands, ground_under
 from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_bands
+from world.arrays import Floats
 from world.scenario import Scenario
 
 # Role and name of the way where returns come to this; the safe lies lowest.
 _LOOKS: dict[Kind, tuple[str, str]] = {kind: (f"return-{kind}", way_text(kind)) for kind in reversed(KINDS)}
 # The smallest range of heights that a profile shows, m; points of the ground under a flight.
-_MIN_SPAN, _GROUND_POINTS = 100.0, 1200
+_MIN_SPAN = 100.0
+_GROUND_POINTS = 1200
 
 Key = TypeVar("Key", bound=str)
 One = TypeVar("One")
@@ -74,9 +76,14 @@ def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
     ways = [one.way for one in drawn.worst] + [np.array(list(targets.values()) or np.zeros((0, 3)))]
     extent = map_extent(scenario, route, [*ways, np.array([one.start for one in drawn.returns.each])])
     return world_map(
-        scenario, "returns to launch from everywhere on the way", layers, [*labels, *end_labels(scenario, route)],
-        extent, route=route, winds=(NamedWind(scenario.wind),),
-    )  # fmt: skip
+        scenario,
+        "returns to launch from everywhere on the way",
+        layers,
+        [*labels, *end_labels(scenario, route)],
+        extent,
+        route=route,
+        winds=(NamedWind(scenario.wind),),
+    )
 
 
 def _targets(targets: dict[str, tuple[float, float, float]]) -> list[Layer]:

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.views.charts import Floats
 from logs.views.failures import Failures
 from world.airspace.zones_on_map import zone_walls
+from world.arrays import Floats
 from world.terrain import Terrain
 
 MAX_GROUND = 250  # vertices a side: index numbers of the mesh stay below 65,536

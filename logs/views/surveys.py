@@ -1,7 +1,6 @@
 """The photo lines of a survey from above: what of each can be used, what is lost, and the track beside them."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.surveys import Survey
 from flight.simulation.setup import FlightSetup
@@ -10,11 +9,11 @@ from logs.verdict.measures.photo_lines import LineMeasure, measure_line
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements, surveys_of
 from logs.verdict.measures.track_alignment import align_track
 from logs.views.charts import Chart, Label, Layer, Panel, parted
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Beyond this number of lines every second is numbered, and so on; points of a track that are drawn.
-_NUMBERED, _POINTS = 24, 8000
+_NUMBERED = 24
+_POINTS = 8000
 
 
 def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
@@ -50,8 +49,7 @@ def _panel(
     axes = np.stack([unit, [-unit[1], unit[0]]], axis=1)
 
     def laid(places: Floats) -> Floats:
-        found: Floats = (places[:, :2] - origin) @ axes
-        return found
+        return (places[:, :2] - origin) @ axes
 
     used, lost = [np.zeros((0, 2))], [np.zeros((0, 2))]
     labels = []

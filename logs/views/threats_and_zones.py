@@ -5,15 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from logs.views.charts import Floats, Label, Layer, shorten
+from logs.views.charts import Label, Layer, shorten
 from logs.views.failures import Failures, radius_of, route_samples
 from world.airspace.zone_kernels import edge_distance, zone_records
 from world.airspace.zones import Zone, ZoneLevel
 from world.airspace.zones_on_map import level_heights, zone_rings
+from world.arrays import Floats
 from world.threats import Threats
 
 # Beyond these numbers, names would be a grey mat: of threats and zones on the map, and on the profile.
-_MAX_NAMES, _MAX_ZONE_NAMES, _MAX_CUT_NAMES = 80, 40, 24
+_MAX_NAMES = 80
+_MAX_ZONE_NAMES = 40
+_MAX_CUT_NAMES = 24
 _TURN = np.linspace(0.0, 2.0 * np.pi, 73)
 
 

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from aircraft.envelope import GRAVITY
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, control_limits, held_at_limit
-from logs.views.charts import Chart, Floats, Panel, filled_series, held_band, leg_marks, series, shorten
+from logs.views.charts import Chart, Panel, filled_series, held_band, leg_marks, series, shorten
+from world.arrays import Floats
 from world.geometry import segment_exposure
 from world.kernels import compiled
 
@@ -40,8 +41,9 @@ def time_chart(setup: FlightSetup, track: Track) -> Chart:
     east, north, _ = doubles(track.wind).T
     limit = float(np.degrees(min(setup.max_bank, setup.envelope.max_bank)))
     airspeed = (
-        series("commanded", "commanded", time, track.speed_command), series("flown", "flown", time, track.airspeed)
-    )  # fmt: skip
+        series("commanded", "commanded", time, track.speed_command),
+        series("flown", "flown", time, track.airspeed),
+    )
     turn_limits = (("limit of planned turns; corrections may pass it", limit), ("", -limit))
 
     def one(title: str, unit: str, values: Floats, min_span: float, name: str = "flown") -> Panel:
@@ -104,8 +106,9 @@ def energy_chart(setup: FlightSetup, track: Track) -> Chart:
     height = track.position[:, 2]
     kinetic = doubles(track.airspeed) ** 2 / (2.0 * GRAVITY)
     as_height = (
-        series("height and speed", "second", time, height + kinetic), series("height alone", "flown", time, height)
-    )  # fmt: skip
+        series("height and speed", "second", time, height + kinetic),
+        series("height alone", "flown", time, height),
+    )
     panels = [
         Panel(f"{store} used", unit, (filled_series("used", "difference", time, scale * used),)),
         Panel("power", power_unit, (series(f"mean of {_POWER_WINDOW:g} s", "flown", time, scale * power),)),
@@ -134,7 +137,7 @@ def exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Flo
 
 
 @compiled
-def _rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:  # pragma: no cover - compiled
+def _rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
     count = position.shape[0] - 1
     out = np.zeros(max(0, count))
     for k in range(count):

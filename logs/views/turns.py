@@ -8,10 +8,12 @@ import numpy as np
 
 from logs.verdict.findings import Finding
 from logs.verdict.verdict import Verdict
-from logs.views.charts import Chart, Floats, Layer, Panel, shorten
+from logs.views.charts import Chart, Layer, Panel, shorten
+from world.arrays import Floats
 
 # Margin above and below what a panel shows, of its span; and a limit so many times as high is left out of it.
-_MARGIN, _FAR = 0.12, 4.0
+_MARGIN = 0.12
+_FAR = 4.0
 # Rule, kind of place, title and unit.
 PLACE_PANELS = (
     ("turn", "waypoint", "turn", "°"),

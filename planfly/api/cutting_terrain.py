@@ -16,7 +16,8 @@ from world.remote_files import is_address
 from world.terrain_cut import COPERNICUS, Box, CutTerrain, cut_from_files, cut_from_server
 
 # km on a degree of latitude, and the furthest from the equator that areas reach, degrees.
-_DEGREE, _FURTHEST = 111.2, 84.0
+_DEGREE = 111.2
+_FURTHEST = 84.0
 
 
 def terrain(

@@ -60,9 +60,17 @@ def new_scenario(
     with stage(f"laying out {name}", "laying out"):
         raster = None if ground is None else open_raster(ground)
         draft = make_draft(
-            name, ends[0], ends[1], height, raster=raster, terrain=ground, aircraft=model,
-            airspeed=airspeed, autopilot=law, px4_version=version or None,
-        )  # fmt: skip
+            name,
+            ends[0],
+            ends[1],
+            height,
+            raster=raster,
+            terrain=ground,
+            aircraft=model,
+            airspeed=airspeed,
+            autopilot=law,
+            px4_version=version or None,
+        )
         # As it is read from there: a fault is found before anything is written.
         from_spec(parse_scenario(draft_text(draft), str(file)), str(file))
     moved = replace(draft, terrain=ground and _from(target, ground), aircraft=_from(target, model))

@@ -200,9 +200,16 @@ def fly(
     target = None if log is None else _log_target(log, setup, mission, program, overwrite)
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
         flown = fly_and_judge(
-            setup, airframe_of(setup), target, advance, every=60 // options["log_hz"], autopilot=program,
-            limits=limits, reference="always" if options["levels"] else "failed", returns=target is not None,
-        )  # fmt: skip
+            setup,
+            airframe_of(setup),
+            target,
+            advance,
+            every=60 // options["log_hz"],
+            autopilot=program,
+            limits=limits,
+            reference="always" if options["levels"] else "failed",
+            returns=target is not None,
+        )
     target = target if len(flown.track) else None
     own = None if target is None or program is None else autopilot_log(target, program)
     return FlownMission(flown.setup, flown.track, flown.verdict, flown.ended, flown.events, target, own, flown.returns)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft, check_new_folder, find_aircraft, read_aircraft
 from aircraft.identification.estimate import Estimate, estimate_model
@@ -32,12 +31,11 @@ from planfly.identification.wide_numbers import WideNumber, wide_numbers
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.data_sheets import parse_sheet
+from world.arrays import Floats
 from world.errors import FlightError, LogError, PlanflyError
 from world.extras import needs_extra
 from world.files import whole_path, write_folder
 from world.scenario_tables import names_folder
-
-Floats = NDArray[np.float64]
 
 # How far from its base an aircraft may be, as a factor of mass and span, before the prior is none.
 _FARTHEST = 1.6

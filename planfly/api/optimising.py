@@ -5,15 +5,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from planner.optimisers.differential_evolution import DifferentialEvolution
 from planner.optimisers.emna import Emna
 from planner.optimisers.multistart import Multistart
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # "umda": independent Gaussians, the paper's; "emna": one Gaussian of full covariance; "multistart": Gaussians of full
 # covariance from many starts; "differential": differential evolution, which is no EDA and stands beside them for

@@ -183,9 +183,16 @@ def play_to_foxglove(
     found = _opened(log)
     first, last = replayed_part(found, start, end)
     foxglove_server.play_to_foxglove(
-        found, first, last, speed=speed or 1.0, port=port, allowed=allowed, wait=wait, stopped=stop,
+        found,
+        first,
+        last,
+        speed=speed or 1.0,
+        port=port,
+        allowed=allowed,
+        wait=wait,
+        stopped=stop,
         on_message=on_message,
-    )  # fmt: skip
+    )
 
 
 def _origin(text: str) -> str:
@@ -223,6 +230,10 @@ def play_to_stations(
     check_arguments(speed=speed, wait=wait)
     access = link_access(to, bind, allow, sign_key)
     stations.play_to_stations(
-        _opened(log), access, speed=speed or 1.0, wait=_STATION_PATIENCE if wait is None else wait, stopped=stop,
+        _opened(log),
+        access,
+        speed=speed or 1.0,
+        wait=_STATION_PATIENCE if wait is None else wait,
+        stopped=stop,
         on_message=on_message,
-    )  # fmt: skip
+    )

@@ -104,10 +104,17 @@ def report(
     folder = clean_folder(out, LOG_FIGURES, overwrite=overwrite)
     with stage("drawing", "drawing a report"):
         files = write_report(
-            folder, shown.setup, shown.track, shown.verdict, ended=shown.ended, events=shown.events, svg=svg,
-            versions=shown.versions or package_versions(), command=command,
+            folder,
+            shown.setup,
+            shown.track,
+            shown.verdict,
+            ended=shown.ended,
+            events=shown.events,
+            svg=svg,
+            versions=shown.versions or package_versions(),
+            command=command,
             returns=return_summary(shown.setup, shown.track).drawn(),
-        )  # fmt: skip
+        )
     return WrittenReport(folder / "report.html", tuple(files), shown.verdict)
 
 

@@ -224,16 +224,30 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
     setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan)
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
         flown = fly_and_judge(
-            setup, airframe, folder / "flight.mcap", advance, every=task.every, autopilot=task.program,
-            reference=task.reference, returns=True, limits=task.limits,
-        )  # fmt: skip
+            setup,
+            airframe,
+            folder / "flight.mcap",
+            advance,
+            every=task.every,
+            autopilot=task.program,
+            reference=task.reference,
+            returns=True,
+            limits=task.limits,
+        )
     write_whole(folder / "verdict.json", verdict_json(flown.verdict))
     beside = flown.returns or return_summary(flown.setup, flown.track)
     with stage("drawing", "drawing a report"):
         write_report(
-            folder, flown.setup, flown.track, flown.verdict, ended=flown.ended, versions=package_versions(),
-            command=task.command, events=flown.events, returns=beside.drawn(),
-        )  # fmt: skip
+            folder,
+            flown.setup,
+            flown.track,
+            flown.verdict,
+            ended=flown.ended,
+            versions=package_versions(),
+            command=task.command,
+            events=flown.events,
+            returns=beside.drawn(),
+        )
     notes = (*setup.scenario.notes, *setup.notes)
     has_log = len(flown.track) > 0
     return Round(

@@ -169,8 +169,9 @@ def check_middle(base: CampaignBase) -> None:
         raise SpreadError(
             f"{base.dispersions.name}: {factors}: at the middle of these {aircraft.name} holds no level flight at"
             f" {base.airframe.airspeed:g} m/s",
-            file=base.dispersions.name, value=factors,
-        )  # fmt: skip
+            file=base.dispersions.name,
+            value=factors,
+        )
 
 
 def _check_draws(base: CampaignBase) -> None:
@@ -202,7 +203,8 @@ def _with_own_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions
 
 # In the order in which turbulence grows.
 LEVELS: tuple[Literal["none", "light", "moderate"], ...] = ("none", "light", "moderate")
-MAX_WIND, MAX_GRADIENT = 40.0, 0.05
+MAX_WIND = 40.0
+MAX_GRADIENT = 0.05
 
 
 class GivenWind(NamedTuple):

@@ -64,7 +64,8 @@ def _text(value: object) -> str:
 
 
 # Flights of a campaign that says no number, and the most of one that stops by itself.
-USUAL_FLIGHTS, MAX_FLIGHTS = 300, 5000
+USUAL_FLIGHTS = 300
+MAX_FLIGHTS = 5000
 
 
 @dataclass(frozen=True, repr=False)

@@ -135,8 +135,7 @@ class DaskPool:
         if future.status == "finished":
             # A result goes with its worker until it is fetched, and is made again: that may be given up, too.
             with contextlib.suppress(KilledWorker, CancelledError):
-                row: FlightRow = future.result()
-                return row
+                return future.result()
         elif future.status == "error":
             error = future.exception()
             if isinstance(error, PlanflyError):

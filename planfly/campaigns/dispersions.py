@@ -23,14 +23,11 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.uncertainty import Draws, read_draws
+from world.arrays import Floats
 from world.errors import PlanflyError
 from world.files import read_small_file, toml_table, utf8_text
-
-Floats = NDArray[np.float64]
-
 
 # ----------------------------------------------------------------------
 # What may vary between the flights of a campaign: each quantity's unit, how it changes the flight, and its range.
@@ -138,8 +135,7 @@ class Varying:
         """(n,) the same of many shares (n,)."""
         low, high = self._inside
         drawn = self._frozen.ppf(low + uniform * (high - low))
-        out: Floats = np.clip(drawn, self.quantity.low, self.quantity.high)
-        return out
+        return np.clip(drawn, self.quantity.low, self.quantity.high)
 
 
 @dataclass(frozen=True)

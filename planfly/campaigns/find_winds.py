@@ -19,12 +19,15 @@ from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worke
 
 # Half of the interval's width that is flown for, m/s, and the fewest flights of a direction: where none of so many
 # fails, one in fifty does at most (95 %); and with fewer a fit is surer of itself than it may be.
-ACCURACY, FEWEST = 0.25, 150
+ACCURACY = 0.25
+FEWEST = 150
 # Points that stand for all that may be drawn.
 _POPULATION = 4096
 # Flights of a round, about, where few directions are open, and the fewest and the most of one direction: workers wait
 # for each round.
-_ROUND, _FEWEST_EACH, _MAX_EACH = 48, 3, 6
+_ROUND = 48
+_FEWEST_EACH = 3
+_MAX_EACH = 6
 # A direction that is not settled is looked at again with so many times as many flights: a posterior takes a while.
 _LOOK_AGAIN = 1.04
 # Of the dispersions, what the wind that is asked about takes the place of.

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.route import Route
 from flight.simulation.track import Track
@@ -24,11 +23,8 @@ from logs.verdict.verdict import Verdict
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary
 from planfly.campaigns.dispersions import Draw, draw_flight
 from planfly.workflow.pipeline import fly_and_judge
+from world.arrays import Singles
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
-
 
 # ----------------------------------------------------------------------
 # Where a flight passed narrowly, and by how much: that tells more of the risk than that it did not fail.
@@ -174,7 +170,9 @@ def failed_of(text: str) -> tuple[tuple[str, Place], ...]:
     return tuple((entry.pop("rule"), Place(**entry)) for entry in entries)
 
 
-_TEXT, _REAL, _BLOB = Column("TEXT NOT NULL"), Column("REAL NOT NULL"), Column("BLOB NOT NULL")
+_TEXT = Column("TEXT NOT NULL")
+_REAL = Column("REAL NOT NULL")
+_BLOB = Column("BLOB NOT NULL")
 _FAILED = Column("TEXT NOT NULL", _failed_text, failed_of)
 
 

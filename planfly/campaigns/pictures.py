@@ -17,13 +17,17 @@ from logs import theme
 from logs.views.charts import shorten
 from logs.views.drawing import clean_style, new_figure
 from planfly.campaigns.statistics.decision import Interval, wilson
+from world.arrays import Floats
 
-Floats = NDArray[np.float64]
-
-PLANNED, BLUE, FAIL, LIMIT, INTERVAL = (
-    theme.colour(role) for role in ("planned", "second", "fail", "limit", "commanded")
-)
-INK, QUIET, GRID, PAPER = (theme.colour(name) for name in ("ink", "quiet", "grid", "paper"))
+PLANNED = theme.colour("planned")
+BLUE = theme.colour("second")
+FAIL = theme.colour("fail")
+LIMIT = theme.colour("limit")
+INTERVAL = theme.colour("commanded")
+INK = theme.colour("ink")
+QUIET = theme.colour("quiet")
+GRID = theme.colour("grid")
+PAPER = theme.colour("paper")
 
 
 # ----------------------------------------------------------------------
@@ -55,9 +59,14 @@ def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figur
         axes.barh(rows, numbers, height=0.62, color=FAIL)
         for row, number in zip(rows, numbers, strict=True):
             axes.annotate(
-                f"{number}  ({100.0 * number / max(1, flights):.1f} %)", (number, row), xytext=(4, 0),
-                textcoords="offset points", va="center", fontsize=8, color=INK,
-            )  # fmt: skip
+                f"{number}  ({100.0 * number / max(1, flights):.1f} %)",
+                (number, row),
+                xytext=(4, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize=8,
+                color=INK,
+            )
         axes.set_yticks(rows, [shorten(f"{rule}, {place}", 38) for rule, place, _ in shown])
         axes.invert_yaxis()
         axes.set_xlim(0.0, 1.2 * max(numbers))
@@ -136,8 +145,16 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
             )
         if target is not None:
             axes.axhline(target, color=LIMIT, linewidth=1.2, linestyle="--")
-            axes.annotate(f"target {target:g}", (1.0, target), xycoords=("axes fraction", "data"), xytext=(-4, -11),
-                          textcoords="offset points", ha="right", color=INK, fontsize=8)  # fmt: skip
+            axes.annotate(
+                f"target {target:g}",
+                (1.0, target),
+                xycoords=("axes fraction", "data"),
+                xytext=(-4, -11),
+                textcoords="offset points",
+                ha="right",
+                color=INK,
+                fontsize=8,
+            )
         axes.set_ylim(-0.02, 1.05)
         axes.set_xlabel("mean wind at the start's height (m/s)")
         axes.set_ylabel("share of flyable flights")
@@ -157,9 +174,14 @@ def draw_tornado(bars: Sequence[Bar], of_what: str) -> Figure:
             length = bar.index * (1.0 if bar.slope >= 0.0 else -1.0)
             axes.barh(row, length, height=0.62, color=BLUE if length >= 0.0 else FAIL)
             axes.annotate(
-                f"{100.0 * bar.index:.0f} %", (length, row), xytext=(4 if length >= 0.0 else -4, 0),
-                textcoords="offset points", va="center", ha="left" if length >= 0.0 else "right", fontsize=8,
-            )  # fmt: skip
+                f"{100.0 * bar.index:.0f} %",
+                (length, row),
+                xytext=(4 if length >= 0.0 else -4, 0),
+                textcoords="offset points",
+                va="center",
+                ha="left" if length >= 0.0 else "right",
+                fontsize=8,
+            )
         axes.axvline(0.0, color=INK, linewidth=0.8)
         axes.set_yticks(list(rows), [bar.title for bar in bars])
         axes.invert_yaxis()
@@ -365,9 +387,14 @@ def draw_go_no_go(
             for speed, flights, flyable in one.flights:
                 all_well = flights == flyable
                 axes.plot(
-                    np.radians(one.from_deg), speed, marker="o" if all_well else "x", color=BLUE if all_well else FAIL,
-                    markersize=2.6 if all_well else 3.6, linewidth=0.0, alpha=0.75,
-                )  # fmt: skip
+                    np.radians(one.from_deg),
+                    speed,
+                    marker="o" if all_well else "x",
+                    color=BLUE if all_well else FAIL,
+                    markersize=2.6 if all_well else 3.6,
+                    linewidth=0.0,
+                    alpha=0.75,
+                )
         if wind is not None:
             axes.plot(np.radians(wind[1]), wind[0], marker="*", color=INK, markersize=13, markeredgecolor=PAPER)
         axes.set_ylim(0.0, most)
@@ -377,9 +404,12 @@ def draw_go_no_go(
         axes.grid(color=GRID, linewidth=0.6)
         figure.text(0.03, 0.955, f"{name}: in which wind it flies", fontsize=14, color=INK)
         figure.text(
-            0.03, 0.922, f"wind from each direction, m/s; flies with a probability of {target:g} or more",
-            fontsize=9, color=QUIET,
-        )  # fmt: skip
+            0.03,
+            0.922,
+            f"wind from each direction, m/s; flies with a probability of {target:g} or more",
+            fontsize=9,
+            color=QUIET,
+        )
         edge = most if any(one.reaches for one in spokes) else None
         _legend(figure, target, confidence, wind, edge)
     return figure
@@ -401,15 +431,19 @@ def _legend(
         (Line2D([], [], color=FAIL, marker="x", markersize=4, linewidth=0), "flown, some not"),
     ]
     if edge is not None:
-        entries.append((
-            Line2D([], [], color=QUIET, marker="^", markersize=7, linewidth=0), f"no limit found up to\n{edge:g} m/s"
-        ))  # fmt: skip
+        entries.append(
+            (Line2D([], [], color=QUIET, marker="^", markersize=7, linewidth=0), f"no limit found up to\n{edge:g} m/s")
+        )
     if wind is not None:
         entries.append((Line2D([], [], color=INK, marker="*", markersize=11, linewidth=0), "the scenario's wind"))
     figure.legend(
-        [handle for handle, _ in entries], [label for _, label in entries],
-        loc="center left", bbox_to_anchor=(0.735, 0.45), fontsize=9, labelspacing=1.0,
-    )  # fmt: skip
+        [handle for handle, _ in entries],
+        [label for _, label in entries],
+        loc="center left",
+        bbox_to_anchor=(0.735, 0.45),
+        fontsize=9,
+        labelspacing=1.0,
+    )
 
 
 # ----------------------------------------------------------------------

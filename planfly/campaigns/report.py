@@ -165,8 +165,13 @@ def _ways(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
 # What a campaign or a search for winds writes into its folder, and clears where it is replaced.
 CAMPAIGN_FILES = (
     *(f"{table}{ending}" for table in (DATABASE, WINDS_DATABASE) for ending in ("", "-wal", "-shm")),
-    "summary.json", "report.html", "winds.json", "winds.png", "winds.html", "plan.json",
-)  # fmt: skip
+    "summary.json",
+    "report.html",
+    "winds.json",
+    "winds.png",
+    "winds.html",
+    "plan.json",
+)
 
 
 @dataclass(frozen=True)
@@ -314,10 +319,14 @@ def write_winds(folder: Path, base: CampaignBase, found: WindsFound, command: st
     own = (wind.speed, math.degrees(wind.from_course)) if wind.speed else None
     figure = draw_go_no_go(chart, goal.most, goal.target, goal.confidence, base.name, own)
     rows = [
-        (f"{one.from_deg:g}°", _speed_text(one.boundary, goal.most), _interval_text(one.low, one.high, goal.most),
-         str(sum(count for _, count, _ in one.flights)))
+        (
+            f"{one.from_deg:g}°",
+            _speed_text(one.boundary, goal.most),
+            _interval_text(one.low, one.high, goal.most),
+            str(sum(count for _, count, _ in one.flights)),
+        )
         for one in chart
-    ]  # fmt: skip
+    ]
     data = {
         "schema": SCHEMA,
         "name": base.name,

@@ -301,8 +301,7 @@ def kept_settings(path: Path) -> dict[str, Any]:
         known = _kept(connection)
     if known:
         _refuse_damaged(known, path)
-    settings: dict[str, Any] = json.loads(known["settings"]) if known else {}
-    return settings
+    return json.loads(known["settings"]) if known else {}
 
 
 def _kept(connection: sqlite3.Connection) -> dict[str, str]:
@@ -489,9 +488,12 @@ class WindsStore(LockedTable):
     def add(self, asked: AskedFlight, row: FlightRow) -> None:
         """Write a flight, for good.  Raises OSError for a full disk; what was written before stays."""
         asked_for = {
-            "flight": asked.number, "direction": asked.direction, "asked_speed": asked.speed, "draw": asked.draw,
+            "flight": asked.number,
+            "direction": asked.direction,
+            "asked_speed": asked.speed,
+            "draw": asked.draw,
             "narrow": json.dumps([{"rule": rule, "margin": left, **asdict(place)} for rule, place, left in row.narrow]),
-        }  # fmt: skip
+        }
         self.insert({**asked_for, **row_values(replace(row, made_of=self.made_of))})
 
     def known(self) -> dict[int, tuple[AskedFlight, FlownFlight]]:

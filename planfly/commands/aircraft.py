@@ -186,8 +186,10 @@ def _identify(args: argparse.Namespace) -> int:
     files_made = sorted(file.name for file in made.folder.iterdir())
     print(f"aircraft  {args.out} ({', '.join(files_made)}), from {estimate.seconds / 60.0:.1f} min of flight")
     for name, unit, (low, value, high) in (
-        ("climb", "deg", found.climb), ("sink", "deg", found.sink), ("power", "W", found.power),
-    ):  # fmt: skip
+        ("climb", "deg", found.climb),
+        ("sink", "deg", found.sink),
+        ("power", "W", found.power),
+    ):
         print(f"  {name:<8} {value:.{0 if unit == 'W' else 1}f} {unit} at cruise, {low:.1f} to {high:.1f} (95 %)")
     _print_unknown(found)
     if "identify.waypoints" not in files_made:

@@ -36,13 +36,17 @@ def campaign_options(line: LineParser) -> None:
         "--at-least", metavar="P", type=number("at_least"), help="decide after all flights whether P is reached"
     )
     parser.add_argument(
-        "--flights", metavar="N", type=number("flights"),
+        "--flights",
+        metavar="N",
+        type=number("flights"),
         help="number of flights (default: 300), or with --prove the largest number (default: 5000)",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--confidence", metavar="C", type=number("confidence"),
+        "--confidence",
+        metavar="C",
+        type=number("confidence"),
         help="confidence of each bound (default: 0.95; with --resume what it was)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--refly", metavar="K", type=number("index"), help="fly flight K of the campaign in --out again, with a log"
     )
@@ -61,20 +65,28 @@ def winds_options(line: LineParser) -> None:
         "--prove", metavar="P", type=number("prove"), default=0.99, help="probability to fly with (default: 0.99)"
     )
     parser.add_argument(
-        "--confidence", metavar="C", type=number("confidence"), default=0.95,
+        "--confidence",
+        metavar="C",
+        type=number("confidence"),
+        default=0.95,
         help="confidence of each interval (default: 0.95)",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--directions", metavar="N", type=number("directions"), default=16,
+        "--directions",
+        metavar="N",
+        type=number("directions"),
+        default=16,
         help="number of directions, 4 to 72 (default: 16)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--most", metavar="M/S", type=number("most"), default=20.0, help="largest wind to try, m/s (default: 20)"
     )
     parser.add_argument(
-        "--flights", metavar="N", type=number("flights"),
+        "--flights",
+        metavar="N",
+        type=number("flights"),
         help="largest number of flights, in all directions together (default: 5000)",
-    )  # fmt: skip
+    )
 
 
 def _shared_options(parser: CommandParser) -> None:

@@ -49,14 +49,18 @@ def check_options(line: LineParser) -> None:
     flown_by_options(parser)
     group = pilot_options(parser)
     group.add_argument(
-        "--for", dest="autopilots", metavar="AUTOPILOT,...", type=autopilots,
+        "--for",
+        dest="autopilots",
+        metavar="AUTOPILOT,...",
+        type=autopilots,
         help="fly a mission by the laws of several autopilots, and print one table, a column each: "
         + ", ".join(CHOICES["autopilot_law"]),
-    )  # fmt: skip
+    )
     group.add_argument(
-        "--geometry", action="store_true",
+        "--geometry",
+        action="store_true",
         help="judge a mission by its geometry and the aircraft's envelope alone: quick, and no autopilot flies it",
-    )  # fmt: skip
+    )
     result_options(parser, junit=True)
 
 

@@ -20,11 +20,12 @@ def export_options(line: LineParser) -> None:
     )
     completed(
         parser.add_argument(
-            "source", metavar="PLAN.json|MISSION|LOG.mcap",
+            "source",
+            metavar="PLAN.json|MISSION|LOG.mcap",
             help="a plan that planfly made, a mission file, or a flight log",
         ),
         files("mcap", *MISSIONS),
-    )  # fmt: skip
+    )
     parser.add_argument(
         "files",
         metavar="FILE",

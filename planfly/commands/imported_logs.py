@@ -33,12 +33,13 @@ def import_log_options(line: LineParser) -> None:
     )
     completed(
         parser.add_argument(
-            "log", metavar=LOGS,
+            "log",
+            metavar=LOGS,
             help="a log of ArduPilot, of a ground station (.tlog; extra planfly[live]), of PX4 (.ulg; extra"
             " planfly[px4-logs]), or a track",
         ),
         files(*IMPORTED_LOGS),
-    )  # fmt: skip
+    )
     parser.add_argument("target", metavar="FLIGHT.mcap", help="the flight log to write")
     imported_log_options(parser)
     world_options(parser)

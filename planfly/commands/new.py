@@ -27,18 +27,23 @@ def new_options(line: LineParser) -> None:
             option, dest=keyword, metavar="LAT,LON", type=place, required=True, help="degrees north and east"
         )
     way.add_argument(
-        "--height", metavar="M", type=number("height"), default=120.0,
+        "--height",
+        metavar="M",
+        type=number("height"),
+        default=120.0,
         help="of both ends above ground, m (default: 120)",
-    )  # fmt: skip
+    )
     terrain_option(parser.group("where it flies"))
     flown = parser.group("aircraft and autopilot")
     completed(
         flown.add_argument(
-            "--aircraft", metavar="AIRCRAFT", default="aerosonde",
+            "--aircraft",
+            metavar="AIRCRAFT",
+            default="aerosonde",
             help="a name that planfly aircraft lists, or a folder (default: aerosonde)",
         ),
         aircraft_words,
-    )  # fmt: skip
+    )
     flown.add_argument("--autopilot-law", choices=CHOICES["autopilot_law"], help="whose law flies (default: ardupilot)")
     result_options(parser)
 

@@ -22,14 +22,19 @@ def paper_options(line: LineParser) -> None:
         "planfly paper --problems 7,60 --runs 5 --out my-paper",
     )
     parser.add_argument(
-        "--problems", metavar="N,...", type=problems, default=CHOICES["problems"],
+        "--problems",
+        metavar="N,...",
+        type=problems,
+        default=CHOICES["problems"],
         help="numbers of threats (default: 7,15,30,60)",
-    )  # fmt: skip
+    )
     parser.add_argument("--runs", metavar="N", type=number("runs"), default=15, help="seeds 1..N of each (default: 15)")
     parser.add_argument(
-        "--algorithm", metavar="A", default="umda",
+        "--algorithm",
+        metavar="A",
+        default="umda",
         help="the algorithm beside the two baselines (default: umda, the paper's)",
-    )  # fmt: skip
+    )
     parser.add_argument("--jobs", metavar="N", type=number("jobs"), help="processes (default: one a core)")
     result_options(parser, "where tables and figures go (default: runs/paper, replaced)")
 

@@ -44,16 +44,20 @@ def plan_options(line: LineParser) -> None:
         "--algorithm", metavar="A", help="the planner's algorithm, in place of the scenario's (see below)"
     )
     planning.add_argument(
-        "--budget", metavar="N|Xs", type=budget,
+        "--budget",
+        metavar="N|Xs",
+        type=budget,
         help="stop after N evaluations or X seconds with the best plan so far (as Ctrl-C does); a plan under a budget "
         "in seconds may differ from run to run",
-    )  # fmt: skip
+    )
     planning.add_argument(
-        "--front", metavar="N", type=number("front"),
+        "--front",
+        metavar="N",
+        type=number("front"),
         help="a choice of up to N plans (2 to 100), none better than another in length, exposure to radars, height "
-        "above ground and energy at once (time for energy with [planner] objective = \"time\"); --out is then a folder "
+        'above ground and energy at once (time for energy with [planner] objective = "time"); --out is then a folder '
         "of plan-1.json ..., front.csv, front.json and pictures (default: runs/<name>-seed<N>-front, replaced)",
-    )  # fmt: skip
+    )
     again = parser.group("planning again in flight")
     completed(
         again.add_argument("--from", dest="old", metavar="PLAN.json", help="the plan that is being flown"),
@@ -61,9 +65,13 @@ def plan_options(line: LineParser) -> None:
     )
     again.add_argument("--at-leg", metavar="K", type=number("at_leg"), help="legs before K have been flown and stay")
     again.add_argument(
-        "--add-threat", dest="threats", metavar="EAST,NORTH,KILL,DETECTION", type=threat, action="append",
+        "--add-threat",
+        dest="threats",
+        metavar="EAST,NORTH,KILL,DETECTION",
+        type=threat,
+        action="append",
         help="a threat that has popped up, in m; repeatable",
-    )  # fmt: skip
+    )
     flown_by_options(parser)
     pilot_options(parser)
     result_options(parser, "the plan file (default: runs/<name>-seed<N>/plan.json, replaced)", "FILE")
@@ -85,9 +93,14 @@ def plan(args: argparse.Namespace) -> int:
     evaluations, seconds = args.budget or (None, None)
     with _best_so_far() as stop:
         made = call(
-            planfly.plan if args.old is None else planfly.replan, args, budget=evaluations, seconds=seconds, out=out,
-            overwrite=args.overwrite or args.out is None, stop=stop,
-        )  # fmt: skip
+            planfly.plan if args.old is None else planfly.replan,
+            args,
+            budget=evaluations,
+            seconds=seconds,
+            out=out,
+            overwrite=args.overwrite or args.out is None,
+            stop=stop,
+        )
     target = expand_path_pattern(out, made.scenario.name, made.seed)
     print_warnings(made.scenario.notes)
     _print_plan(made)
@@ -112,9 +125,14 @@ def _front(args: argparse.Namespace) -> int:
     out = FRONT_FOLDER if args.out is None else args.out
     with _best_so_far() as stop:
         made = call(
-            planfly.plan_front, args, count=args.front, seconds=seconds, out=out,
-            overwrite=args.overwrite or args.out is None, stop=stop,
-        )  # fmt: skip
+            planfly.plan_front,
+            args,
+            count=args.front,
+            seconds=seconds,
+            out=out,
+            overwrite=args.overwrite or args.out is None,
+            stop=stop,
+        )
     default = made.default.plan
     folder = expand_path_pattern(out, default.scenario.name, default.seed)
     print_warnings(default.scenario.notes)

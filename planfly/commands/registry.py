@@ -38,8 +38,12 @@ class Command(NamedTuple):
         return getattr(module, (self.function or self.name) + ending)
 
 
-_FLY, _LOOK, _OTHERS = "plan and fly", "judge and show", "logs of autopilots"
-_MANY, _AIRCRAFT, _HELP = "many flights", "aircraft, scenarios and terrain", "help"
+_FLY = "plan and fly"
+_LOOK = "judge and show"
+_OTHERS = "logs of autopilots"
+_MANY = "many flights"
+_AIRCRAFT = "aircraft, scenarios and terrain"
+_HELP = "help"
 
 COMMANDS = (
     Command("run", _FLY, "RunAnswer"),
@@ -97,8 +101,7 @@ def find_command(name: str) -> CommandFunction:
     >>> find_command("scenarios").__module__
     'planfly.commands.shell'
     """
-    function: CommandFunction = _named(name).load()
-    return function
+    return _named(name).load()
 
 
 def _named(name: str) -> Command:

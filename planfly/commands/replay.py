@@ -29,8 +29,11 @@ if TYPE_CHECKING:
 
 # Frames a second on a terminal.
 _RATE = 10.0
-_ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
-_HOME, _TO_LINE_END, _TO_END = "\x1b[H", "\x1b[K", "\x1b[J"
+_ENTER = "\x1b[?1049h\x1b[?25l"
+_LEAVE = "\x1b[?25h\x1b[?1049l"
+_HOME = "\x1b[H"
+_TO_LINE_END = "\x1b[K"
+_TO_END = "\x1b[J"
 
 
 def replay_options(line: LineParser) -> None:
@@ -78,9 +81,11 @@ def replay_options(line: LineParser) -> None:
         "--allow-origin", metavar="URL,URL", help="web pages that --foxglove lets in beside Foxglove's (https://HOST)"
     )
     other.add_argument(
-        "--wait", metavar="S", type=number("wait"),
+        "--wait",
+        metavar="S",
+        type=number("wait"),
         help="wait S seconds for a ground station (default: 10) or for Foxglove (default: forever)",
-    )  # fmt: skip
+    )
     own_link_options(parser, bind="127.0.0.1:0")
     result_options(parser)
 

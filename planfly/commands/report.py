@@ -42,9 +42,12 @@ def report(args: argparse.Namespace) -> int:
     source = Path(args.log)
     log = planfly.read_log(source)
     written = planfly.report(
-        log, args.out or source.with_name(f"{source.stem}-report"), svg=args.svg,
-        overwrite=args.overwrite or args.out is None, command=f"planfly report {args.log}",
-    )  # fmt: skip
+        log,
+        args.out or source.with_name(f"{source.stem}-report"),
+        svg=args.svg,
+        overwrite=args.overwrite or args.out is None,
+        command=f"planfly report {args.log}",
+    )
     for file in written.files:
         print(f"report    {file}")
     code = NOT_FLYABLE if written.verdict is None else verdict_code(written.verdict)

@@ -33,13 +33,18 @@ def run_options(line: LineParser) -> None:
     scenario_argument(parser, nargs="?", default="jacksboro", help="TOML file or embedded name (default: jacksboro)")
     planning = parser.group("planning")
     planning.add_argument(
-        "--seed", metavar="N", type=number("seed"),
+        "--seed",
+        metavar="N",
+        type=number("seed"),
         help="seed of planner and turbulence (default: the scenario's, or 1)",
-    )  # fmt: skip
+    )
     planning.add_argument(
-        "--refine", metavar="N", type=number("refine"), default=0,
+        "--refine",
+        metavar="N",
+        type=number("refine"),
+        default=0,
         help="if it does not fly, tighten the limits and try again, up to N times (default: 0)",
-    )  # fmt: skip
+    )
     terrain_option(planning)
     flight_options(parser)
     log_rate_option(parser.group("the log"))

@@ -38,14 +38,19 @@ def serve_options(line: LineParser) -> None:
     time_option(world_options(parser))
     steering_options(parser)
     parser.add_argument(
-        "--to", metavar="IP:PORT,...", default="127.0.0.1:14550",
+        "--to",
+        metavar="IP:PORT,...",
+        default="127.0.0.1:14550",
         help="where ground stations listen (default: 127.0.0.1:14550)",
-    )  # fmt: skip
+    )
     own_link_options(parser, bind="127.0.0.1:14580")
     parser.add_argument(
-        "--speed", metavar="X", type=number("served_speed"), default=1.0,
+        "--speed",
+        metavar="X",
+        type=number("served_speed"),
+        default=1.0,
         help="fly at X times real time, 0.1 to 100 (default: 1)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--log", metavar="DIR", default="runs/serve", help="folder of the flight logs (default: runs/serve)"
     )

@@ -35,12 +35,14 @@ def studio_options(line: LineParser) -> None:
     )
     completed(
         parser.add_argument(
-            "what", metavar="SCENARIO|MISSION|PLAN", nargs="?",
+            "what",
+            metavar="SCENARIO|MISSION|PLAN",
+            nargs="?",
             help="a scenario, by name or .toml, whose path is planned; plan.json, .waypoints, .plan; or a "
             "log's mission (default: jacksboro)",
         ),
         files("toml", "mcap", *MISSIONS, *IMPORTED_LOGS),
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--port", metavar="PORT", type=number("port"), help="where it listens (default: 8790, or any free one)"
     )

@@ -30,11 +30,13 @@ def survey_options(line: LineParser) -> None:
     )
     group = parser.group("the survey")
     group.add_argument(
-        "--camera", metavar="WxH,FOCAL", type=camera,
+        "--camera",
+        metavar="WxH,FOCAL",
+        type=camera,
         help="the camera, which looks straight down: its sensor across the way and along it, and its focal length, mm, "
         "as in 23.5x15.6,16; then the overlaps asked for, along and across, as in 23.5x15.6,16,75,60 "
         "(default: those of a .plan)",
-    )  # fmt: skip
+    )
     group.add_argument(
         "--suggest",
         action="store_true",

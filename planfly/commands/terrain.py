@@ -34,15 +34,17 @@ def terrain_options(line: LineParser) -> None:
     )
     tiles = parser.group("the tiles")
     tiles.add_argument(
-        "--source", metavar="DIR|URL",
+        "--source",
+        metavar="DIR|URL",
         help="a folder of tiles or an elevation file; or a server of GLO-30 tiles of the Copernicus DEM (default: the "
         "public one in Amazon's registry of open data, of which the parts that are needed are fetched, and kept)",
-    )  # fmt: skip
+    )
     tiles.add_argument(
-        "--sea", action="store_true",
+        "--sea",
+        action="store_true",
         help="degrees of which the server has no tile are sea, at 0 m (default: no data there, for some countries' "
         "tiles are not published)",
-    )  # fmt: skip
+    )
     result_options(parser, "the file to write (default: dem.tif)", "FILE")
 
 
@@ -67,10 +69,15 @@ def terrain(args: argparse.Namespace) -> int:
         from planfly.terminal.answers import TerrainAnswer
 
         return TerrainAnswer(
-            exit_code=FLYABLE, file=str(made.file), rows=rows, columns=cols, tiles=list(made.tiles),
+            exit_code=FLYABLE,
+            file=str(made.file),
+            rows=rows,
+            columns=cols,
+            tiles=list(made.tiles),
             absent=[list(degree) for degree in made.absent],
-            empty_pixels=made.empty, fetched_bytes=made.fetched,
-        )  # fmt: skip
+            empty_pixels=made.empty,
+            fetched_bytes=made.fetched,
+        )
 
     give_answer(args, answer)
     return FLYABLE

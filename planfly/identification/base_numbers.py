@@ -7,7 +7,6 @@ from functools import partial
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from aircraft.identification.base_model import BaseModel, Coefficients
@@ -16,12 +15,14 @@ from aircraft.identification.motor import Motor
 from aircraft.identification.propeller_disc import PropellerDisc
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import straight
+from world.arrays import Floats
 from world.errors import FlightError
 
-Floats = NDArray[np.float64]
-
 # Height at which it is taken, m; steps of angles (rad), of rates (rad/s) and of surfaces (rad).
-_AMSL, _ANGLE, _RATE, _SURFACE = 500.0, 1e-3, 1e-3, 1e-3
+_AMSL = 500.0
+_ANGLE = 1e-3
+_RATE = 1e-3
+_SURFACE = 1e-3
 _SLUG_FT2 = 1.3558179483314004
 
 
@@ -87,16 +88,34 @@ class _Probe:
             self._slope(partial(self._rate, k), _RATE) / size for k, size in enumerate((across, along, across))
         )
         return Coefficients(
-            drag_zero=float(constant - induced * least * least), drag_induced=float(induced),
+            drag_zero=float(constant - induced * least * least),
+            drag_induced=float(induced),
             drag_elevator=float(elevator[0]),
-            lift_zero=float(zero[1]), lift_alpha=float(alpha[1]), lift_rate=float(pitch[1]),
-            lift_elevator=float(elevator[1]), side_beta=float(beta[2]), side_aileron=float(aileron[2]),
-            side_rudder=float(rudder[2]), roll_beta=float(beta[3]), roll_roll=float(roll[3]), roll_yaw=float(yaw[3]),
-            roll_aileron=float(aileron[3]), roll_rudder=float(rudder[3]), pitch_zero=float(zero[4]),
-            pitch_alpha=float(alpha[4]), pitch_rate=float(pitch[4]), pitch_elevator=float(elevator[4]),
-            yaw_beta=float(beta[5]), yaw_roll=float(roll[5]), yaw_yaw=float(yaw[5]), yaw_aileron=float(aileron[5]),
-            yaw_rudder=float(rudder[5]), lift_least_drag=float(least), side_roll=float(roll[2]), side_yaw=float(yaw[2]),
-        )  # fmt: skip
+            lift_zero=float(zero[1]),
+            lift_alpha=float(alpha[1]),
+            lift_rate=float(pitch[1]),
+            lift_elevator=float(elevator[1]),
+            side_beta=float(beta[2]),
+            side_aileron=float(aileron[2]),
+            side_rudder=float(rudder[2]),
+            roll_beta=float(beta[3]),
+            roll_roll=float(roll[3]),
+            roll_yaw=float(yaw[3]),
+            roll_aileron=float(aileron[3]),
+            roll_rudder=float(rudder[3]),
+            pitch_zero=float(zero[4]),
+            pitch_alpha=float(alpha[4]),
+            pitch_rate=float(pitch[4]),
+            pitch_elevator=float(elevator[4]),
+            yaw_beta=float(beta[5]),
+            yaw_roll=float(roll[5]),
+            yaw_yaw=float(yaw[5]),
+            yaw_aileron=float(aileron[5]),
+            yaw_rudder=float(rudder[5]),
+            lift_least_drag=float(least),
+            side_roll=float(roll[2]),
+            side_yaw=float(yaw[2]),
+        )
 
     def _surface(self, k: int, step: float) -> Floats:
         return self._at(0.0, surfaces=step * np.eye(3)[k])
@@ -218,8 +237,13 @@ def scaled(base: BaseModel, mass: float, span: float, area: float, volts: float 
     slender = (span * span / area) / (base.span * base.span / base.area)
     induced = base.coefficients.drag_induced / slender
     return replace(
-        base, coefficients=replace(base.coefficients, drag_induced=induced),
-        induced_factor=base.induced_factor / slender, mass=mass, span=span, area=area, chord=chord,
+        base,
+        coefficients=replace(base.coefficients, drag_induced=induced),
+        induced_factor=base.induced_factor / slender,
+        mass=mass,
+        span=span,
+        area=area,
+        chord=chord,
         inertia=(ixx * factor, iyy * factor, izz * factor, ixz * factor),
         motor=base.motor if volts is None else base.motor.for_voltage(volts),
-    )  # fmt: skip
+    )

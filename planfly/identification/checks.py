@@ -14,7 +14,8 @@ _KNOWN = 0.3
 # Slopes of lift curves, per rad, of wings as there are.
 LIFT_SLOPES = (3.0, 7.0)
 # A change of mass within the logs, as a share, and how many of its standard deviations it must be.
-MASS_CHANGE, _SURE = 0.05, 4.0
+MASS_CHANGE = 0.05
+_SURE = 4.0
 _BLOCK_SECONDS = 30.0
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft, read_aircraft
 from aircraft.identification.base_model import BaseModel
@@ -24,18 +23,37 @@ from logs.importers.motion import MotionLog
 from planfly.identification.manoeuvres import identification_mission
 from planfly.identification.model_text import identified_xml
 from planfly.identification.servos import ServoOutput
+from world.arrays import Floats
 from world.files import temporary_folder
 
-Floats = NDArray[np.float64]
-
 # Height at which performance is stated, m, and the density of the standard atmosphere there, kg/m^3 (ISO 2533).
-AMSL, DENSITY = 480.0, 1.1695
+AMSL = 480.0
+DENSITY = 1.1695
 # Parameters of a log that say how it flew, by their beginnings; the rest is of its hardware.
 _FLYING = (
-    "AIRSPEED_", "ARSPD_FBW_", "TECS_", "NAVL1_", "RLL_RATE_", "PTCH_RATE_", "RLL2SRV_", "PTCH2SRV_", "YAW2SRV_",
-    "KFF_",    "ROLL_LIMIT_DEG", "PTCH_LIM_", "PTCH_TRIM_DEG", "SCALING_SPEED", "TRIM_THROTTLE", "THR_MIN", "THR_MAX",
-    "THR_SLEWRATE", "WP_RADIUS", "WP_LOITER_RAD", "RTL_", "LEVEL_ROLL_LIMIT",
-)  # fmt: skip
+    "AIRSPEED_",
+    "ARSPD_FBW_",
+    "TECS_",
+    "NAVL1_",
+    "RLL_RATE_",
+    "PTCH_RATE_",
+    "RLL2SRV_",
+    "PTCH2SRV_",
+    "YAW2SRV_",
+    "KFF_",
+    "ROLL_LIMIT_DEG",
+    "PTCH_LIM_",
+    "PTCH_TRIM_DEG",
+    "SCALING_SPEED",
+    "TRIM_THROTTLE",
+    "THR_MIN",
+    "THR_MAX",
+    "THR_SLEWRATE",
+    "WP_RADIUS",
+    "WP_LOITER_RAD",
+    "RTL_",
+    "LEVEL_ROLL_LIMIT",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,14 +155,24 @@ def _metadata(found: Identified, battery: tuple[float, float], slow: float, fast
     stall = min(slow if slow > 0.0 else base.stall_speed, least)
     volts, energy = battery
     rows = {
-        "mass_kg": found.numbers.mass, "wing_area_m2": found.numbers.area, "wing_span_m": found.numbers.span,
-        "airspeed_mps": cruise, "airspeed_min_mps": least, "airspeed_max_mps": most, "stall_speed_mps": stall,
+        "mass_kg": found.numbers.mass,
+        "wing_area_m2": found.numbers.area,
+        "wing_span_m": found.numbers.span,
+        "airspeed_mps": cruise,
+        "airspeed_min_mps": least,
+        "airspeed_max_mps": most,
+        "stall_speed_mps": stall,
         "max_bank_deg": value("ROLL_LIMIT_DEG", math.degrees(base.max_bank)),
-        "max_pitch_deg": math.degrees(base.max_pitch), "max_elevator_deg": math.degrees(base.max_elevator),
-        "max_aileron_deg": math.degrees(base.max_aileron), "max_rudder_deg": math.degrees(base.max_rudder),
-        "surface_rate_deg_s": math.degrees(base.surface_rate), "surface_lag_s": base.surface_lag,
-        "motor_lag_s": base.motor_lag, "battery_v": volts, "battery_wh": energy / 3600.0,
-    }  # fmt: skip
+        "max_pitch_deg": math.degrees(base.max_pitch),
+        "max_elevator_deg": math.degrees(base.max_elevator),
+        "max_aileron_deg": math.degrees(base.max_aileron),
+        "max_rudder_deg": math.degrees(base.max_rudder),
+        "surface_rate_deg_s": math.degrees(base.surface_rate),
+        "surface_lag_s": base.surface_lag,
+        "motor_lag_s": base.motor_lag,
+        "battery_v": volts,
+        "battery_wh": energy / 3600.0,
+    }
     lines = [
         "# What planner, guidance and verdict need to know of the aircraft; posterior.toml says what was estimated.",
         f'title = "aircraft of {found.numbers.mass:.3g} kg, identified from flight logs"',

@@ -18,7 +18,8 @@ from world.frames import GeoOrigin, to_geo
 # itself can be flown in the wind there may be.
 _SHARE = 0.85
 # Seconds of a run, and of a climb or a glide.
-_RUN, _SLOPE = 25.0, 25.0
+_RUN = 25.0
+_SLOPE = 25.0
 # Height above home that it begins at, m.
 _UP = 150.0
 
@@ -62,10 +63,19 @@ def _places(
     between = 0.5 * (slow + cruise)
     # Speed, seconds, and -1, 0 or 1 for down, level and up.
     figure = (
-        (cruise, _RUN, 0), (cruise, _SLOPE, 1), (slow, _RUN, 0), (cruise, _SLOPE, -1), (fast, _RUN, 0),
-        (between, _SLOPE, 1), (cruise, _RUN, 0), (fast, _SLOPE, -1), (between, _RUN, 0), (cruise, _SLOPE, 1),
-        (0.5 * (cruise + fast), _RUN, 0), (cruise, _SLOPE, -1),
-    )  # fmt: skip
+        (cruise, _RUN, 0),
+        (cruise, _SLOPE, 1),
+        (slow, _RUN, 0),
+        (cruise, _SLOPE, -1),
+        (fast, _RUN, 0),
+        (between, _SLOPE, 1),
+        (cruise, _RUN, 0),
+        (fast, _SLOPE, -1),
+        (between, _RUN, 0),
+        (cruise, _SLOPE, 1),
+        (0.5 * (cruise + fast), _RUN, 0),
+        (cruise, _SLOPE, -1),
+    )
     east = north = 0.0
     up, heading = base, 0.0
     yield east, north, up, cruise

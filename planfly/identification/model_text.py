@@ -7,9 +7,6 @@ estimate: a draw of the aircraft is another set of them.
 
 from xml.etree import ElementTree
 
-import numpy as np
-from numpy.typing import NDArray
-
 from aircraft.catalog import Aircraft
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.electric_motor import ElectricMotor
@@ -17,11 +14,11 @@ from aircraft.identification.motor import Motor
 from aircraft.identification.parameters import INDEX, PARAMETERS
 from aircraft.identification.propeller_disc import PropellerDisc
 from aircraft.xml_text import number
+from world.arrays import Floats
 from world.errors import FlightError
 
-Floats = NDArray[np.float64]
-
-_SLUG_FT2, _POUND = 1.3558179483314004, 0.45359237
+_SLUG_FT2 = 1.3558179483314004
+_POUND = 0.45359237
 # Angles of attack beyond this, rad, are not seen in flight: what was estimated is held from there on.
 _LARGEST_ALPHA = 0.25
 
@@ -86,9 +83,11 @@ def _part(root: ElementTree.Element, path: str, base: Aircraft) -> ElementTree.E
     if found is None:
         allowed = "a model to identify from needs it, as aircraft/aerosonde/aerosonde.xml has it"
         raise FlightError(
-            f"{base.model_file}: no <{path.replace('/', '><')}>: {allowed}", file=base.model_file, field=path,
+            f"{base.model_file}: no <{path.replace('/', '><')}>: {allowed}",
+            file=base.model_file,
+            field=path,
             allowed=allowed,
-        )  # fmt: skip
+        )
     return found
 
 
@@ -181,7 +180,7 @@ def _additions(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control
             _term(c.yaw_aileron, _factor("adverse-yaw"), aileron),
             _term(c.yaw_rudder, _factor("rudder-power"), rudder),
         ),
-    }  # fmt: skip
+    }
     if axis not in sums:
         return ""
     scale, *terms = sums[axis]
@@ -192,7 +191,9 @@ def _additions(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control
 # ----------------------------------------------------------------------
 # Motor and propeller.
 
-_RHO, _SPEED, _AIR = "<p> motor/rho-kg_m3 </p>", "<p> motor/propeller-rad_sec </p>", "<p> motor/airspeed-mps </p>"
+_RHO = "<p> motor/rho-kg_m3 </p>"
+_SPEED = "<p> motor/propeller-rad_sec </p>"
+_AIR = "<p> motor/airspeed-mps </p>"
 
 
 def _reactions(numbers: BaseModel, values: Floats, kept: list[ElementTree.Element]) -> str:

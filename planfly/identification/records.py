@@ -3,26 +3,27 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from logs.importers.motion import MotionLog, Samples
 from planfly.identification.base_numbers import is_flying_wing
 from planfly.identification.servos import ServoOutput
+from world.arrays import Flags, Floats
 from world.errors import LogError
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # Rows a second that inertial sensors and outputs need for an estimate of the moments: 10 Hz are a little more or less
 # in a log.  With fewer than `PLENTY_HZ` the setting that records more is named.
-MIN_HZ, PLENTY_HZ = 9.5, 20.0
+MIN_HZ = 9.5
+PLENTY_HZ = 20.0
 # Flight that a log must have after what cannot be used is cut, s; and a stretch, s.
-MIN_SECONDS, MIN_STRETCH = 180.0, 30.0
+MIN_SECONDS = 180.0
+MIN_STRETCH = 30.0
 # A pause between rows that parts two stretches, s; of airspeed and wind, which come more slowly: PX4's wind once a
 # second, more or less.
-_GAP, _AIR_GAP, _SLOW_WIND_GAP = 0.5, 1.0, 2.5
+_GAP = 0.5
+_AIR_GAP = 1.0
+_SLOW_WIND_GAP = 2.5
 # After taking off or being let go, s.
 _SETTLING = 15.0
 # Flight: faster than this share of AIRSPEED_MIN.
@@ -31,11 +32,16 @@ _FLYING = 0.8
 # surfaces under control: INITIALISING 16.
 _VTOL_MODES = frozenset({17, 18, 19, 20, 21, 22, 23, 25})
 # SERVOn_FUNCTION (ArduPilot's parameter list).
-_AILERON, _ELEVATOR, _RUDDER, _THROTTLE = 4, 19, 21, 70
-_ELEVON_LEFT, _ELEVON_RIGHT = 77, 78
+_AILERON = 4
+_ELEVATOR = 19
+_RUDDER = 21
+_THROTTLE = 70
+_ELEVON_LEFT = 77
+_ELEVON_RIGHT = 78
 _MIXED = {79: "a V-tail", 80: "a V-tail"}
 # Outputs of a flying wing by their names: surfaces that are mixed into elevator and ailerons.
-LEFT, RIGHT = "left elevon", "right elevon"
+LEFT = "left elevon"
+RIGHT = "right elevon"
 _FLAPS = {
     2: "flap",
     3: "automatic flap",
@@ -130,19 +136,25 @@ def _shares_as_angles(shares: Floats, aircraft: Aircraft) -> Floats:
 # What the series are called, by whose log it is.
 _SERIES = {
     "ardupilot": {
-        "inertial": "IMU, the inertial sensors", "outputs": "RCOU, the servo outputs", "attitude": "ATT, the attitude",
-        "velocity": "XKF1, the velocity", "height": "POS, the height",
-        "airspeed": "ARSP of a sensor in use (U = 1), the airspeed", "wind": "XKF2, the wind",
+        "inertial": "IMU, the inertial sensors",
+        "outputs": "RCOU, the servo outputs",
+        "attitude": "ATT, the attitude",
+        "velocity": "XKF1, the velocity",
+        "height": "POS, the height",
+        "airspeed": "ARSP of a sensor in use (U = 1), the airspeed",
+        "wind": "XKF2, the wind",
     },
     "px4": {
         "inertial": "sensor_combined, the inertial sensors",
         "outputs": "actuator_servos and actuator_motors, nor actuator_controls_0: actuator_outputs alone do not say"
         " what they move",
-        "attitude": "vehicle_attitude, the attitude", "velocity": "vehicle_local_position, the velocity",
+        "attitude": "vehicle_attitude, the attitude",
+        "velocity": "vehicle_local_position, the velocity",
         "height": "vehicle_global_position, the height",
-        "airspeed": "airspeed_validated of a sensor in use, the airspeed", "wind": "wind, the wind",
+        "airspeed": "airspeed_validated of a sensor in use, the airspeed",
+        "wind": "wind, the wind",
     },
-}  # fmt: skip
+}
 
 
 def _refuse(log: MotionLog) -> None:

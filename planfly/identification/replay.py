@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft, read_aircraft
 from aircraft.identification.alignment import Clocks, Signals, align
@@ -20,12 +19,12 @@ from aircraft.identification.level import levelled
 from aircraft.identification.parameters import PARAMETERS, prior_means
 from flight.dynamics.fdm import Fdm
 from planfly.identification.folder import Identified
+from world.arrays import Floats
 from world.files import temporary_folder
 
-Floats = NDArray[np.float64]
-
 # Seconds of a window, how many of a log, and steps a second of JSBSim.
-WINDOW, COUNT = 5.0, 40
+WINDOW = 5.0
+COUNT = 40
 _HZ = 100.0
 # Gusts are taken below this, Hz.
 _GUST_BAND = 2.0

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.errors import FlightError
 from world.files import read_toml
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 # Either side of the estimate, as a share of it, from which on an interval (95 %) is wide.
-WIDE_SINK, WIDE_POWER = 0.10, 0.20
+WIDE_SINK = 0.10
+WIDE_POWER = 0.20
 # `benchmarks.identification_information`: a glide of so many seconds tells what half an hour of powered flight cannot.
 GLIDE_SECONDS = 20
 
@@ -46,10 +47,12 @@ def wide_numbers(sink: Interval, power: Interval, *, with_current: bool) -> tupl
     for title, (low, value, high), limit, show in (
         ("sink at idle", sink, WIDE_SINK, f"glides of {GLIDE_SECONDS} s at idle, at cruise speed"),
         (
-            "power in level flight", power, WIDE_POWER,
+            "power in level flight",
+            power,
+            WIDE_POWER,
             speeds if with_current else "with the battery's current logged (BAT); no manoeuvre does without it",
         ),
-    ):  # fmt: skip
+    ):
         half = 0.5 * (high - low) / abs(value)
         if half > limit:
             made.append(WideNumber(title, half, show))

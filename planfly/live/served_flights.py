@@ -10,7 +10,6 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from flight.live.flight_process import (
@@ -54,12 +53,11 @@ from planfly.named_fences import read_named_fences
 from planfly.workflow.airframe import Airframe, airframe_of, choose_seed, load_airframe
 from planfly.workflow.open_flight import make_setup, open_flight
 from planfly.workflow.reference_flights import judge_with_reference_flights
+from world.arrays import Floats
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.interruption import end_with_parent
 from world.scenario import Scenario, in_the_air
-
-Floats = NDArray[np.float64]
 
 DEFAULT_SCENARIO = "jacksboro-air"
 # Duration of a loiter in LOITER and GUIDED in one log, s: each lap of a loiter is laid out, and judged, separately.

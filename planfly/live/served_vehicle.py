@@ -69,9 +69,13 @@ def _make_vehicle(
     )
     standby = standby_at_start(served.scenario)
     return Vehicle(
-        link, pool.spawn, parameters, standby, airframe.battery,
+        link,
+        pool.spawn,
+        parameters,
+        standby,
+        airframe.battery,
         lambda text: on_message(f"{time.strftime('%H:%M:%S')} {text}"),
-    )  # fmt: skip
+    )
 
 
 class _FlightPool:

@@ -13,7 +13,6 @@ from itertools import pairwise, product
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, turn_tangents
 from flight.autopilots.autopilot import Autopilot
@@ -25,10 +24,10 @@ from planner.evaluation.certify import certify, kill_distance
 from planner.evaluation.certify_kernels import heights_above_ground
 from planner.evaluation.problem import Problem, make_problem
 from planner.plan import Plan
+from world.arrays import Floats
 from world.scenario import Scenario
 from world.wind import Turbulence
 
-Floats = NDArray[np.float64]
 Search = Callable[[Limits], Plan]
 Gust = Literal["downdrafts", "updrafts"]
 

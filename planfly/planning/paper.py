@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planfly.arguments import check_arguments
 from planfly.runtime.stages import stage
@@ -23,12 +22,10 @@ from planfly.workflow.make_plan import Advance, make_plan
 from planfly.workflow.output_paths import prepare_folder, refuse_folder
 from planner.plan import Objective, Violation
 from planner.search.algorithms import find_algorithm
+from world.arrays import Floats
 from world.files import hold, write_whole
 from world.interruption import children_ignore_sigint, end_children, end_with_parent, uninterrupted
 from world.scenario import Scenario, load_scenario, with_planner
-
-Floats = NDArray[np.float64]
-
 
 # Numbers of threats in the problems of the paper.
 PROBLEMS = (7, 15, 30, 60)

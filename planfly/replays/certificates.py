@@ -4,7 +4,8 @@ from datetime import UTC, datetime
 from typing import NamedTuple
 
 # Whatever a clock is set to while a run lasts, its certificate stays valid.
-_FROM, _UNTIL = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 12, 31, tzinfo=UTC)
+_FROM = datetime(1970, 1, 1, tzinfo=UTC)
+_UNTIL = datetime(9999, 12, 31, tzinfo=UTC)
 
 
 class Certificate(NamedTuple):

@@ -69,9 +69,15 @@ def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: Origi
     certificate = temporary_certificate()
     try:
         server = foxglove.start_server(
-            name=name, host=HOST, port=0, server_listener=broadcast, capabilities=[foxglove.Capability.Time],
-            context=broadcast.context, tls_cert=certificate.certificate.encode(), tls_key=certificate.key.encode(),
-        )  # fmt: skip
+            name=name,
+            host=HOST,
+            port=0,
+            server_listener=broadcast,
+            capabilities=[foxglove.Capability.Time],
+            context=broadcast.context,
+            tls_cert=certificate.certificate.encode(),
+            tls_key=certificate.key.encode(),
+        )
     except RuntimeError as error:
         raise OSError(0, str(error), HOST) from error
     gate.open(server.port, certificate)

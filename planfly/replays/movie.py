@@ -119,9 +119,16 @@ def _gif(film: MovieFrames) -> bytes:
     data = io.BytesIO()
     durations = [round(1000 / RATE)] * len(rest) + [_LAST_FRAME_MS]
     first.save(
-        data, "GIF", save_all=True, append_images=rest, duration=durations, loop=0, optimize=False, disposal=1,
+        data,
+        "GIF",
+        save_all=True,
+        append_images=rest,
+        duration=durations,
+        loop=0,
+        optimize=False,
+        disposal=1,
         transparency=_TRANSPARENT,
-    )  # fmt: skip
+    )
     return data.getvalue()
 
 
@@ -144,9 +151,25 @@ def _mp4(film: MovieFrames, program: str) -> bytes:
     with temporary_folder("planfly-movie-") as folder, tempfile.TemporaryFile() as messages:
         out = folder / "film.mp4"
         command = [
-            program, "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
-            "-r", str(RATE), "-i", "-", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(out),
-        ]  # fmt: skip
+            program,
+            "-loglevel",
+            "error",
+            "-f",
+            "rawvideo",
+            "-pix_fmt",
+            "rgb24",
+            "-s",
+            f"{width}x{height}",
+            "-r",
+            str(RATE),
+            "-i",
+            "-",
+            "-pix_fmt",
+            "yuv420p",
+            "-movflags",
+            "+faststart",
+            str(out),
+        ]
         with (
             stage("drawing", "drawing frames") as advance,
             subprocess.Popen(command, stdin=subprocess.PIPE, stderr=messages) as encoder,

@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.mission.items import LANDINGS, Command, Frame, Mission, MissionItem
@@ -16,11 +15,10 @@ from flight.simulation.track import Track
 from logs.verdict.returns.judge_returns import ReturnWorld
 from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
+from world.arrays import Floats
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.kernels import Record
-
-Floats = NDArray[np.float64]
 
 # Length of the lead-in, m, so that the flight is steady at the start of the return.
 LEAD = 500.0

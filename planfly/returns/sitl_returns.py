@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.rtl_point_mass import (
@@ -40,11 +39,10 @@ from logs.verdict.returns.returns_text import measured_text
 from planfly.returns.jsbsim_returns import LEAD, from_start, met_on_way, return_setup
 from planfly.runtime.stages import stage
 from planfly.workflow.pipeline import fly_and_judge
+from world.arrays import Floats
 from world.errors import ArgumentError, MissionError
 from world.kernels import Record
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 # Least height above ground of the lead-in to the start of a return, m; a return with a lower lead-in is not flown.
 _MIN_LEAD_IN_HEIGHT_M = 20.0

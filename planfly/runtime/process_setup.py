@@ -73,8 +73,7 @@ def with_large_stack(work: Callable[[], _Given]) -> _Given:
     7
     """
     roomy = _run.__code__.replace(co_stacksize=_STACK_VALUES)
-    given: _Given = FunctionType(roomy, globals())(work)
-    return given
+    return FunctionType(roomy, globals())(work)
 
 
 def _run(work: Callable[[], _Given]) -> _Given:

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import LANDINGS, Mission
 from flight.mission.route import Route
@@ -18,10 +17,9 @@ from logs.verdict.places import Change, Suggestion
 from planfly.studio.edit_context import EditContext, Judged
 from planfly.studio.edits import at_height, at_speed, moved, places
 from planfly.studio.states import violated_legs
+from world.arrays import Floats
 from world.errors import MissionError
 from world.geometry import leg_courses, signed_turns
-
-Floats = NDArray[np.float64]
 
 _PATH_CHANGES = (
     "length",

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import AMSL, LANDINGS, TAKEOFFS, Command, Mission
 from flight.mission_files.formats import mission_text, parse_mission
@@ -29,12 +28,11 @@ from planner.evaluation.certify import certify
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.plan import Certificate, Plan, plan_json
+from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import LogError, MissionError, PlanflyError
 from world.files import temporary_folder
 from world.scenario import Scenario, embedded_names
-
-Floats = NDArray[np.float64]
 
 # Largest file that may be dropped on the page, bytes.
 MAX_DROPPED = 16 * 2**20
@@ -149,8 +147,10 @@ def _open_file(path: Path, options: MissionOptions) -> FlightSetup:
 def _imported(path: Path, options: MissionOptions) -> ImportedFlight:
     """Read the flight of another program's log.  Raises PlanflyError, in the studio's words for a track alone."""
     world: LogOptions = {
-        "scenario": options.get("scenario"), "terrain": options.get("terrain"), "fence": options.get("fence") or (),
-    }  # fmt: skip
+        "scenario": options.get("scenario"),
+        "terrain": options.get("terrain"),
+        "fence": options.get("fence") or (),
+    }
     try:
         return read_imported(path, **world)
     except LogError as error:

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.from_plan import acceptance_radii
 from flight.mission.implied_scenario import implied_scenario
@@ -26,10 +25,10 @@ from planfly.studio.settings import SetParameters
 from planfly.workflow.airframe import Airframe, airframe_of
 from planfly.workflow.open_flight import make_setup
 from planner.plan import Plan
+from world.arrays import Floats
 from world.frames import to_geo, to_map
 from world.scenario import Scenario
 
-Floats = NDArray[np.float64]
 # Distance from the edge of its scenario, m, at which a mission without a given scenario gets a new one around it.
 _EDGE_DISTANCE_M = 500.0
 _NO_FENCES = NamedFences()

@@ -14,9 +14,9 @@ from PIL import Image
 from logs import theme
 from logs.views.charts import nice_step
 from logs.views.relief import relief
+from world.arrays import Floats
 from world.terrain import Terrain
 
-Floats = NDArray[np.float64]
 Range = tuple[float, float]
 
 # Pixels of the longer side.

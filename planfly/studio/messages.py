@@ -28,7 +28,7 @@ _Name = Annotated[str, Field(min_length=1, max_length=200)]
 # Keys of the [limits] table of a scenario.
 LimitName = Literal[
     "min_clearance_m", "max_height_m", "corridor_m", "max_turn_deg", "max_climb_deg", "max_dive_deg", "surveys"
-]  # fmt: skip
+]
 LIMITS: tuple[str, ...] = get_args(LimitName)
 
 

@@ -7,17 +7,15 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import AMSL, OVER_HOME, OVER_TERRAIN, PLACES, Command, Mission, MissionItem
 from flight.mission.placing import HIGHEST, LOWEST
 from flight.mission.route import Route, fly_over_waypoints
 from planfly.workflow.airframe import Airframe
+from world.arrays import Floats
 from world.frames import to_map
 from world.scenario import Scenario
 from world.scenario_tables import MAP_EXTENT
-
-Floats = NDArray[np.float64]
 
 # A drag changes at most this number of items.
 _MAX_MOVED_ITEMS = 8

@@ -140,10 +140,18 @@ async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], b
     app = make_app(server, listener.getsockname()[1])
     config = uvicorn.Config(
         app,
-        log_level="critical", access_log=False, server_header=False, date_header=False, lifespan="off",
-        ws="websockets-sansio", ws_max_size=MAX_DROPPED_MESSAGE + MAX_MESSAGE, timeout_graceful_shutdown=_GRACE_S,
-        limit_concurrency=_MAX_SOCKETS, h11_max_incomplete_event_size=16_384, http=ShortLived,
-    )  # fmt: skip
+        log_level="critical",
+        access_log=False,
+        server_header=False,
+        date_header=False,
+        lifespan="off",
+        ws="websockets-sansio",
+        ws_max_size=MAX_DROPPED_MESSAGE + MAX_MESSAGE,
+        timeout_graceful_shutdown=_GRACE_S,
+        limit_concurrency=_MAX_SOCKETS,
+        h11_max_incomplete_event_size=16_384,
+        http=ShortLived,
+    )
     web = Quiet(config)
     serving = asyncio.create_task(web.serve(sockets=[listener]))
     running = asyncio.create_task(server.run())

@@ -60,9 +60,12 @@ def changed_world(scenario: Scenario, asked: Settings) -> Scenario:
     if asked.aircraft is not None and ("/" in asked.aircraft or "\\" in asked.aircraft):
         raise PlanflyError("aircraft: a name that planfly aircraft lists is expected", field="aircraft")
     options: FlightOptions = {
-        "wind": wind, "turbulence": asked.turbulence, "aircraft": asked.aircraft, "airspeed": asked.airspeed,
+        "wind": wind,
+        "turbulence": asked.turbulence,
+        "aircraft": asked.aircraft,
+        "airspeed": asked.airspeed,
         "autopilot_law": asked.autopilot,
-    }  # fmt: skip
+    }
     changed = apply_options(scenario, options)
     if asked.limits is None and asked.ceiling is None:
         return changed

@@ -16,9 +16,8 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.wording import UNITS
+from world.arrays import Floats
 from world.threats import Threats
-
-Floats = NDArray[np.float64]
 
 # For a rule whose margin has no scale, such as turns, near is the last tenth before the limit.
 _NEAR_FRACTION = 0.1

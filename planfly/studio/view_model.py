@@ -25,10 +25,10 @@ from planfly.studio.edits import places
 from planfly.studio.incremental_verdict import Window
 from planfly.studio.states import PlaceStates, State, place_states
 from world.airspace.zones_on_map import zone_rings
+from world.arrays import Floats
 from world.scenario import Scenario
 from world.threats import Threats
 
-Floats = NDArray[np.float64]
 Json = dict[str, Any]
 
 # Samples of the profile.
@@ -88,9 +88,12 @@ def _with_surroundings(extent: Floats) -> Floats:
 
 def _threats_json(threats: Threats) -> list[Json]:
     rows = zip(
-        threats.names, threats.position.tolist(), threats.kill_radius.tolist(), threats.detection_radius.tolist(),
+        threats.names,
+        threats.position.tolist(),
+        threats.kill_radius.tolist(),
+        threats.detection_radius.tolist(),
         strict=True,
-    )  # fmt: skip
+    )
     return [
         {"name": name, "at": rounded(at), "kill": round(kill, 1), "detection": round(detection, 1)}
         for name, at, kill, detection in rows

@@ -11,7 +11,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import Mission
 from flight.simulation.track import Track
@@ -26,9 +25,9 @@ from planfly.workflow.airframe import Airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.pipeline import fly_and_judge
 from planner.search.plan_front import FrontPlan
+from world.arrays import Floats
 from world.scenario import Scenario, from_spec
 
-Floats = NDArray[np.float64]
 # Longest search for one path, s: a user waits for it.
 SECONDS = 25.0
 # Longest search for several paths, s.

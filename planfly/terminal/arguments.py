@@ -102,8 +102,7 @@ def time_or_stations(text: str) -> float | str:
     """A time of the flight, or where ground stations listen: an address has a colon."""
     if ":" in text:
         return text
-    time: float = number("end")(text)
-    return time
+    return number("end")(text)
 
 
 def budget(text: str) -> tuple[int | None, float | None]:
@@ -166,8 +165,7 @@ def files(*suffixes: str) -> Completer:
     def propose(prefix: str, **_about: object) -> Iterable[str]:
         from argcomplete.completers import FilesCompleter
 
-        found: Iterable[str] = FilesCompleter(suffixes)(prefix)
-        return found
+        return FilesCompleter(suffixes)(prefix)
 
     return propose
 
@@ -208,5 +206,4 @@ def shell_script(shell: str) -> str:
     """The script that has a shell ask planfly.  shell: one of `SHELLS`."""
     from argcomplete.shell_integration import shellcode
 
-    script: str = shellcode(["planfly"], shell=shell)
-    return script
+    return shellcode(["planfly"], shell=shell)

@@ -45,7 +45,8 @@ def coloured(text: str, style: Style, stream: TextIO | None = None) -> str:
 
 
 # In a help: what stands above a paragraph, and options, wherever they stand.
-_HEADING, _NAMED = re.compile(r"^(\S[^\n]*:)(?=$| planfly)", re.MULTILINE), re.compile(r"(?<![\w/-])--?[a-z][a-z-]*")
+_HEADING = re.compile(r"^(\S[^\n]*:)(?=$| planfly)", re.MULTILINE)
+_NAMED = re.compile(r"(?<![\w/-])--?[a-z][a-z-]*")
 
 
 def coloured_help(text: str) -> str:
@@ -125,8 +126,12 @@ class LineParser(CommandParser):
         self._section = ""
         # prog is named: to find it out argparse would lay out a help.
         self._parsers = self.add_subparsers(
-            dest="command", metavar="COMMAND", required=True, parser_class=CommandParser, prog="planfly",
-        )  # fmt: skip
+            dest="command",
+            metavar="COMMAND",
+            required=True,
+            parser_class=CommandParser,
+            prog="planfly",
+        )
         # Shown in sections instead.
         self._positionals._group_actions.clear()
 

@@ -13,7 +13,11 @@ exit codes: 0 flyable, or flown as planned
             4 not flyable, not flown as planned, or no feasible plan
             130 stopped by SIGINT (Ctrl-C), 143 by SIGTERM, within a second"""
 
-FLYABLE, FAULT, BAD_INPUT, LOSS, NOT_FLYABLE = 0, 1, 2, 3, 4
+FLYABLE = 0
+FAULT = 1
+BAD_INPUT = 2
+LOSS = 3
+NOT_FLYABLE = 4
 # By Ctrl-C, as a shell counts what a signal ended: 128 and the signal's number.
 INTERRUPTED = 130
 

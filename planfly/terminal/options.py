@@ -118,9 +118,11 @@ def fence_option(group: OptionTaker) -> None:
 def time_option(group: OptionTaker) -> None:
     """When it is flown."""
     group.add_argument(
-        "--at", metavar="TIME", help="when it is flown, START or START/END by ISO 8601, as in 2026-05-01T10:00+02:00: "
+        "--at",
+        metavar="TIME",
+        help="when it is flown, START or START/END by ISO 8601, as in 2026-05-01T10:00+02:00: "
         "zones that are not active then are left out (default: all count)",
-    )  # fmt: skip
+    )
 
 
 def flown_by_options(parser: CommandParser) -> None:
@@ -135,14 +137,18 @@ def flown_by_options(parser: CommandParser) -> None:
         aircraft_words,
     )
     group.add_argument(
-        "--airspeed", metavar="M/S", type=number("airspeed"),
+        "--airspeed",
+        metavar="M/S",
+        type=number("airspeed"),
         help="true airspeed until the mission sets one, m/s (default: the aircraft's cruise speed)",
-    )  # fmt: skip
+    )
     group.add_argument(
-        "--wind", metavar="SPEED,FROM", type=wind,
+        "--wind",
+        metavar="SPEED,FROM",
+        type=wind,
         help="steady wind: m/s, and the direction it blows from in degrees: 8,270 is 8 m/s from the west "
         "(default: the scenario's, or none)",
-    )  # fmt: skip
+    )
     turbulence_option(group)
     time_option(group)
 
@@ -206,27 +212,38 @@ def flight_options(parser: CommandParser) -> None:
         " loop (extra planfly[live])",
     )
     group.add_argument(
-        "--levels", action="store_true",
+        "--levels",
+        action="store_true",
         help="if the flight passes, also fly the mission by planfly's guidance, and say whether the two flights agree "
         "(default: only if the flight fails, to find out why)",
-    )  # fmt: skip
+    )
     limits = parser.group("limits of the flight")
     limits.add_argument(
-        "--max-hours", metavar="H", type=number("max_hours"), default=6.0,
+        "--max-hours",
+        metavar="H",
+        type=number("max_hours"),
+        default=6.0,
         help="stop after so many simulated hours (default: 6)",
-    )  # fmt: skip
+    )
     limits.add_argument(
-        "--max-log", metavar="MB", type=number("max_log"), default=256.0,
+        "--max-log",
+        metavar="MB",
+        type=number("max_log"),
+        default=256.0,
         help="stop when the log has so many MB (default: 256; it grows by about 20 an hour)",
-    )  # fmt: skip
+    )
 
 
 def log_rate_option(group: OptionTaker) -> None:
     """Rows a second."""
     group.add_argument(
-        "--log-hz", metavar="HZ", type=int, choices=CHOICES["log_hz"], default=60,
+        "--log-hz",
+        metavar="HZ",
+        type=int,
+        choices=CHOICES["log_hz"],
+        default=60,
         help="rows a second in the log: 60 (default), 30, 20 or 10; the verdict is on these rows",
-    )  # fmt: skip
+    )
 
 
 def imported_log_options(parser: CommandParser) -> None:

@@ -173,7 +173,9 @@ def _say(line: str) -> None:
 
 # s.  Where no terminal is, an estimate is told this long after the first report, and again when four times as long has
 # passed, at least once a minute; and a stage that reports nothing is named after the first second, and once a minute.
-_FIRST_REPORT, _REPORT_AGAIN, _REPORT_EVERY = 2.0, 4.0, 60.0
+_FIRST_REPORT = 2.0
+_REPORT_AGAIN = 4.0
+_REPORT_EVERY = 60.0
 _LOOKS_EVERY = 1.0
 # Stages that have begun in this process: one within another makes the outer one's time none that comes again.
 _begun = itertools.count()

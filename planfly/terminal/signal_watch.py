@@ -18,7 +18,8 @@ from world.interruption import Interrupted, interrupt, remove_unfinished
 ENDING = (signal.SIGINT, signal.SIGTERM)
 # Time from a signal to the end of the process where its command has not ended by itself, s; time that it waited for a
 # processor does not count, up to so much in all.
-GRACE, _AT_LONGEST = 0.7, 10.0
+GRACE = 0.7
+_AT_LONGEST = 10.0
 # For which files are tried to be removed, s.
 _REMOVING = 0.5
 # Time from a signal that could not be heard to its next, and between two tries to remove files, s.

@@ -141,7 +141,12 @@ def near_miss_entry(one: NearMiss) -> NearMissEntry:
 def survey_remedy_entry(one: SurveyRemedy) -> SurveyRemedyEntry:
     """What would help as an answer has it."""
     return SurveyRemedyEntry(
-        kind=one.kind, name=one.name, current=round(one.current, 3), value=round(one.value, 3), unit=one.unit,
-        turn_around_m=None if math.isnan(one.turn_around) else round(one.turn_around, 1), lead_in_m=one.lead_in,
+        kind=one.kind,
+        name=one.name,
+        current=round(one.current, 3),
+        value=round(one.value, 3),
+        unit=one.unit,
+        turn_around_m=None if math.isnan(one.turn_around) else round(one.turn_around, 1),
+        lead_in_m=one.lead_in,
         length_m=round(one.length, 1),
-    )  # fmt: skip
+    )

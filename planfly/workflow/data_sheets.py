@@ -25,7 +25,6 @@ from aircraft.uncertainty import (
     DRAWS,
     DRAWS_FILE,
     POWER_SD,
-    Floats,
     UncertainQuantity,
     Uncertainty,
     draw_quantities,
@@ -37,6 +36,7 @@ from flight.autopilots.parameter_files import Entry, read_parameter_file
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import Simulator, Trim, fastest, full_throttle, idle, linearise, slowest, straight
 from flight.guidance.model_gains import AMSL, gains_of_model, gains_text, idle_throttle
+from world.arrays import Floats
 from world.errors import FlightError
 from world.files import temporary_folder, write_folder
 
@@ -241,9 +241,12 @@ def _effect_of_factor(aircraft: Aircraft, middle: Floats, name: str, sd: float) 
         fdm = Fdm(aircraft, tried=True, variation=Variation(properties=((f"ident/{name}", 1.0 + sign * sd),)))
         angles = [steepest(fdm, aircraft.airspeed, AMSL) for steepest in (full_throttle, idle)]
         top = fastest(fdm, AMSL)
-        found.append([
-            *(math.nan if trim is None else trim.climb for trim in angles), math.nan if top is None else top.airspeed,
-        ])  # fmt: skip
+        found.append(
+            [
+                *(math.nan if trim is None else trim.climb for trim in angles),
+                math.nan if top is None else top.airspeed,
+            ]
+        )
     climb, descent, faster = change_of(np.array(found[0]), np.array(found[1]), middle).tolist()
     return climb, descent, faster
 
@@ -503,9 +506,7 @@ _README_ROWS = (
 )
 
 
-def _readme(
-    name: str, made: SizedAircraft, flown: Performance, known: Uncertainty, stated: Mapping[str, float]
-) -> str:  # fmt: skip
+def _readme(name: str, made: SizedAircraft, flown: Performance, known: Uncertainty, stated: Mapping[str, float]) -> str:
     sheet = made.sheet
     drive = "burns fuel; its mass stays the same" if sheet.fuelled else "is electric"
     climb, sink = math.degrees(flown.climb.climb), -math.degrees(flown.idle.climb)

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from flight.autopilots.autopilot import Autopilot
@@ -41,8 +40,6 @@ from planner.plan import read_plan
 from world.errors import LogError, MissionError
 from world.scenario import Scenario, load_scenario, with_flight, with_wind
 from world.scenario_tables import FlightTable
-
-Floats = NDArray[np.float64]
 
 _BLOCK = 2**20
 # Items that a mission has at least.

@@ -158,7 +158,8 @@ def find_deciding_parameter(
 
 # What a law is off its autopilot by: a share of how far it is off the legs (of ArduPlane's kept corners nine in ten are
 # within it), and a height, m (the least clearances of 20 climbs of ArduPlane's were met within it).
-STRAY_SHARE, HEIGHT_ERROR = 0.1, 1.2
+STRAY_SHARE = 0.1
+HEIGHT_ERROR = 1.2
 
 
 def has_room(flown: Sequence[Finding], failed: Sequence[Finding]) -> bool:

@@ -32,9 +32,15 @@ MIN_BANK_DEG = 5.0
 GO_ON = "tightened and planned again"
 
 Tightened = Literal[
-    "max_climb_deg", "max_dive_deg", "max_turn_deg", "max_bank_deg", "min_clearance_m", "max_height_m", "kill_radius_m",
+    "max_climb_deg",
+    "max_dive_deg",
+    "max_turn_deg",
+    "max_bank_deg",
+    "min_clearance_m",
+    "max_height_m",
+    "kill_radius_m",
     "zone_margin_m",
-]  # fmt: skip
+]
 
 
 @dataclass(frozen=True, slots=True)

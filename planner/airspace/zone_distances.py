@@ -9,17 +9,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.airspace.zone_limits import MapSegment, ZonesWithMargins, first_exclusion_near, segment_between, view_shape
 from world.airspace.zone_kernels import ZoneRecords, box_distance, edge_distance
+from world.arrays import Floats, Heights
 from world.frames import PolyMapRecord, polymap
 from world.kernels import Record, inlined, inner
 from world.terrain import pixel_height, segment_clearance
-
-Floats = NDArray[np.float64]
-Heights = NDArray[np.float32]
-
 
 # --- Penetration of zones, for the search ---
 
@@ -56,7 +52,7 @@ def zone_excess(
     lateral: float,
     below: float,
     above: float,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the depth of the leg a-b in zones enlarged by their margins, integrated over its length: m x km.
 
     pitch: spacing of terrain samples (m), for levels above ground. lateral, below, above: tracking error, m.
@@ -94,9 +90,7 @@ def zone_excess(
 
 
 @inner
-def penetration_depth(
-    records: ZoneRecords, z: int, line: MapSegment, wanted: float
-) -> tuple[float, float, float]:  # pragma: no cover - compiled
+def penetration_depth(records: ZoneRecords, z: int, line: MapSegment, wanted: float) -> tuple[float, float, float]:
     """Return the lateral shift that moves a line `wanted` m away from exclusion z, and its fractions abreast of z.
 
     The shift is 0 m if the line already is that far away.
@@ -114,9 +108,7 @@ def penetration_depth(
 
 
 @inner
-def _inclusion_excess(
-    records: ZoneRecords, z: int, line: MapSegment, wanted: float
-) -> float:  # pragma: no cover - compiled
+def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, wanted: float) -> float:
     """Return the shortfall from `wanted` (m) of a line's distance inside inclusion z, times its length: m x km."""
     reach = view_shape(records, z, line, wanted)
     if reach.inside and reach.distance >= wanted:
@@ -134,7 +126,7 @@ def _inclusion_excess(
 
 
 @inlined
-def altitude_band(up: float, to_up: float, below: float, above: float) -> AltitudeBand:  # pragma: no cover - compiled
+def altitude_band(up: float, to_up: float, below: float, above: float) -> AltitudeBand:
     """Return the vertical range of a straight line over unknown ground; below, above: tracking error, m."""
     lowest, highest = min(up, to_up) - below, max(up, to_up) + above
     return AltitudeBand(lowest, highest, -UNKNOWN, UNKNOWN)
@@ -151,7 +143,7 @@ def _sampled_band(
     last: float,
     below: float,
     above: float,
-) -> AltitudeBand:  # pragma: no cover - compiled
+) -> AltitudeBand:
     """Return the vertical range of a-b between two fractions of it, with sampled heights above ground."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     plain = altitude_band(a[2] + first * dz, a[2] + last * dz, below, above)
@@ -170,7 +162,7 @@ def _sampled_band(
 
 
 @inlined
-def vertical_distance(zone: Record, band: AltitudeBand) -> float:  # pragma: no cover - compiled
+def vertical_distance(zone: Record, band: AltitudeBand) -> float:
     """Return the distance of a vertical range below a zone's floor or above its ceiling, m.
 
     Negative between them.
@@ -210,7 +202,7 @@ def measure_zone_margin(
     below: float,
     above: float,
     margin: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill the `ZONE_MARGIN` record of the piece a-b.
 
     depths: negated heights of the ground. lateral: (2,) lateral tracking error at a and b; below, above: vertical
@@ -251,9 +243,7 @@ def measure_zone_margin(
 
 
 @inner
-def _update_margin(
-    zone: Record, need: Record, z: int, away: float, over: float, margin: Record
-) -> None:  # pragma: no cover - compiled
+def _update_margin(zone: Record, need: Record, z: int, away: float, over: float, margin: Record) -> None:
     """Update the record with the distances of a piece from a zone."""
     enough = away >= need.horizontal or over >= need.vertical
     if not zone.exclusion:
@@ -270,15 +260,13 @@ def _update_margin(
 
 
 @inner
-def _distance_to_violation(zone: Record, away: float, over: float) -> float:  # pragma: no cover - compiled
+def _distance_to_violation(zone: Record, away: float, over: float) -> float:
     """Return the distance from violating a zone, given the horizontal and vertical distances, m."""
     return max(away, over) if zone.exclusion else min(away, -over)
 
 
 @inner
-def _map_distance(
-    records: ZoneRecords, z: int, a: Floats, b: Floats, within: float
-) -> float:  # pragma: no cover - compiled
+def _map_distance(records: ZoneRecords, z: int, a: Floats, b: Floats, within: float) -> float:
     """Return the smallest horizontal distance of a-b outside an exclusion or inside an inclusion, m.
 
     Otherwise negative.
@@ -305,7 +293,7 @@ def _exact_band(
     lateral: Floats,
     below: float,
     above: float,
-) -> AltitudeBand:  # pragma: no cover - compiled
+) -> AltitudeBand:
     """Return the vertical range along a-b, also above the ground below it and `lateral` (2,) m to both sides."""
     plain = altitude_band(a[2], b[2], below, above)
     run = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))

@@ -10,18 +10,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
 from world.airspace.zones import Zone
+from world.arrays import Floats, Heights
 from world.by_reference import by_reference
 from world.kernels import Records, compiled, inlined, inner, record_dtype
 from world.scenario import Scenario
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
-Heights = NDArray[np.float32]
-
 
 # --- Zones with their margins ---
 
@@ -83,9 +79,7 @@ def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, ma
 
 
 @compiled
-def _reduce_margins(
-    records: ZoneRecords, ends: Floats, grounds: Floats, share: float, required: Records
-) -> None:  # pragma: no cover - compiled
+def _reduce_margins(records: ZoneRecords, ends: Floats, grounds: Floats, share: float, required: Records) -> None:
     """Reduce margins to a fraction of the distances of the ends (k, 3).
 
     Grounds: (k,) ground heights there, m.
@@ -107,7 +101,7 @@ def _reduce_margins(
 
 
 @inner
-def first_exclusion_near(zones: ZonesWithMargins, west: float) -> int:  # pragma: no cover - compiled
+def first_exclusion_near(zones: ZonesWithMargins, west: float) -> int:
     """Return the index of the first exclusion that may extend as far east as `west` (m)."""
     low, high = zones.inclusions, zones.required.shape[0]
     while low < high:
@@ -207,7 +201,7 @@ class ShapeView(NamedTuple):
 
 
 @inlined
-def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:  # pragma: no cover - compiled
+def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:
     """Return the line from a to b; a line without length points north."""
     dx, dy = bx - ax, by - ay
     run = math.sqrt(dx * dx + dy * dy)
@@ -217,9 +211,7 @@ def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:  
 
 
 @inner
-def view_shape(
-    records: ZoneRecords, z: int, line: MapSegment, within: float
-) -> ShapeView:  # pragma: no cover - compiled
+def view_shape(records: ZoneRecords, z: int, line: MapSegment, within: float) -> ShapeView:
     """Return the shape of zone z as seen from a line; distances above `within` (m) may be inf."""
     zone = records.zones[z]
     if zone.round:
@@ -253,7 +245,7 @@ def view_shape(
 
 
 @inlined
-def _view_circle(along: float, off: float, radius: float, run: float) -> ShapeView:  # pragma: no cover - compiled
+def _view_circle(along: float, off: float, radius: float, run: float) -> ShapeView:
     """Return a circle as seen from a line, given its centre in the line's axes."""
     gap = along - min(run, max(0.0, along))
     nearest = math.sqrt(gap * gap + off * off) - radius
@@ -265,9 +257,7 @@ def _view_circle(along: float, off: float, radius: float, run: float) -> ShapeVi
 
 
 @inlined
-def _edge_distance2(
-    along: float, off: float, to_along: float, to_off: float, run: float
-) -> float:  # pragma: no cover - compiled
+def _edge_distance2(along: float, off: float, to_along: float, to_off: float, run: float) -> float:
     """Return the squared distance of the line from an edge that does not cross it: at an end of one of them."""
     gap = along - min(run, max(0.0, along))
     nearest = gap * gap + off * off

@@ -9,7 +9,6 @@ A certificate measures every piece of the path: its distance from each zone and 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.airspace.zone_distances import ZONE_MARGIN, measure_zone_margin, zone_excess
 from planner.evaluation.certify_kernels import ENDS, TRACKED_PIECE, required_buffer, tracked_pieces
@@ -17,12 +16,9 @@ from planner.evaluation.corners import ARC_STEP, blended_vertices, fly_by_radii,
 from planner.evaluation.paper_scores import POINTS
 from planner.evaluation.problem import ProblemArrays, RequiredClearance, required_headroom
 from planner.evaluation.terrain_clearance import lag_at, segment_pixels, terrain_excess
+from world.arrays import Floats, Ints
 from world.kernels import Record, Records, compiled, copy_into, inlined, inner
 from world.terrain import segment_clearance
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 
 # --- Margins for the certificate ---
 
@@ -46,7 +42,7 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 
 @compiled
-def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
+def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     """Return `AIRSPACE_PIECE` records of the legs of a path (w, 3) and then of its corners."""
     pieces = tracked_pieces(data, waypoints) if data.tracking.has_error else _exact_pieces(data, waypoints)
     out = np.zeros(pieces.size, dtype=AIRSPACE_PIECE)
@@ -75,7 +71,7 @@ def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragm
 
 
 @inner
-def _exact_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
+def _exact_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     """Return `TRACKED_PIECE` records of a path flown without tracking error: its legs, then the chords of its arcs."""
     last, radii = waypoints.shape[0] - 1, fly_by_radii(data, waypoints)
     out = np.zeros(last + last * _MAX_PIECES, dtype=TRACKED_PIECE)
@@ -104,7 +100,7 @@ def _exact_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma:
 
 
 @inner
-def _greatest_height(data: ProblemArrays, piece: Record) -> float:  # pragma: no cover - compiled
+def _greatest_height(data: ProblemArrays, piece: Record) -> float:
     """Return the greatest height above ground along a piece and on both sides of it, m.
 
     NaN off the terrain.
@@ -139,7 +135,7 @@ def add_airspace_violations(
     flown: Records,
     lags: Records,
     violations: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Add zone penetration (bounds) and excess height (terrain) of a path (w, 3) to a `VIOLATIONS` record, m x km.
 
     legs, corners, flown, lags: measurements of the path.
@@ -177,9 +173,7 @@ def add_airspace_violations(
 
 
 @inner
-def airspace_excess(
-    data: ProblemArrays, a: Floats, b: Floats, below: float, above: float, enough: float
-) -> float:  # pragma: no cover - compiled
+def airspace_excess(data: ProblemArrays, a: Floats, b: Floats, below: float, above: float, enough: float) -> float:
     """Return the zone penetration and excess height above ground of a single leg, integrated along it: m x km.
 
     below, above: vertical tracking error, m. enough: what exceeds it is not integrated further.
@@ -193,9 +187,7 @@ def airspace_excess(
 
 
 @inner
-def _zone_excess(
-    data: ProblemArrays, a: Floats, b: Floats, lateral: float, below: float, above: float
-) -> float:  # pragma: no cover - compiled
+def _zone_excess(data: ProblemArrays, a: Floats, b: Floats, lateral: float, below: float, above: float) -> float:
     zones = data.airspace.zones
     return zone_excess(zones, data.heights, data.to_pixel, data.sample_pitch, a, b, lateral, below, above)
 
@@ -203,7 +195,7 @@ def _zone_excess(
 @inner
 def _excess_height(
     data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, leg: Record, lag: Record, across: float
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the excess over the maximum height above ground along a leg, with its height lag: m x km."""
     if not data.tracking.has_error:
         return _excess_height_around(data, required, a, b, 0.0, 0.0, math.inf)
@@ -221,7 +213,7 @@ def _excess_height(
 @inner
 def _excess_height_around(
     data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, lateral: float, above: float, enough: float
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the largest excess over the maximum height of a line and the lines offset to both sides: m x km.
 
     A lower bound on it where it exceeds `enough`.
@@ -271,7 +263,7 @@ def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
 
 
 @compiled
-def _count_pieces(data: ProblemArrays, paths: Floats) -> Ints:  # pragma: no cover - compiled
+def _count_pieces(data: ProblemArrays, paths: Floats) -> Ints:
     number, waypoints, _ = paths.shape
     counts = np.zeros(number, np.int64)
     a, b = np.empty(3), np.empty(3)

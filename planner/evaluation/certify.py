@@ -9,7 +9,6 @@ measurements are in `planner.evaluation.certify_kernels`.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import arc_slope, turn_tangents
 from planner.airspace.zone_limits import is_limited
@@ -25,9 +24,8 @@ from planner.evaluation.corners import fly_by_radii, settling_length
 from planner.evaluation.leg_constraints import CERTIFIED_LEG, slope_limits
 from planner.evaluation.problem import ANGLE_MARGIN, Problem, ProblemArrays
 from planner.plan import Certificate
+from world.arrays import Floats
 from world.geometry import leg_runs, leg_slopes, turning_angles
-
-Floats = NDArray[np.float64]
 
 # Tolerance for rounding of a waypoint on a limit, rad and m.
 _EPSILON = 1e-9

@@ -8,7 +8,6 @@ distances are then measured from the worst positions within those bounds.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import downwind
 from planner.evaluation.corners import (
@@ -26,11 +25,9 @@ from planner.evaluation.corners import (
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import ProblemArrays
 from planner.evaluation.terrain_clearance import HEIGHT_LAG, lag_at, measure_lags
+from world.arrays import Floats
 from world.kernels import Record, Records, compiled, copy_into, inner, sort_few
 from world.terrain import segment_clearance
-
-Floats = NDArray[np.float64]
-
 
 # --- Pieces with tracking error ---
 
@@ -58,7 +55,7 @@ ENDS = 100.0
 
 
 @inner
-def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
+def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     """Return `TRACKED_PIECE` records of the legs of a path (w, 3) and then of its corners."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
@@ -104,7 +101,7 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma
 
 
 @inner
-def _cuts(decay: float, run: float) -> Floats:  # pragma: no cover - compiled
+def _cuts(decay: float, run: float) -> Floats:
     """Return the fractions of a leg at which its pieces end, increasing; the last is 1."""
     cuts = np.ones(len(_CUTS) + 3)
     for k in range(len(_CUTS)):
@@ -116,7 +113,7 @@ def _cuts(decay: float, run: float) -> Floats:  # pragma: no cover - compiled
 
 
 @inner
-def _cut(a: Floats, b: Floats, share: float, after: float, piece: Record) -> None:  # pragma: no cover - compiled
+def _cut(a: Floats, b: Floats, share: float, after: float, piece: Record) -> None:
     """Fill the ends of the part of a-b between two fractions of it."""
     for axis in range(3):
         piece.begin[axis] = a[axis] + share * (b[axis] - a[axis])
@@ -124,14 +121,14 @@ def _cut(a: Floats, b: Floats, share: float, after: float, piece: Record) -> Non
 
 
 @inner
-def _set_below(lag: Record, share: float, after: float, piece: Record) -> None:  # pragma: no cover - compiled
+def _set_below(lag: Record, share: float, after: float, piece: Record) -> None:
     """Fill the deviations below and above of the piece between two fractions of a leg."""
     one, two = lag_at(lag, share), lag_at(lag, after)
     piece.below, piece.above = max(0.0, one, two), max(0.0, -one, -two)
 
 
 @inner
-def _lateral_deviation(data: ProblemArrays, place: Floats, across: float) -> float:  # pragma: no cover - compiled
+def _lateral_deviation(data: ProblemArrays, place: Floats, across: float) -> float:
     """Return the lateral deviation of the flight at a point of the path, m: reduced near the fixed ends."""
     away = min(
         math.hypot(place[0] - data.start[0], place[1] - data.start[1]),
@@ -152,7 +149,7 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 
 @compiled
-def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:  # pragma: no cover - compiled
+def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
     """Return the distance of the flight of a path (w, 3) from the nearest missile sphere, m.
 
     Inf without missiles.
@@ -178,7 +175,7 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:  # pragma
 
 
 @inner
-def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) -> float:  # pragma: no cover - compiled
+def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) -> float:
     """Return the distance from a-b to the surface of the nearest missile sphere, or `nearest` if that is smaller."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     length2 = dx * dx + dy * dy + dz * dz
@@ -196,7 +193,7 @@ def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) ->
 
 
 @compiled
-def with_courses(data: ProblemArrays, path: Floats) -> Floats:  # pragma: no cover - compiled
+def with_courses(data: ProblemArrays, path: Floats) -> Floats:
     """Return the path with distant points before the start and after the destination on the prescribed courses.
 
     Without a prescribed course the point is on the extension of the leg, so that there is no turn.
@@ -237,7 +234,7 @@ def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Float
 
 
 @compiled
-def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
+def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:
     """Return the steepest climb and dive of each leg (w - 1,), rad."""
     count = waypoints.shape[0] - 1
     climbs, dives = np.empty(count), np.empty(count)
@@ -247,7 +244,7 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 
 
 @compiled
-def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
+def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
     """Return `CERTIFIED_PIECE` records of the legs of a path (w, 3) and then of its fly-by arcs or corners."""
     if data.tracking.has_error:
         return _tracked_heights(data, tracked_pieces(data, waypoints))
@@ -266,7 +263,7 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # 
 
 
 @inner
-def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:  # pragma: no cover - compiled
+def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
     """Return `CERTIFIED_PIECE` records of `TRACKED_PIECE` records: smallest heights along them and to both sides."""
     out = np.zeros(pieces.size, dtype=CERTIFIED_PIECE)
     for k in range(pieces.size):
@@ -289,9 +286,7 @@ def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:  # pragma
 
 
 @inner
-def _measure_piece(
-    data: ProblemArrays, a: Floats, b: Floats, of_arc: bool, number: int, out: Record
-) -> None:  # pragma: no cover - compiled
+def _measure_piece(data: ProblemArrays, a: Floats, b: Floats, of_arc: bool, number: int, out: Record) -> None:
     height, _ = segment_clearance(data.heights, data.to_pixel, a, b)
     out.of_arc, out.number, out.height = of_arc, number, height
     out.buffer = required_buffer(data, data.buffer, (data.start_buffer, data.destination_buffer), a, b)
@@ -300,7 +295,7 @@ def _measure_piece(
 @inner
 def required_buffer(
     data: ProblemArrays, buffer: float, end_buffers: tuple[float, float], a: Floats, b: Floats
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the buffer required on a piece, m: smaller near a fixed end, growing with the distance from it.
 
     buffer: m, away from the ends. end_buffers: at the start and the destination, m. The buffer grows half as fast as in

@@ -8,7 +8,6 @@ that blend the slopes of the two legs; `blended_vertices` encloses it from below
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from aircraft.path_limits import (
@@ -23,11 +22,9 @@ from aircraft.path_limits import (
 )
 from aircraft.tracking import corner_deviation
 from planner.evaluation.problem import ProblemArrays
+from world.arrays import Floats
 from world.geometry import turning_angle
 from world.kernels import Record, Records, compiled, compiled_inline, copy_into, inlined, inner
-
-Floats = NDArray[np.float64]
-
 
 # --- Measurements of legs and corners ---
 
@@ -46,7 +43,7 @@ SETTLING_LENGTH = 20.0
 
 
 @inlined
-def measure_legs(path: Floats, legs: Records) -> None:  # pragma: no cover - compiled
+def measure_legs(path: Floats, legs: Records) -> None:
     """Fill `LEG` records (w - 1,) of a path (w, 3)."""
     for i in range(legs.shape[0]):
         dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
@@ -59,9 +56,7 @@ def measure_legs(path: Floats, legs: Records) -> None:  # pragma: no cover - com
 
 
 @inner
-def measure_corners(
-    data: ProblemArrays, wind: Wind, path: Floats, legs: Records, corners: Records
-) -> None:  # pragma: no cover - compiled
+def measure_corners(data: ProblemArrays, wind: Wind, path: Floats, legs: Records, corners: Records) -> None:
     """Fill `CORNER` records (w,) of a path (w, 3) whose legs are measured."""
     aircraft, tracking = data.aircraft, data.tracking
     last: int = legs.shape[0]
@@ -87,7 +82,7 @@ def measure_corner(
     vy: float,
     amsl: float,
     corner: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill the `CORNER` record of a turn between the unit courses u and v.
 
     Zeros if `turning` is false (no turn).
@@ -107,9 +102,7 @@ def measure_corner(
 
 
 @inlined
-def courses_at(
-    data: ProblemArrays, legs: Records, i: int
-) -> tuple[float, float, float, float]:  # pragma: no cover - compiled
+def courses_at(data: ProblemArrays, legs: Records, i: int) -> tuple[float, float, float, float]:
     """Return the unit courses before and after waypoint i.
 
     At the ends the prescribed course, otherwise the leg's own.
@@ -125,7 +118,7 @@ def courses_at(
 
 
 @compiled_inline
-def settling_length(need: float, run: float) -> float:  # pragma: no cover - compiled
+def settling_length(need: float, run: float) -> float:
     """Return the length of a leg (m) kept straight between its turns so that the first settles.
 
     Need: length of both turns.
@@ -134,14 +127,13 @@ def settling_length(need: float, run: float) -> float:  # pragma: no cover - com
 
 
 @inlined
-def turn_length(fly_over: bool, corners: Records, i: int) -> float:  # pragma: no cover - compiled
+def turn_length(fly_over: bool, corners: Records, i: int) -> float:
     """Return the length of leg i taken by its two turns, m.
 
     Of fly-over turns only the first, whose track returns to the leg.
     """
     if not fly_over:
-        need: float = corners[i].after + corners[i + 1].before
-        return need
+        return corners[i].after + corners[i + 1].before
     if corners[i].tangent <= 0.0:
         return 0.0
     if math.isinf(corners[i].tangent):
@@ -151,9 +143,7 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:  # pragma: n
 
 
 @inner
-def roll_length(
-    aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind
-) -> float:  # pragma: no cover - compiled
+def roll_length(aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind) -> float:
     """Return the length of leg i taken by rolling from its first turn into its second, m.
 
     0 if both turn the same way.
@@ -164,10 +154,7 @@ def roll_length(
     into, onward = legs[i - 1].east * uy - legs[i - 1].north * ux, ux * legs[i + 1].north - uy * legs[i + 1].east
     if into * onward >= 0.0 or math.isinf(corners[i].tangent + corners[i + 1].tangent):
         return 0.0
-    length: float = roll_reversal_length(
-        aircraft, ux, uy, amsl, corners[i].radius, corners[i + 1].radius, wind[0], wind[1]
-    )
-    return length
+    return roll_reversal_length(aircraft, ux, uy, amsl, corners[i].radius, corners[i + 1].radius, wind[0], wind[1])
 
 
 # --- Flown shape of a corner ---
@@ -177,25 +164,20 @@ ARC_STEP = math.radians(15.0)
 
 
 @inlined
-def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
+def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
     """Return half the length of the parabola that blends two slopes, m per unit of slope, with a full tailwind."""
     speed = true_airspeed(aircraft, amsl) + wind_speed_at(aircraft, amsl)
-    length: float = speed * speed / (2.0 * BLEND_ACCELERATION)
-    return length
+    return speed * speed / (2.0 * BLEND_ACCELERATION)
 
 
 @inner
-def fly_by_vertices(
-    aircraft: PerformanceTable, before: Floats, at: Floats, after: Floats, radius: float
-) -> Floats:  # pragma: no cover - compiled
+def fly_by_vertices(aircraft: PerformanceTable, before: Floats, at: Floats, after: Floats, radius: float) -> Floats:
     """Return vertices (k, 3) of the flown path past the waypoint `at`; see `blended_vertices`."""
     return blended_vertices(half_blend_length(aircraft, at[2]), before, at, after, radius)
 
 
 @inner
-def blended_vertices(
-    blend: float, before: Floats, at: Floats, after: Floats, radius: float
-) -> Floats:  # pragma: no cover - compiled
+def blended_vertices(blend: float, before: Floats, at: Floats, after: Floats, radius: float) -> Floats:
     """Return vertices (k, 3) of the flown path past the waypoint `at`, nowhere higher than the flight.
 
     They are: a point on the leg where the blend of slopes begins, the fly-by arc of this radius from tangent point to
@@ -242,9 +224,7 @@ def blended_vertices(
 
 
 @inner
-def legs_about(
-    before: Floats, at: Floats, after: Floats, length_before: float, length_after: float
-) -> Floats:  # pragma: no cover - compiled
+def legs_about(before: Floats, at: Floats, after: Floats, length_before: float, length_after: float) -> Floats:
     """Return the parts of the legs before and after the waypoint `at` of these lengths (m), as vertices (3, 3)."""
     out = np.empty((3, 3))
     for row, other, length in ((0, before, length_before), (2, after, length_after)):
@@ -257,14 +237,14 @@ def legs_about(
 
 
 @inlined
-def _set(out: Floats, row: int, east: float, north: float, up: float) -> None:  # pragma: no cover - compiled
+def _set(out: Floats, row: int, east: float, north: float, up: float) -> None:
     out[row, 0] = east
     out[row, 1] = north
     out[row, 2] = up
 
 
 @compiled
-def fly_by_radii(data: ProblemArrays, path: Floats) -> Floats:  # pragma: no cover - compiled
+def fly_by_radii(data: ProblemArrays, path: Floats) -> Floats:
     """Return the radius (m) of the fly-by arc at each waypoint (w,).
 
     0 at the ends and where the path goes straight on.

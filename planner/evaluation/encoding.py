@@ -13,12 +13,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from world.arrays import Floats
 from world.by_reference import by_reference
-
-Floats = NDArray[np.float64]
-
 
 # --- Frames of the inner waypoints ---
 

@@ -8,18 +8,20 @@ import math
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.evaluation.problem import ProblemArrays
 from planner.evaluation.travel_cost import LENGTH, TravelCost, leg_cost
+from world.arrays import Floats
 from world.frames import polymap
 from world.geometry import window_exposure
 from world.kernels import Record, compiled, inner
 from world.terrain import TILE, pixel_height
 
-Floats = NDArray[np.float64]
-
-_LENGTH, _EXPOSURE, _CLEARANCE, _TIME, _ENERGY = range(5)
+_LENGTH = 0
+_EXPOSURE = 1
+_CLEARANCE = 2
+_TIME = 3
+_ENERGY = 4
 SECONDS = LENGTH._replace(length=0.0, time=1.0)
 
 
@@ -48,9 +50,7 @@ def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) 
 
 
 @compiled
-def _fill(
-    data: ProblemArrays, of_time: TravelCost, joules: TravelCost, paths: Floats, out: Floats
-) -> None:  # pragma: no cover - compiled
+def _fill(data: ProblemArrays, of_time: TravelCost, joules: TravelCost, paths: Floats, out: Floats) -> None:
     for n in range(paths.shape[0]):
         path = paths[n]
         lowest = math.inf
@@ -67,7 +67,7 @@ def _fill(
 
 
 @inner
-def _detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float) -> float:  # pragma: no cover - compiled
+def _detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float) -> float:
     """Return the mean detection density along the leg d from a."""
     total, length2 = 0.0, dx * dx + dy * dy + dz * dz
     if length2 < 1e-12:
@@ -91,9 +91,7 @@ def _detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float) 
 
 
 @inner
-def _lowest(
-    data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float, lowest: float
-) -> float:  # pragma: no cover - compiled
+def _lowest(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float, lowest: float) -> float:
     """Return the least height above ground at samples of the leg d from a and of legs before it, m.
 
     -inf off the terrain.

@@ -9,7 +9,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import PerformanceTable
 from planner.evaluation.airspace_scores import add_airspace_violations
@@ -36,12 +35,9 @@ from planner.evaluation.terrain_clearance import (
     terrain_excess,
 )
 from planner.evaluation.threat_index import MissileIndex, kill_density
+from world.arrays import Floats, Heights, Ints
 from world.frames import PolyMapRecord
 from world.kernels import Record, Records, compiled, inlined, inner
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Heights = NDArray[np.float32]
 
 # A flown corner that departs from the legs by more than this (m) is always evaluated.
 CORNER_TOLERANCE = 30.0
@@ -84,7 +80,7 @@ class PathScratch(NamedTuple):
 
 
 @inner
-def make_scratch(count: int) -> PathScratch:  # pragma: no cover - compiled
+def make_scratch(count: int) -> PathScratch:
     """Return scratch for paths of `count` waypoints."""
     return PathScratch(
         np.zeros(count - 1, dtype=LEG),
@@ -106,7 +102,7 @@ def score_path(
     path: Floats,
     violations: Record,
     objectives: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Evaluate a path (w, 3): add to a zeroed `VIOLATIONS` record and fill an `OBJECTIVES` record."""
     score_legs(data, limits, scratch, path, violations, objectives)
     score_ground(data, limits, scratch, path, violations)
@@ -122,7 +118,7 @@ def score_legs(
     path: Floats,
     violations: Record,
     objectives: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Evaluate the first part, without ground, missiles and zones. Each part only adds to violations.
 
     objectives: the length ratio is filled; the kill exposure is 0 until `score_missiles`.
@@ -146,7 +142,7 @@ def score_legs(
 @inner
 def score_ground(
     data: ProblemArrays, limits: PrecomputedLimits, scratch: PathScratch, path: Floats, violations: Record
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Evaluate the second part: the ground below the legs."""
     legs, terrain_legs = scratch.legs, scratch.terrain_legs
     sample_terrain(
@@ -173,7 +169,7 @@ def score_missiles(
     path: Floats,
     violations: Record,
     objectives: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Evaluate the third part: missiles, and the ground below corners as flown."""
     # Arrays are taken out of the data once: passing it on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
@@ -215,9 +211,7 @@ def score_missiles(
 
 
 @inner
-def score_airspace(
-    data: ProblemArrays, scratch: PathScratch, path: Floats, violations: Record
-) -> None:  # pragma: no cover - compiled
+def score_airspace(data: ProblemArrays, scratch: PathScratch, path: Floats, violations: Record) -> None:
     """Evaluate the last part: zones and the maximum height above ground."""
     if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
         add_airspace_violations(data, path, scratch.legs, scratch.corners, scratch.flown, scratch.lags, violations)
@@ -238,9 +232,7 @@ def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
 
 
 @compiled
-def _score_paths(
-    data: ProblemArrays, paths: Floats, violations: Records, objectives: Records
-) -> None:  # pragma: no cover - compiled
+def _score_paths(data: ProblemArrays, paths: Floats, violations: Records, objectives: Records) -> None:
     limits = precompute_limits(data)
     scratch = make_scratch(paths.shape[1])
     for n in range(paths.shape[0]):
@@ -248,7 +240,7 @@ def _score_paths(
 
 
 @inlined
-def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) -> float:  # pragma: no cover - compiled
+def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) -> float:
     """Return the radius of the arc at waypoint i.
 
     0 where a number alone limits turns and a leg is too short for its two turns.
@@ -276,7 +268,7 @@ def _measure_exact(
     corners: Records,
     flown: Records,
     extents: Floats,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill `FLOWN_CORNER` records (w,) and extents (w,) of the inner waypoints of a path without tracking error.
 
     The flown corner departs from the legs downwards by the blend of slopes, and sideways by at most R(1/cos(theta/2) -
@@ -300,7 +292,7 @@ def _measure_exact(
 
 
 @inlined
-def _lag_about(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:  # pragma: no cover - compiled
+def _lag_about(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:
     """Return the largest deviation of the flight below and above the legs near a corner, m.
 
     Lag, leg: of the leg after it.
@@ -310,7 +302,7 @@ def _lag_about(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:
 
 
 @inlined
-def _measure_tracked(corners: Records, flown: Records, extents: Floats) -> None:  # pragma: no cover - compiled
+def _measure_tracked(corners: Records, flown: Records, extents: Floats) -> None:
     """Fill `FLOWN_CORNER` records (w,) and extents (w,) of the inner waypoints of a path with tracking error."""
     for i in range(1, corners.shape[0] - 1):
         aside = corners[i].excursion
@@ -327,7 +319,7 @@ def _corner_depth(
     required: RequiredClearance,
     more: float,
     vertices: Floats,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the depth below the required clearance plus `more` (m) along a flown corner (k, 3), m x km."""
     total = 0.0
     for k in range(vertices.shape[0] - 1):
@@ -339,9 +331,7 @@ def _corner_depth(
 
 
 @inner
-def _corner_kill(
-    missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float
-) -> float:  # pragma: no cover - compiled
+def _corner_kill(missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float) -> float:
     """Return the kill density x length along a flown corner (k, 3).
 
     Below, above: vertical tracking error, m.

@@ -9,16 +9,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import arc_slope, downwind, slopes_along, wind_speed_at
 from planner.evaluation.corners import Wind, courses_at, roll_length, settling_length, turn_length
 from planner.evaluation.problem import ProblemArrays, RequiredClearance, required_clearance
+from world.arrays import Floats
 from world.frames import PolyMapRecord
 from world.kernels import Record, Records, compiled, inlined, inner
-
-Floats = NDArray[np.float64]
-
 
 # --- Blocks of paths evaluated side by side ---
 
@@ -61,7 +58,7 @@ BLOCK_SCRATCH = np.dtype(
 
 
 @inlined
-def clear_sums(sums: Record) -> None:  # pragma: no cover - compiled
+def clear_sums(sums: Record) -> None:
     """Reset all sums to 0."""
     for b in range(BLOCK):
         sums.below[b], sums.height[b], sums.kill[b], sums.detection[b] = 0.0, 0.0, 0.0, 0.0
@@ -69,7 +66,7 @@ def clear_sums(sums: Record) -> None:  # pragma: no cover - compiled
 
 
 @inlined
-def copy_point(place: Record, out: Record, size: int) -> None:  # pragma: no cover - compiled
+def copy_point(place: Record, out: Record, size: int) -> None:
     """Copy one point of each path to another."""
     for b in range(size):
         out.east[b], out.north[b], out.up[b] = place.east[b], place.north[b], place.up[b]
@@ -77,7 +74,7 @@ def copy_point(place: Record, out: Record, size: int) -> None:  # pragma: no cov
 
 
 @inlined
-def subtract_points(end: Record, begin: Record, size: int, out: Record) -> None:  # pragma: no cover - compiled
+def subtract_points(end: Record, begin: Record, size: int, out: Record) -> None:
     """Fill the step from one point of each path to another."""
     for b in range(size):
         out.east[b] = end.east[b] - begin.east[b]
@@ -88,9 +85,7 @@ def subtract_points(end: Record, begin: Record, size: int, out: Record) -> None:
 
 
 @inlined
-def divide_legs(
-    begin: Record, step: Record, share: float, size: int, out: Record
-) -> None:  # pragma: no cover - compiled
+def divide_legs(begin: Record, step: Record, share: float, size: int, out: Record) -> None:
     """Fill the point of each path's leg at this fraction of the step from its beginning."""
     for b in range(size):
         out.east[b] = begin.east[b] + share * step.east[b]
@@ -101,9 +96,7 @@ def divide_legs(
 
 
 @inlined
-def load_waypoints(
-    to_pixel: PolyMapRecord, paths: Floats, begin: int, i: int, size: int, block: Record
-) -> None:  # pragma: no cover - compiled
+def load_waypoints(to_pixel: PolyMapRecord, paths: Floats, begin: int, i: int, size: int, block: Record) -> None:
     """Fill waypoint i of each path and its pixel: `polymap`, for all paths at once."""
     end, x, y, inner = block.end, block.x, block.y, block.inner
     east, north, up = end.east, end.north, end.up
@@ -120,9 +113,7 @@ def load_waypoints(
 
 
 @inlined
-def _horner(
-    coefficients: Floats, terms: int, size: int, x: Floats, y: Floats, inner: Floats, out: Floats
-) -> None:  # pragma: no cover - compiled
+def _horner(coefficients: Floats, terms: int, size: int, x: Floats, y: Floats, inner: Floats, out: Floats) -> None:
     """Fill out with the sum of coefficients[i, j] x^i y^j, i + j < terms, for each path; inner is scratch."""
     for b in range(size):
         out[b] = 0.0
@@ -169,7 +160,7 @@ class PrecomputedLimits(NamedTuple):
 
 
 @inner
-def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:  # pragma: no cover - compiled
+def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
     """Return the limits that hold for all paths of a problem."""
     climb, dive = data.max_climb, data.max_dive
     by_aircraft = math.isnan(climb) or math.isnan(dive)
@@ -193,7 +184,7 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:  # pragma: no c
 
 
 @inlined
-def _slope_everywhere(data: ProblemArrays, air_angles: Floats) -> float:  # pragma: no cover - compiled
+def _slope_everywhere(data: ProblemArrays, air_angles: Floats) -> float:
     """Return the slope (rad) that the aircraft can fly on every course between floor and ceiling.
 
     -1 if there is none.
@@ -210,7 +201,7 @@ def _slope_everywhere(data: ProblemArrays, air_angles: Floats) -> float:  # prag
 
 
 @inlined
-def _straight_distance(start: Floats, destination: Floats) -> float:  # pragma: no cover - compiled
+def _straight_distance(start: Floats, destination: Floats) -> float:
     total = 0.0
     for k in range(3):
         total += (destination[k] - start[k]) ** 2
@@ -220,7 +211,7 @@ def _straight_distance(start: Floats, destination: Floats) -> float:  # pragma: 
 @inlined
 def _slope_limits_on(
     data: ProblemArrays, ux: float, uy: float, low: float, high: float, wind: Wind
-) -> tuple[float, float]:  # pragma: no cover - compiled
+) -> tuple[float, float]:
     """Return the steepest climb and dive, rad, on the unit course u between two heights."""
     climb, dive = data.max_climb, data.max_dive
     if math.isnan(climb) or math.isnan(dive):
@@ -237,7 +228,7 @@ def _slope_limits_on(
 
 
 @compiled
-def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
+def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, float]:
     """Return the slope limits of the leg a-b, rad: smallest over its ends and middle altitude, minus the margin."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     run = math.sqrt(dx * dx + dy * dy)
@@ -248,7 +239,7 @@ def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, floa
 @inlined
 def slope_excess(
     data: ProblemArrays, limits: PrecomputedLimits, ux: float, uy: float, run: float, low: float, high: float
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the amount by which a leg is too steep, in m of height per m of run.
 
     0 if it is not (eq. 3-4).
@@ -264,9 +255,7 @@ def slope_excess(
 
 
 @inlined
-def _turn_excess(
-    cosine: float, largest: float, ux: float, uy: float, vx: float, vy: float
-) -> float:  # pragma: no cover - compiled
+def _turn_excess(cosine: float, largest: float, ux: float, uy: float, vx: float, vy: float) -> float:
     """Return the amount by which the turn between two unit courses exceeds the largest, rad.
 
     0 if it does not (eq. 1-2).
@@ -287,7 +276,7 @@ def add_leg_violations(
     corners: Records,
     graded: bool,
     violations: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Add turn, slope and bounds violations of a path (w, 3) to a `VIOLATIONS` record: counts, or amounts if graded.
 
     Where legs must hold their turns, each leg shorter than its two turns adds to turn (eq. 1-4, 7).
@@ -312,9 +301,7 @@ def add_leg_violations(
 
 
 @inlined
-def _add_turns(
-    data: ProblemArrays, limits: PrecomputedLimits, legs: Records, graded: bool, violations: Record
-) -> None:  # pragma: no cover - compiled
+def _add_turns(data: ProblemArrays, limits: PrecomputedLimits, legs: Records, graded: bool, violations: Record) -> None:
     """Add the turns that are too sharp, last those from and to the courses prescribed at the ends."""
     largest, last = data.max_turn, legs.shape[0]
     for i in range(1, last):
@@ -327,9 +314,7 @@ def _add_turns(
 
 
 @inlined
-def _add_bounds(
-    data: ProblemArrays, path: Floats, corners: Records, graded: bool, violations: Record
-) -> None:  # pragma: no cover - compiled
+def _add_bounds(data: ProblemArrays, path: Floats, corners: Records, graded: bool, violations: Record) -> None:
     """Add the waypoints off the map (tracking error included), below the floor or above the ceiling (eq. 7)."""
     west, east, south, north = data.west, data.east, data.south, data.north
     floor, ceiling = data.floor, data.ceiling
@@ -350,7 +335,7 @@ def _add_turn_lengths(
     corners: Records,
     graded: bool,
     violations: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Add legs shorter than their turns, the roll between them and settling require, in units of 100 m."""
     for i in range(legs.shape[0]):
         need, run = turn_length(data.fly_over, corners, i), legs[i].run
@@ -364,7 +349,7 @@ def _add_turn_lengths(
 @inlined
 def _arc_excess(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, i: int, legs: Records, corners: Records
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the excess of the arc's slope at waypoint i over the aircraft's limit on either course, m per m."""
     rise_in = (path[i, 2] - path[i - 1, 2]) / max(legs[i - 1].run, 1.0)
     rise_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1.0)
@@ -379,7 +364,7 @@ def _arc_excess(
 
 
 @inlined
-def _violation(over: float, graded: bool) -> float:  # pragma: no cover - compiled
+def _violation(over: float, graded: bool) -> float:
     """Return the violation added for an excess `over`: the excess itself if graded, otherwise 1."""
     if graded:
         return over

@@ -12,7 +12,6 @@ neither on the block nor on the vector width of the machine.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.evaluation.corners import CORNER, LEG, measure_corners, measure_legs
 from planner.evaluation.leg_constraints import (
@@ -36,13 +35,10 @@ from planner.evaluation.problem import (
     clearance_at,
 )
 from planner.evaluation.threat_index import Short, ThreatCells
+from world.arrays import Floats, Heights, Ints
 from world.geometry import CLOSEST
 from world.kernels import Record, Records, compiled, inlined, inner
 from world.terrain import EDGE
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Heights = NDArray[np.float32]
 
 # Points per leg (eq. 6).
 POINTS = 6
@@ -70,7 +66,7 @@ def _score_paths(
     corners: Records,
     violations: Records,
     objectives: Records,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3).
 
     scratch: a `BLOCK_SCRATCH` record (1,). legs, corners: scratch records of one path.
@@ -100,7 +96,7 @@ def _score_paths(
 
 
 @inlined
-def _by_numbers(data: ProblemArrays, limits: PrecomputedLimits) -> bool:  # pragma: no cover - compiled
+def _by_numbers(data: ProblemArrays, limits: PrecomputedLimits) -> bool:
     """Return True if only numbers limit turns and slopes, and no course is prescribed at the ends."""
     courses = math.isnan(data.start_course) and math.isnan(data.destination_course)
     return courses and not data.legs_hold_turns and not limits.slopes_by_aircraft
@@ -109,7 +105,7 @@ def _by_numbers(data: ProblemArrays, limits: PrecomputedLimits) -> bool:  # prag
 @inner
 def _score_block(
     data: ProblemArrays, limits: PrecomputedLimits, paths: Floats, begin: int, size: int, block: Record
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill the sums of paths begin : begin + size.
 
     Each waypoint is mapped to the raster once; between waypoints a leg is taken as straight in pixels.
@@ -135,7 +131,7 @@ def _score_block(
 
 
 @inlined
-def _find_ground(heights: Heights, size: int, block: Record) -> None:  # pragma: no cover - compiled
+def _find_ground(heights: Heights, size: int, block: Record) -> None:
     """Fill the ground height at the points; the same as `pixel_height`."""
     rows, columns = heights.shape
     flat = heights.reshape(heights.size)
@@ -171,9 +167,7 @@ def _find_ground(heights: Heights, size: int, block: Record) -> None:  # pragma:
 
 
 @inlined
-def _add_terrain(
-    required: RequiredClearance, size: int, inner: bool, block: Record
-) -> None:  # pragma: no cover - compiled
+def _add_terrain(required: RequiredClearance, size: int, inner: bool, block: Record) -> None:
     """Add the points' terrain violations and heights above ground (eq. 5, 11)."""
     east, north, up = block.point.east, block.point.north, block.point.up
     ground, need, below, height = block.ground, block.need, block.sums.below, block.sums.height
@@ -192,7 +186,7 @@ def _add_terrain(
 
 
 @inlined
-def _find_units(threat_cells: ThreatCells, size: int, block: Record) -> None:  # pragma: no cover - compiled
+def _find_units(threat_cells: ThreatCells, size: int, block: Record) -> None:
     """Fill first entry and length of the list of units near each point."""
     # A cell is not bounded in height; it notes the heights its units reach.
     west, south, per_metre = threat_cells.west, threat_cells.south, 1.0 / threat_cells.side
@@ -213,7 +207,7 @@ def _find_units(threat_cells: ThreatCells, size: int, block: Record) -> None:  #
 
 
 @inlined
-def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> None:  # pragma: no cover - compiled
+def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> None:
     """Add kill and detection exposure of the points to the units found near them (eq. 9, 10).
 
     Round k takes the k-th unit of every list that has one. No branch within a round depends on the contents of a list,
@@ -249,7 +243,7 @@ def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> 
 
 
 @inlined
-def _add_leg(limits: PrecomputedLimits, size: int, first: bool, block: Record) -> None:  # pragma: no cover - compiled
+def _add_leg(limits: PrecomputedLimits, size: int, first: bool, block: Record) -> None:
     """Add a leg's length, and whether its slope and the turn into it exceed their limits (eq. 1-4, 8)."""
     climb, dive, cosine = limits.climb_slope, limits.dive_slope, limits.cos_max_turn
     east, north, up, runs = block.step.east, block.step.north, block.step.up, block.run
@@ -274,7 +268,7 @@ def _add_leg(limits: PrecomputedLimits, size: int, first: bool, block: Record) -
 
 
 @inlined
-def _add_outside(data: ProblemArrays, size: int, place: Record, sums: Record) -> None:  # pragma: no cover - compiled
+def _add_outside(data: ProblemArrays, size: int, place: Record, sums: Record) -> None:
     """Add whether a waypoint is off the map, below the floor or above the ceiling (eq. 7)."""
     west, east, south, north = data.west, data.east, data.south, data.north
     floor, ceiling = data.floor, data.ceiling

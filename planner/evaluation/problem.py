@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, PerformanceTable, derated, within_rates
 from aircraft.tracking import no_tracking
@@ -19,6 +18,7 @@ from planner.evaluation.encoding import Space
 from planner.evaluation.threat_index import MissileIndex, ThreatCells, make_missile_index, make_threat_cells
 from planner.evaluation.travel_cost import LENGTH, TravelCost
 from planner.plan import Objective, Violation
+from world.arrays import Floats, Heights
 from world.by_reference import by_reference
 from world.errors import ScenarioError
 from world.frames import PolyMapRecord
@@ -26,10 +26,6 @@ from world.kernels import Record, Records, inlined, inner
 from world.scenario import Scenario
 from world.terrain import TILE, Terrain, steepest_slopes
 from world.threats import Threats
-
-Floats = NDArray[np.float64]
-Heights = NDArray[np.float32]
-
 
 # --- Arrays for compiled code ---
 
@@ -198,13 +194,13 @@ class RequiredClearance(NamedTuple):
 
 
 @inner
-def required_clearance(data: ProblemArrays) -> RequiredClearance:  # pragma: no cover - compiled
+def required_clearance(data: ProblemArrays) -> RequiredClearance:
     """Return the clearance that a problem requires."""
     return _required(data, data.clearance, data.buffer, data.start_buffer, data.destination_buffer)
 
 
 @inner
-def required_headroom(data: ProblemArrays) -> RequiredClearance:  # pragma: no cover - compiled
+def required_headroom(data: ProblemArrays) -> RequiredClearance:
     """Return the maximum height above ground as a required clearance, with the heights of path and ground negated."""
     space = data.airspace
     return _required(data, -space.max_height, space.buffer, space.start_buffer, space.destination_buffer)
@@ -213,7 +209,7 @@ def required_headroom(data: ProblemArrays) -> RequiredClearance:  # pragma: no c
 @inlined
 def _required(
     data: ProblemArrays, clearance: float, buffer: float, start_buffer: float, destination_buffer: float
-) -> RequiredClearance:  # pragma: no cover - compiled
+) -> RequiredClearance:
     same_everywhere = min(start_buffer, destination_buffer) >= buffer
     growth = 0.0 if same_everywhere else data.buffer_growth
     return RequiredClearance(
@@ -233,7 +229,7 @@ def _required(
 
 
 @inlined
-def clearance_at(required: RequiredClearance, east: float, north: float) -> float:  # pragma: no cover - compiled
+def clearance_at(required: RequiredClearance, east: float, north: float) -> float:
     """Return the required height above ground at a point, m.
 
     The buffer grows away from fixed ends with less.
@@ -246,8 +242,7 @@ def clearance_at(required: RequiredClearance, east: float, north: float) -> floa
     other = required.destination_buffer + required.growth * math.sqrt(dx * dx + dy * dy)
     keep = other if other < keep else keep
     keep = keep if keep < required.buffer else required.buffer
-    need: float = required.clearance + keep
-    return need
+    return required.clearance + keep
 
 
 # --- Margins ---

@@ -8,20 +8,15 @@ height demand with a lag flies below or above its legs, and that deviation is ad
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import ground_speed
 from aircraft.path_limits import PerformanceTable, true_airspeed, wind_speed_at
 from planner.evaluation.corners import Wind
 from planner.evaluation.problem import RequiredClearance, SlopeBounds, clearance_at
+from world.arrays import Floats, Heights, Ints
 from world.frames import PolyMapRecord, polymap
 from world.kernels import Record, Records, inlined, inner
 from world.terrain import TILE, pixel_height
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Heights = NDArray[np.float32]
-
 
 # --- Height lag ---
 
@@ -36,17 +31,16 @@ HEIGHT_LAG = np.dtype([(name, np.float64) for name in ("steady", "slant", "rest"
 
 
 @inlined
-def _left(lengths: float) -> float:  # pragma: no cover - compiled
+def _left(lengths: float) -> float:
     """Share of a difference that remains after this many lag lengths: an upper bound on exp(-x)."""
     # By four terms of exp(x): a library's exponential rounds differently on different machines.
-    left: float = 1.0 / (1.0 + lengths * (1.0 + lengths * (0.5 + lengths / 6.0)))
-    return left
+    return 1.0 / (1.0 + lengths * (1.0 + lengths * (0.5 + lengths / 6.0)))
 
 
 @inlined
 def lag_length(
     tracking: Record, aircraft: PerformanceTable, east: float, north: float, amsl: float, wind: Wind
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the distance (m) that the aircraft covers over the ground during the lag, on a unit course."""
     (wx, wy), speed, airspeed = wind, wind_speed_at(aircraft, amsl), true_airspeed(aircraft, amsl)
     along = ground_speed(airspeed, speed * (east * wx + north * wy), speed * (east * wy - north * wx))
@@ -56,9 +50,7 @@ def lag_length(
 
 
 @inlined
-def set_lag(
-    tracking: Record, length: float, run: float, rise: float, below: float, lag: Record
-) -> float:  # pragma: no cover - compiled
+def set_lag(tracking: Record, length: float, run: float, rise: float, below: float, lag: Record) -> float:
     """Fill the `HEIGHT_LAG` record of a leg; returns the distance of the aircraft below its end, m.
 
     length: from `lag_length`. run, rise: of the leg. below: distance of the aircraft below its beginning, m.
@@ -76,7 +68,7 @@ def set_lag(
 @inner
 def measure_lags(
     tracking: Record, aircraft: PerformanceTable, wind: Wind, path: np.ndarray, legs: Records, lags: Records
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill `HEIGHT_LAG` records (w - 1,) of a path (w, 3), flown without deviation at its start."""
     below = 0.0
     for i in range(legs.shape[0]):
@@ -86,10 +78,9 @@ def measure_lags(
 
 
 @inlined
-def lag_at(lag: Record, share: float) -> float:  # pragma: no cover - compiled
+def lag_at(lag: Record, share: float) -> float:
     """Return the distance of the aircraft below a leg at a fraction of it, m; negative above."""
-    below: float = lag.steady + lag.slant * (1.0 - share) + lag.rest * _left(share * lag.decay)
-    return below
+    return lag.steady + lag.slant * (1.0 - share) + lag.rest * _left(share * lag.decay)
 
 
 # --- Terrain samples ---
@@ -137,7 +128,7 @@ def _sample(
     run: float,
     rise: float,
     pitch: float,
-) -> tuple[float, float]:  # pragma: no cover - compiled
+) -> tuple[float, float]:
     """Return the height above the required clearance at a point of a line, and the step to the next sample.
 
     tiles, tile_side: of `SlopeBounds`. growth: of `RequiredClearance`. need: required clearance. later: largest further
@@ -168,7 +159,7 @@ def terrain_excess(
     by: float,
     bz: float,
     enough: float,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the depth below the required clearance along a-b, summed over samples (m x km).
 
     The sum ends where it exceeds `enough`.
@@ -198,7 +189,7 @@ def terrain_excess(
 @inlined
 def _begin_legs(
     to_pixel: PolyMapRecord, sample_pitch: float, path: Floats, legs: Records, extents: Floats, terrain_legs: Records
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill `TERRAIN_LEG` records (w - 1,) as they are before the first sample."""
     start = path[0]
     column, row = polymap(to_pixel, start[0], start[1])
@@ -230,7 +221,7 @@ def sample_terrain(
     lags: Records,
     terrain_legs: Records,
     unfinished: Ints,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill `TERRAIN_LEG` records (w - 1,) of a path (w, 3): depths below the required clearance and smallest heights.
 
     extents: (w,) distance within which a point is near a waypoint, m. lags: `HEIGHT_LAG` records (w - 1,).

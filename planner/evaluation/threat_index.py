@@ -11,13 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from world.arrays import Floats, Ints
 from world.by_reference import by_reference
 from world.geometry import window_exposure
 from world.kernels import Records, compiled, inlined, inner
 
-Floats = NDArray[np.float64]
 Short = NDArray[np.int32]
-Ints = NDArray[np.int64]
 
 
 # --- Threats that reach a cell ---
@@ -81,9 +80,7 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
 
 
 @compiled
-def _fill_cells(
-    first: Short, units: Short, lowest: Short, highest: Short, cells: Records
-) -> None:  # pragma: no cover - compiled
+def _fill_cells(first: Short, units: Short, lowest: Short, highest: Short, cells: Records) -> None:
     for k in range(cells.shape[0]):
         cell = cells[k]
         cell.first, cell.count = first[k], first[k + 1] - first[k]
@@ -97,7 +94,7 @@ def _fill_cells(
 @compiled
 def _lists(
     position: Floats, radius: Floats, west: float, south: float, side: float, columns: int, rows: int
-) -> tuple[Short, Short]:  # pragma: no cover - compiled
+) -> tuple[Short, Short]:
     count = columns * rows
     first = np.zeros(count + 2, dtype=np.int32)
     units = np.empty(0, dtype=np.int32)
@@ -220,7 +217,7 @@ def kill_density(
     last: float,
     below: float,
     above: float,
-) -> tuple[float, float, float]:  # pragma: no cover - compiled
+) -> tuple[float, float, float]:
     """Return the mean kill density over a-b with enlarged radii, and the distances to the nearest spheres, m.
 
     first, last: lengths (m) at a and at b from which the two distances are measured; a distance is exact if below
@@ -268,14 +265,14 @@ def kill_density(
 
 
 @inlined
-def _part(f: float, g: float) -> tuple[float, float]:  # pragma: no cover - compiled
+def _part(f: float, g: float) -> tuple[float, float]:
     """Two fractions of a line in increasing order, clipped to it."""
     f, g = (f, g) if f < g else (g, f)
     return f if f > 0.0 else 0.0, g if g < 1.0 else 1.0
 
 
 @inlined
-def _nearer(z: float, rise: float, below: float, above: float) -> float:  # pragma: no cover - compiled
+def _nearer(z: float, rise: float, below: float, above: float) -> float:
     """Return the height of a segment's start above a missile (m), shifted towards it by the tracking error.
 
     rise: of the segment up to its closest point.
@@ -286,17 +283,14 @@ def _nearer(z: float, rise: float, below: float, above: float) -> float:  # prag
 
 
 @inlined
-def _cell(place: float, count: int) -> int:  # pragma: no cover - compiled
+def _cell(place: float, count: int) -> int:
     """Return the index of the cell along one axis; -1 and `count` if outside."""
     inside = place if place > -1.0 else -1.0
-    number: int = math.floor(inside if inside < count else count)
-    return number
+    return math.floor(inside if inside < count else count)
 
 
 @inlined
-def _closest2(
-    nearest: float, low: float, high: float, along: float, start2: float, length2: float
-) -> float:  # pragma: no cover - compiled
+def _closest2(nearest: float, low: float, high: float, along: float, start2: float, length2: float) -> float:
     """Return the squared distance from a point to the part low..high (fractions) of a segment.
 
     nearest: fraction of the infinite line that is closest to the point. along, start2, length2: see `window_exposure`.

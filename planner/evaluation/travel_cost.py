@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 
 from aircraft.envelope import Envelope
 from aircraft.path_limits import PerformanceTable, downwind, true_airspeed, wind_speed_at
+from world.arrays import Floats
 from world.by_reference import by_reference
 from world.kernels import compiled, inner
-
-Floats = NDArray[np.float64]
 
 # The third coordinate.
 UP = 2
@@ -131,9 +130,7 @@ class LegTime(NamedTuple):
 
 
 @inner
-def leg_time(
-    dx: float, dy: float, dz: float, wind_east: float, wind_north: float, airspeed: float
-) -> LegTime:  # pragma: no cover - compiled
+def leg_time(dx: float, dy: float, dz: float, wind_east: float, wind_north: float, airspeed: float) -> LegTime:
     """Time of a leg (m) at an airspeed in a wind (m/s): the smaller positive T with |d - w T| = V T.
 
     From |d|^2 - 2 T w.d - (V^2 - w^2) T^2 = 0: T = |d|^2 / (w.d + D), D^2 = (w.d)^2 + (V^2 - w^2) |d|^2, and its
@@ -166,7 +163,7 @@ class _At(NamedTuple):
 
 
 @inner
-def _at_height(travel: TravelCost, table: PerformanceTable, amsl: float) -> _At:  # pragma: no cover - compiled
+def _at_height(travel: TravelCost, table: PerformanceTable, amsl: float) -> _At:
     """Return airspeed, wind and power at an altitude, m."""
     airspeed, wind = true_airspeed(table, amsl), wind_speed_at(table, amsl)
     if travel.energy == 0.0:
@@ -192,7 +189,7 @@ def _at_height(travel: TravelCost, table: PerformanceTable, amsl: float) -> _At:
 @inner
 def _timed_cost(
     travel: TravelCost, table: PerformanceTable, dx: float, dy: float, dz: float, amsl: float
-) -> tuple[float, bool]:  # pragma: no cover - compiled
+) -> tuple[float, bool]:
     """Return the cost of the time and the energy of a leg flown at one height, and whether the leg can be held."""
     here, (wx, wy) = _at_height(travel, table, amsl), downwind(table)
     time = leg_time(dx, dy, dz, here.wind * wx, here.wind * wy, here.airspeed)
@@ -204,9 +201,7 @@ def _timed_cost(
 
 
 @inner
-def leg_cost(
-    travel: TravelCost, table: PerformanceTable, a: NDArray[np.float64], b: NDArray[np.float64]
-) -> float:  # pragma: no cover - compiled
+def leg_cost(travel: TravelCost, table: PerformanceTable, a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Return the cost of the leg a-b; inf if it cannot be held."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     total = travel.length * math.sqrt(dx * dx + dy * dy + dz * dz)
@@ -221,7 +216,7 @@ def leg_cost(
 
 
 @compiled
-def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> float:  # pragma: no cover - compiled
+def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> float:
     """Return the cost of a path (w, 3) world m, the sum over its legs; inf if a leg cannot be held.
 
     >>> from planfly.workflow.airframe import load_airframe
@@ -244,9 +239,7 @@ class LegModel(NamedTuple):
 
 
 @inner
-def model_leg(
-    travel: TravelCost, table: PerformanceTable, a: Floats, b: Floats, model: LegModel
-) -> float:  # pragma: no cover - compiled
+def model_leg(travel: TravelCost, table: PerformanceTable, a: Floats, b: Floats, model: LegModel) -> float:
     """Return the cost of the leg a-b, finite for any leg.
 
     Also fills its derivatives by a and b and its curvature.
@@ -301,9 +294,7 @@ def model_leg(
 
 
 @inner
-def _length_bends(
-    bend: Floats, step: tuple[float, float, float], length: float
-) -> Floats:  # pragma: no cover - compiled
+def _length_bends(bend: Floats, step: tuple[float, float, float], length: float) -> Floats:
     """Fill the curvature (3, 3) of a leg's length by its step."""
     for axis in range(3):
         for other in range(3):
@@ -313,7 +304,7 @@ def _length_bends(
 
 
 @inner
-def _time_bends(bend: Floats, time: LegTime, here: _At, wx: float, wy: float) -> None:  # pragma: no cover - compiled
+def _time_bends(bend: Floats, time: LegTime, here: _At, wx: float, wy: float) -> None:
     """Fill the curvature (3, 3) of a leg's time: (1 - w g' - g w' - (V^2 - w^2) g g') / D, g its gradient."""
     wind = (here.wind * wx, here.wind * wy, 0.0)
     gradient = (time.by_east, time.by_north, time.by_up)
@@ -335,7 +326,7 @@ def _add_bends(
     factor: float,
     gradient: tuple[float, float, float],
     slope_factor: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Add curvature and gradient by a leg's step to those by its ends: minus at a, plus at b."""
     for axis in range(3):
         slopes[0, axis] -= slope_factor * gradient[axis]

@@ -4,10 +4,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from world.arrays import Floats, Ints
 
 
 class BoxSearch(ABC):

@@ -5,7 +5,8 @@ Storn and Price, "Differential Evolution", Journal of Global Optimization 11, 19
 
 import numpy as np
 
-from planner.optimisers.box_search import BoxSearch, Floats, Ints
+from planner.optimisers.box_search import BoxSearch
+from world.arrays import Floats, Ints
 
 # Differential weight F, within the range that Storn and Price recommend.
 WEIGHT = 0.5

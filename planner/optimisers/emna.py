@@ -6,9 +6,9 @@ Larrañaga and Lozano, "Estimation of Distribution Algorithms", Kluwer 2002, cha
 
 import numpy as np
 
-from planner.optimisers.box_search import Floats
 from planner.optimisers.linear_algebra import cholesky, covariance, times_lower
 from planner.optimisers.umda import Umda
+from world.arrays import Floats
 
 # Regularisation added to each variance, as a fraction of their mean: with fewer samples than variables the covariance
 # is singular.

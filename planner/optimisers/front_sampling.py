@@ -20,13 +20,10 @@ solution is kept only because it covers one particular set of points well.
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.optimisers.hypervolume import covering_order
 from planner.optimisers.preference import NO_GOAL, Level, ranks
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from world.arrays import Floats, Ints
 
 # Number of solutions nearest to a mean that give its covariance.
 NEIGHBOURS = 6

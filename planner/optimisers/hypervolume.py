@@ -9,10 +9,9 @@ are minimised. A greedy choice covers at least 1 - 1/e of the volume of the best
 import numpy as np
 from numpy.typing import NDArray
 
+from world.arrays import Floats, Ints
 from world.kernels import compiled, inner
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Marks = NDArray[np.uint8]
 
 # Number of random points at which coverage is counted.
@@ -74,7 +73,7 @@ def covering_order(points: Floats, reference: Floats, count: int, rng: np.random
 
 
 @compiled
-def _covered(points: Floats, probes: Floats) -> Marks:  # pragma: no cover - compiled
+def _covered(points: Floats, probes: Floats) -> Marks:
     """Return marks (n, p), 1 if points (n, m) are at or below probes (m, p)."""
     out = np.ones((points.shape[0], probes.shape[1]), dtype=np.uint8)
     for n in range(points.shape[0]):
@@ -85,7 +84,7 @@ def _covered(points: Floats, probes: Floats) -> Marks:  # pragma: no cover - com
 
 
 @compiled
-def _greedy(covered: Marks, firsts: Ints, count: int) -> Ints:  # pragma: no cover - compiled
+def _greedy(covered: Marks, firsts: Ints, count: int) -> Ints:
     """Return rows (count,) of marks (n, p): `firsts`, then the row that covers most uncovered probes.
 
     Of equal rows the first is taken.
@@ -108,7 +107,7 @@ def _greedy(covered: Marks, firsts: Ints, count: int) -> Ints:  # pragma: no cov
 
 
 @inner
-def _overlap(some: Marks, others: Marks) -> int:  # pragma: no cover - compiled
+def _overlap(some: Marks, others: Marks) -> int:
     """Return the number of places (p,) at which both have a mark."""
     total = 0
     for p in range(some.size):

@@ -4,15 +4,13 @@ BLAS and LAPACK sum and round differently on different machines; a search must d
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.kernels import compiled, inner
-
-Floats = NDArray[np.float64]
 
 
 @compiled
-def covariance(rows: Floats, first: int, second: int, size: int) -> Floats:  # pragma: no cover - compiled
+def covariance(rows: Floats, first: int, second: int, size: int) -> Floats:
     """Return the covariance (size, size) of two groups of columns of centred rows (n, d), by their first columns."""
     out = np.zeros((size, size))
     for n in range(rows.shape[0]):
@@ -24,7 +22,7 @@ def covariance(rows: Floats, first: int, second: int, size: int) -> Floats:  # p
 
 
 @compiled
-def cholesky(matrix: Floats, ridge: float) -> Floats:  # pragma: no cover - compiled
+def cholesky(matrix: Floats, ridge: float) -> Floats:
     """Return the lower Cholesky factor (d, d) of a covariance (d, d) plus ridge x mean variance on its diagonal."""
     size = matrix.shape[0]
     trace = 0.0
@@ -46,7 +44,7 @@ def cholesky(matrix: Floats, ridge: float) -> Floats:  # pragma: no cover - comp
 
 
 @compiled
-def times_lower(rows: Floats, factor: Floats) -> Floats:  # pragma: no cover - compiled
+def times_lower(rows: Floats, factor: Floats) -> Floats:
     """Multiply rows (n, d) by the transpose of a lower triangular matrix (d, d)."""
     out = np.zeros(rows.shape)
     for n in range(rows.shape[0]):
@@ -57,7 +55,7 @@ def times_lower(rows: Floats, factor: Floats) -> Floats:  # pragma: no cover - c
 
 
 @compiled
-def times_sparse(rows: Floats, basis: Floats) -> Floats:  # pragma: no cover - compiled
+def times_sparse(rows: Floats, basis: Floats) -> Floats:
     """Multiply rows (n, d) by a basis (d, k) of which most entries are 0."""
     turned = rows.T.copy()
     out = np.zeros((basis.shape[1], rows.shape[0]))
@@ -69,13 +67,13 @@ def times_sparse(rows: Floats, basis: Floats) -> Floats:  # pragma: no cover - c
 
 
 @inner
-def _add_times(values: Floats, factor: float, out: Floats) -> None:  # pragma: no cover - compiled
+def _add_times(values: Floats, factor: float, out: Floats) -> None:
     for n in range(out.size):
         out[n] += values[n] * factor
 
 
 @inner
-def band_cholesky(matrix: Floats, out: Floats) -> None:  # pragma: no cover - compiled
+def band_cholesky(matrix: Floats, out: Floats) -> None:
     """Compute the lower Cholesky factor (d, b) of a positive definite band matrix (d, b) into `out`.
 
     Entry [i, k] of both belongs to row i and column i - k. Pivots are at least 1e-12 times their diagonal entry.
@@ -90,7 +88,7 @@ def band_cholesky(matrix: Floats, out: Floats) -> None:  # pragma: no cover - co
 
 
 @inner
-def solve_band(factor: Floats, right: Floats, out: Floats) -> None:  # pragma: no cover - compiled
+def solve_band(factor: Floats, right: Floats, out: Floats) -> None:
     """Solve a linear system, given the band factor (d, b) of its matrix, into `out` (d,)."""
     size, wide = factor.shape
     for i in range(size):

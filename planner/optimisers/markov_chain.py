@@ -7,9 +7,9 @@ that a small population suffices to estimate it.
 
 import numpy as np
 
-from planner.optimisers.box_search import Floats
 from planner.optimisers.linear_algebra import cholesky, covariance
 from planner.optimisers.umda import Umda
+from world.arrays import Floats
 from world.kernels import compiled, copy_into
 
 # Regularisation added to each variance of a group, as a fraction of their mean.
@@ -48,7 +48,7 @@ class MarkovChain(Umda):
 
 
 @compiled
-def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
+def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
     """Fit for each group (g, size, size) the regression on the previous one, and the residuals' Cholesky factor."""
     groups = rows.shape[1] // size
     slope, spread = np.zeros((groups, size, size)), np.zeros((groups, size, size))
@@ -78,7 +78,7 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:  
 
 
 @compiled
-def draw_chain(free: Floats, slope: Floats, spread: Floats) -> Floats:  # pragma: no cover - compiled
+def draw_chain(free: Floats, slope: Floats, spread: Floats) -> Floats:
     """Compute samples (n, g size) of the chain from independent standard normal numbers."""
     groups, size, _ = slope.shape
     out = np.zeros(free.shape)

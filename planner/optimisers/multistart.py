@@ -17,8 +17,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.optimisers.box_search import BoxSearch, Floats, Ints
+from planner.optimisers.box_search import BoxSearch
 from planner.optimisers.linear_algebra import cholesky, covariance, times_lower
+from world.arrays import Floats, Ints
 
 # Smallest and largest standard deviation of a start, as fractions of the box; drawn log-uniformly.
 WIDTHS = 0.003, 0.3

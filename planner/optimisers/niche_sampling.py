@@ -9,13 +9,9 @@ niching method for genetic algorithms", ICEC 1996), so that several routes aroun
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Flags, Floats, Ints
 from world.kernels import compiled, copy_into, inner
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 # Redraws of an infeasible first sample before it is accepted.
 FIRST_REDRAWS = 8
@@ -113,7 +109,7 @@ class NicheSampling:
 @compiled
 def _select(
     rows: Floats, costs: Floats, elite: Floats, clearing_radius: Floats, max_cost: float, number: int
-) -> tuple[Floats, Ints]:  # pragma: no cover - compiled
+) -> tuple[Floats, Ints]:
     """Select samples (g, number, d) of each group, the elite first, and return them with their numbers (g,)."""
     groups, _, size = rows.shape
     selected, numbers = np.zeros((groups, number, size)), np.ones(groups, dtype=np.int64)
@@ -130,7 +126,7 @@ def _select(
 
 
 @inner
-def _is_distinct(row: Floats, others: Floats, clearing_radius: Floats) -> bool:  # pragma: no cover - compiled
+def _is_distinct(row: Floats, others: Floats, clearing_radius: Floats) -> bool:
     """Return True if a sample (d,) differs from each other one by at least `clearing_radius` in some variable."""
     for n in range(others.shape[0]):
         near = True

@@ -12,12 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats, Ints
 from world.kernels import compiled, inner
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NO_GOAL = -np.inf
 
@@ -61,7 +58,7 @@ def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
 
 
 @compiled
-def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compiled
+def _rank_rows(table: Floats, widths: Ints) -> Ints:
     """Return the ranks (n,) of a table (c, n) whose levels have these widths."""
     count = table.shape[1]
     total = np.zeros(count, dtype=np.int64)
@@ -107,9 +104,7 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compi
 
 
 @inner
-def _sort(
-    table: Floats, column: int, width: int, order: Ints, scratch: Ints, begin: int, end: int
-) -> None:  # pragma: no cover - compiled
+def _sort(table: Floats, column: int, width: int, order: Ints, scratch: Ints, begin: int, end: int) -> None:
     """Sort order[begin:end] lexicographically by `width` columns of the table: a stable merge sort."""
     for k in range(begin + 1, end):
         # Insertion sort of short runs.
@@ -139,7 +134,7 @@ def _sort(
 
 
 @inner
-def _before(table: Floats, column: int, width: int, a: int, b: int) -> bool:  # pragma: no cover - compiled
+def _before(table: Floats, column: int, width: int, a: int, b: int) -> bool:
     """Return True if row a precedes row b, column by column."""
     for c in range(column, column + width):
         if table[c, a] != table[c, b]:
@@ -148,9 +143,7 @@ def _before(table: Floats, column: int, width: int, a: int, b: int) -> bool:  # 
 
 
 @inner
-def _count_any(
-    rows: Floats, width: int, begin: int, end: int, order: Ints, below: Ints, total: Ints
-) -> None:  # pragma: no cover - compiled
+def _count_any(rows: Floats, width: int, begin: int, end: int, order: Ints, below: Ints, total: Ints) -> None:
     """Add the number of dominators of each row of a group to total.
 
     rows: (c, n), sorted, so that only earlier rows can dominate.
@@ -176,7 +169,7 @@ def _count_any(
 
 
 @inner
-def _at_most(values: Floats, limit: float) -> int:  # pragma: no cover - compiled
+def _at_most(values: Floats, limit: float) -> int:
     """Count the values not above the limit, without branches, so that the loop is vectorised."""
     count = 0
     for k in range(values.size):
@@ -185,14 +178,14 @@ def _at_most(values: Floats, limit: float) -> int:  # pragma: no cover - compile
 
 
 @inner
-def _and_at_most(values: Floats, limit: float, marks: Ints) -> None:  # pragma: no cover - compiled
+def _and_at_most(values: Floats, limit: float, marks: Ints) -> None:
     """Clear the marks of values above the limit."""
     for k in range(values.size):
         marks[k] &= 1 if values[k] <= limit else 0
 
 
 @inner
-def _count_marks(marks: Ints) -> int:  # pragma: no cover - compiled
+def _count_marks(marks: Ints) -> int:
     """Count the marks that are 1; the others are 0."""
     count = 0
     for k in range(marks.size):
@@ -201,7 +194,7 @@ def _count_marks(marks: Ints) -> int:  # pragma: no cover - compiled
 
 
 @inner
-def _places(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:  # pragma: no cover - compiled
+def _places(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
     """Return the places of a group's rows in the order of the second column, from 1, and the number of places.
 
     Equal values have the same place.
@@ -220,7 +213,7 @@ def _places(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:  # pragma: 
 
 
 @inner
-def _count_pairs(rows: Floats, begin: int, end: int, order: Ints, total: Ints) -> None:  # pragma: no cover - compiled
+def _count_pairs(rows: Floats, begin: int, end: int, order: Ints, total: Ints) -> None:
     """Add the number of dominators of each row of a group to total, in O(n log n), for many rows.
 
     Uses a Fenwick tree over the second of two columns.

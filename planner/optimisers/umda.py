@@ -8,8 +8,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.optimisers.box_search import BoxSearch, Floats, Ints
+from planner.optimisers.box_search import BoxSearch
 from planner.optimisers.linear_algebra import times_sparse
+from world.arrays import Floats, Ints
 
 # Redraws of a sample outside the box before it is clipped.
 REDRAWS = 10

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.certify import certify
@@ -22,13 +21,9 @@ from planner.plan import Plan, Violation
 from planner.search.algorithms import ALGORITHMS, limits_for
 from planner.search.infeasibility_proof import closing_missiles, highest_level_flight
 from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
+from world.arrays import Flags, Floats, Ints
 from world.kernels import compiled
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-
 
 # --- Zones that separate start and destination ---
 
@@ -128,7 +123,7 @@ def _grown(cells: Flags) -> Flags:
 @compiled
 def _close_cells(
     records: ZoneRecords, east: Floats, north: Floats, ground: Floats, low: Floats, top: Floats, cells: Ints
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Store in open cells (heights, rows, columns) the first zone that closes them."""
     for z in range(records.zones.shape[0]):
         zone = records.zones[z]

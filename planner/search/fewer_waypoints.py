@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.certify import certify
@@ -11,8 +10,7 @@ from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem, make_problem
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 
 def drop_waypoints(plan: Plan, limits: Limits) -> Plan:

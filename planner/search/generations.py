@@ -16,7 +16,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.evaluation.encoding import rotated_frame
 from planner.optimisers.differential_evolution import DifferentialEvolution
@@ -28,10 +27,7 @@ from planner.optimisers.umda import Umda
 from planner.search.search_state import CONSTRAINTS, DETECTION, HEIGHT, KILL, LENGTH, Search, best_first
 from planner.seeding.first_samples import bridge_basis, first_samples
 from planner.seeding.waypoint_chains import ALL_LEGS, WaypointChains, free_points, waypoint_chains
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
+from world.arrays import Floats, Ints
 
 # --- Whole paths ---
 

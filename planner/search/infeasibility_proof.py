@@ -12,17 +12,13 @@ safe path exists. Other slopes, turns, zones and margins are ignored: they could
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import true_airspeed
 from planner.evaluation.problem import ProblemArrays
+from world.arrays import Flags, Floats, Ints
 from world.frames import polymap
 from world.kernels import compiled, inner
 from world.wind import mean_wind_speed
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 # Number of columns along the map's longer side.
 COLUMNS = 500
@@ -114,7 +110,7 @@ def _flags(indices: Ints, count: int) -> Flags:
 
 
 @compiled
-def _is_closed(data: ProblemArrays, missiles: Flags, side: float, margin: float) -> bool:  # pragma: no cover - compiled
+def _is_closed(data: ProblemArrays, missiles: Flags, side: float, margin: float) -> bool:
     """Implement `is_closed`; side: side of a column, m."""
     columns, rows = (
         max(1, math.ceil((data.east - data.west) / side)),
@@ -136,7 +132,7 @@ def _is_closed(data: ProblemArrays, missiles: Flags, side: float, margin: float)
 
 
 @inner
-def _lowest_ground(data: ProblemArrays, i: int, j: int, side: float) -> float:  # pragma: no cover - compiled
+def _lowest_ground(data: ProblemArrays, i: int, j: int, side: float) -> float:
     """Return the lowest pixel under a column and next to it, m; -inf if any is missing."""
     first_column, first_row, last_column, last_row = math.inf, math.inf, -math.inf, -math.inf
     for corner in range(4):
@@ -160,7 +156,7 @@ def _lowest_ground(data: ProblemArrays, i: int, j: int, side: float) -> float:  
 @inner
 def _close_sphere(
     east: float, north: float, up: float, radius: float, side: float, low: Floats, high: Floats, count: Ints
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Close the altitudes at which a whole column is inside a sphere.
 
     East, north: from the map's corner, m.
@@ -179,9 +175,7 @@ def _close_sphere(
 
 
 @inner
-def _close_range(
-    low: Floats, high: Floats, count: Ints, j: int, begin: float, end: float
-) -> None:  # pragma: no cover - compiled
+def _close_range(low: Floats, high: Floats, count: Ints, j: int, begin: float, end: float) -> None:
     """Add an altitude range to the closed ranges of column j of a row.
 
     A range beyond the maximum number stays open.
@@ -205,9 +199,7 @@ def _close_range(
 
 
 @inner
-def _reaches(
-    data: ProblemArrays, side: float, low: Floats, high: Floats, count: Ints
-) -> bool:  # pragma: no cover - compiled
+def _reaches(data: ProblemArrays, side: float, low: Floats, high: Floats, count: Ints) -> bool:
     """Return True if the destination can be reached from the start through open altitudes of adjacent columns.
 
     Open range s of a column is above its closed range s.

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.certify import certify
@@ -20,9 +19,8 @@ from planner.seeding.pattern_search import search_patterns
 from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import optimistic_grid, side_routes
 from planner.seeding.waypoint_fitting import fit_waypoints
+from world.arrays import Floats
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 # Parts of a search for one plan.
 PARTS = ("scores", "certificates", "shortening", "routes", "sides", "paper")

@@ -14,7 +14,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, aircraft_slopes
 from aircraft.tracking import SPEED_SHARES
@@ -35,11 +34,10 @@ from planner.search.pose_chains import (
     risen,
 )
 from world.airfield import STEEPEST_STRIP, LandingStrip, Launch, strip_slopes
+from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
 
 # Slope of departure and approach as a fraction of the aircraft's steepest climb and dive at cruise airspeed; a take-off
 # climbs at least as steeply (MIN_CLIMB of the verdict).

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.airspace.zone_limits import is_limited
@@ -34,10 +33,9 @@ from planner.search.search_state import SearchProgress, StopCondition
 from planner.seeding.first_samples import bridge_modes
 from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import optimistic_grid, side_routes
+from world.arrays import Floats
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 # Clearance preferences of the seeds, as fractions of the additional height above ground that the fixed ends allow.
 CLEARANCE_SHARES = (0.0, 0.25, 0.5, 0.75, 0.95)

@@ -8,7 +8,6 @@ path exists, the search ends.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.airspace.zone_limits import is_limited
@@ -39,11 +38,10 @@ from planner.search.seeds import (
     starting_vectors,
     straight_line,
 )
+from world.arrays import Floats
 from world.errors import ScenarioError
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 # Per attempt: (stages, number of routes) of its grids, and the factor on the population.
 ATTEMPTS = (

@@ -10,11 +10,10 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
 
-Floats = NDArray[np.float64]
 # East and north, m.
 Spot = tuple[float, float]
 # Steepest slope (m per m) on a course (rad).

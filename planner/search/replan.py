@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.paper_scores import paper_scores
@@ -16,11 +15,10 @@ from planner.search.explain_failure import violated_zones
 from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
 from planner.search.shared_budget import Search, SharedBudget
+from world.arrays import Floats
 from world.errors import MissionError
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 # A function that completes a plan, given a search that plans a changed scenario, or within other limits, in the same
 # way.

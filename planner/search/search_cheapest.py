@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.airspace.zone_limits import is_limited
@@ -24,11 +23,10 @@ from planner.plan import Certificate
 from planner.search.search_state import Search, SearchEnded
 from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import optimistic_grid, side_routes
+from world.arrays import Floats
 from world.errors import ScenarioError
 from world.geometry import path_length
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 # Grids for routes on other sides. Number of stages.
 STAGES = 50

@@ -24,13 +24,9 @@ from planner.search.algorithms import Algorithm
 from planner.seeding.pattern_search import search_patterns
 from planner.seeding.shortening import MAX_MODELS, shorten_path
 from planner.seeding.waypoint_fitting import tighten
+from world.arrays import Flags, Floats, Ints
 from world.errors import ScenarioError
 from world.geometry import path_length
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-
 
 # --- Scores: one row per path, violations followed by objectives ---
 

@@ -12,7 +12,6 @@ import math
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.airspace.zone_limits import is_limited
 from planner.evaluation.encoding import (
@@ -31,10 +30,8 @@ from planner.seeding.lattice import MAX_EXPANDED, ceiling_route, lattice_route, 
 from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import optimistic_grid, side_routes
 from planner.seeding.waypoint_fitting import CLOSE_FIT, QUICK_FIT, fit_points, fit_waypoints
+from world.arrays import Floats
 from world.geometry import path_length
-
-Floats = NDArray[np.float64]
-
 
 # Maximum evaluations of the pattern search on a quickly fitted path.
 QUICK_SEARCH = 50

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.airspace.zone_distances import penetration_depth
 from planner.airspace.zone_limits import MapSegment, ZonesWithMargins, first_exclusion_near, segment_between, view_shape
@@ -28,12 +27,9 @@ from planner.seeding.grids import (
     position_of,
     proximity_cost,
 )
+from world.arrays import Codes, Floats
 from world.kernels import Record, Records, compiled, inner
 from world.terrain import ground_height
-
-Floats = NDArray[np.float64]
-Codes = NDArray[np.int32]
-
 
 # Additional cost per m at the edges of the height band, relative to its middle: legs are longer than grid steps.
 EDGE_COST = 0.3
@@ -71,7 +67,7 @@ class _Passage(NamedTuple):
 @inner
 def _column(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, along: float, across: float, column: Record
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill the `COLUMN` record of a grid position."""
     east, north = position_of(frame, along, across)
     column.lowest, column.highest = math.inf, -math.inf
@@ -94,9 +90,7 @@ def _column(
 
 
 @inner
-def _passage(
-    zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float
-) -> _Passage:  # pragma: no cover - compiled
+def _passage(zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float) -> _Passage:
     """Return heights that zones close to a horizontal step.
 
     Lateral: lateral tracking error added to their margins, m.
@@ -125,9 +119,7 @@ def _passage(
 
 
 @inner
-def _slopes(
-    data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, share: float
-) -> Floats:  # pragma: no cover - compiled
+def _slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, share: float) -> Floats:
     """Return tangents (sideways, 2) of this share of the steepest climb and dive of each step at a height (m)."""
     out, a, b = np.zeros((2 * SIDEWAYS + 1, 2)), np.zeros(3), np.zeros(3)
     a[0], a[1] = frame.east, frame.north
@@ -149,7 +141,7 @@ def _set_cell_costs(
     low: int,
     high: int,
     price: Floats,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill the cost per m of a stage's cells (low..high, layers); inf if a path is not allowed."""
     near, aside2 = np.empty(obstacles.shape[0], dtype=np.int64), np.empty(obstacles.shape[0])
     for y in range(low, high + 1):
@@ -190,7 +182,7 @@ def _relax_stage(
     after: Floats,
     parents_before: Codes,
     parents: Codes,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Relax one stage: costs (across, layers) before and after it, and the parent cell (across x layers) of each.
 
     before, columns: `COLUMN` records (across,) of the previous stage and of this one. parents_before: parents of the
@@ -285,9 +277,7 @@ def cheapest_airspace_route(
 
 
 @compiled
-def begin_airspace_route(
-    data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid
-) -> AirspaceSearch:  # pragma: no cover - compiled
+def begin_airspace_route(data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid) -> AirspaceSearch:
     """Return a search that is at the start."""
     stages, wide, step = grid.stages, grid.across.size, frame.length / grid.stages
     home = int(np.argmin(np.abs(grid.across)))
@@ -317,7 +307,7 @@ def continue_airspace_route(
     bound: float,
     search: AirspaceSearch,
     more: int,
-) -> AirspaceSearch:  # pragma: no cover - compiled
+) -> AirspaceSearch:
     """Return the search after up to `more` further stages, or at the last one if no route comes further."""
     stages, wide, step = grid.stages, grid.across.size, frame.length / grid.stages
     obstacles, columns, cells, cost, after, price, home, reached = search
@@ -363,7 +353,7 @@ def continue_airspace_route(
 @compiled
 def end_airspace_route(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, search: AirspaceSearch
-) -> tuple[Floats, float]:  # pragma: no cover - compiled
+) -> tuple[Floats, float]:
     """Return points (stages + 1, 3) of the route found, and its cost; (0, 3) and inf if there is none."""
     stages, step, columns, y = grid.stages, frame.length / grid.stages, search.columns, search.home
     z = _layer(grid, columns[stages, y], data.destination[2])
@@ -381,11 +371,10 @@ def end_airspace_route(
 
 
 @inner
-def _layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:  # pragma: no cover - compiled
+def _layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:
     """Return the index of the layer nearest to a height, m."""
     first = column.lowest if grid.follows else grid.floor
-    layer: int = min(grid.layers - 1, max(0, round((amsl - first) / grid.pitch)))
-    return layer
+    return min(grid.layers - 1, max(0, round((amsl - first) / grid.pitch)))
 
 
 # --- Grids and routes ---

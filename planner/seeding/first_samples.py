@@ -6,11 +6,9 @@ ends, retain it.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.evaluation.encoding import Encoding, Space
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 # Share of a seeded first population that is sampled around the seeds.
 AROUND_SEEDS = 1.0

@@ -10,7 +10,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from aircraft.tracking import corner_deviation
@@ -18,11 +17,10 @@ from planner.evaluation.corners import ARC_STEP, fly_by_radii, half_blend_length
 from planner.evaluation.leg_constraints import PrecomputedLimits, slope_limits
 from planner.evaluation.problem import ProblemArrays, clearance_at
 from planner.evaluation.terrain_clearance import lag_at
+from world.arrays import Floats
 from world.frames import polymap
 from world.kernels import Records, inner
 from world.terrain import pixel_height
-
-Floats = NDArray[np.float64]
 
 # Samples of a corner: with tracking error along two legs, on both sides of each.
 ON_LEG = 4
@@ -61,7 +59,7 @@ class FlownCorners(NamedTuple):
 
 
 @inner
-def no_corners(count: int, margin: float) -> FlownCorners:  # pragma: no cover - compiled
+def no_corners(count: int, margin: float) -> FlownCorners:
     """Return no corners for a path; margin: additional, m."""
     slope_margin = ARC_MARGIN + ARC_SHARE * margin
     return FlownCorners(
@@ -72,7 +70,7 @@ def no_corners(count: int, margin: float) -> FlownCorners:  # pragma: no cover -
 @inner
 def corners_near_ground(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, corners: Records, lags: Records, margin: float
-) -> FlownCorners:  # pragma: no cover - compiled
+) -> FlownCorners:
     """Return the corners of a path (w, 3) that are flown near the ground; margin: additional, m."""
     count = path.shape[0]
     found, point = no_corners(count, margin), np.empty(3)
@@ -109,9 +107,7 @@ def corners_near_ground(
 
 
 @inner
-def _find_steep_arcs(
-    data: ProblemArrays, path: Floats, corners: Records, found: FlownCorners
-) -> None:  # pragma: no cover - compiled
+def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, found: FlownCorners) -> None:
     """Fill radii and steepest slopes of the arcs that are almost as steep as can be flown, on either course."""
     flat, step = np.zeros(3), np.zeros(3)
     for i in range(1, path.shape[0] - 1):
@@ -132,9 +128,7 @@ def _find_steep_arcs(
 
 
 @inner
-def arc_room(
-    before: Floats, at: Floats, after: Floats, radius: float, sign: float, steepest: float
-) -> float:  # pragma: no cover - compiled
+def arc_room(before: Floats, at: Floats, after: Floats, radius: float, sign: float, steepest: float) -> float:
     """Return the arc's length past the waypoint `at` minus the length of its climb (sign 1) or descent (-1), m.
 
     Slopes are those of `aircraft.path_limits.arc_slope`; steepest: tangent of what can be flown.
@@ -143,37 +137,32 @@ def arc_room(
     ux, uy, vx, vy = at[0] - before[0], at[1] - before[1], after[0] - at[0], after[1] - at[1]
     turn = min(MAX_TURN, math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy))
     rise = radius * math.tan(0.5 * turn) * ((at[2] - before[2]) / run + (after[2] - at[2]) / on)
-    room: float = radius * turn - sign * rise / steepest
-    return room
+    return radius * turn - sign * rise / steepest
 
 
 @inner
-def leg_of(sample: int) -> int:  # pragma: no cover - compiled
+def leg_of(sample: int) -> int:
     """Return the leg of a sample: 0 for before its corner, 1 for after it."""
-    leg: int = 2 * sample // SAMPLES
-    return leg
+    return 2 * sample // SAMPLES
 
 
 @inner
-def _run(a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
+def _run(a: Floats, b: Floats) -> float:
     return max(1e-3, math.hypot(b[0] - a[0], b[1] - a[1]))
 
 
 @inner
-def height_above_required(
-    data: ProblemArrays, limits: PrecomputedLimits, point: Floats
-) -> float:  # pragma: no cover - compiled
+def height_above_required(data: ProblemArrays, limits: PrecomputedLimits, point: Floats) -> float:
     """Return the height of a point (3,) above the lowest that is allowed there, m; NaN off the terrain."""
     column, row = polymap(data.to_pixel, point[0], point[1])
     ground: float = pixel_height(data.heights, column, row)
-    height: float = point[2] - ground - clearance_at(limits.required, point[0], point[1])
-    return height
+    return point[2] - ground - clearance_at(limits.required, point[0], point[1])
 
 
 @inner
 def corner_point(
     data: ProblemArrays, before: Floats, at: Floats, after: Floats, radius: float, sample: int, out: Floats
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill the place (3,) of a sample of the corner at the waypoint `at`, whose turn has this radius, m.
 
     Heights are those of the legs, or of the arc between its tangent points, and not lowered.
@@ -211,7 +200,7 @@ def corner_point(
 @inner
 def corner_slopes(
     data: ProblemArrays, corner: Floats, radius: float, sample: int, up: Floats, point: Floats, slopes: Floats
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill the derivatives (3, 3), by the waypoints of a corner (3, 3), of a value that rises by `up` (3,) at a sample.
 
     point: scratch (3,).
@@ -228,9 +217,7 @@ def corner_slopes(
 
 
 @inner
-def arc_room_slopes(
-    corner: Floats, radius: float, sign: float, steepest: float, slopes: Floats
-) -> None:  # pragma: no cover - compiled
+def arc_room_slopes(corner: Floats, radius: float, sign: float, steepest: float, slopes: Floats) -> None:
     """Fill the derivatives (3, 3) of `arc_room` by the waypoints of a corner (3, 3)."""
     for row in range(3):
         for axis in range(3):
@@ -243,7 +230,7 @@ def arc_room_slopes(
 
 
 @inner
-def ground_slopes(data: ProblemArrays, x: float, y: float, out: Floats) -> None:  # pragma: no cover - compiled
+def ground_slopes(data: ProblemArrays, x: float, y: float, out: Floats) -> None:
     """Fill the derivatives (3,) of the height above ground at a place; 0 across where they are not known."""
     heights, to_pixel = data.heights, data.to_pixel
     column, row = polymap(to_pixel, x + GROUND_STEP, y)

@@ -14,19 +14,15 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import ProblemArrays, RequiredClearance, clearance_at, required_clearance
+from world.arrays import Codes, Floats
 from world.by_reference import by_reference
 from world.frames import polymap
 from world.kernels import Records, compiled, inner
 from world.terrain import pixel_height
-
-Floats = NDArray[np.float64]
-Codes = NDArray[np.int32]
-
 
 # --- Cost per metre of grid cells ---
 
@@ -74,7 +70,7 @@ class _PixelSteps(NamedTuple):
 
 
 @inner
-def position_of(frame: RotatedFrame, along: float, across: float) -> tuple[float, float]:  # pragma: no cover - compiled
+def position_of(frame: RotatedFrame, along: float, across: float) -> tuple[float, float]:
     """East and north of a point in the rotated frame."""
     return (
         frame.east + frame.cosine * along - frame.sine * across,
@@ -90,7 +86,7 @@ def _lowest_height(
     along: float,
     across: float,
     steps: _PixelSteps,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the lowest height allowed in a cell: highest ground of 3 x 3 samples plus the clearance.
 
     Inf outside the map.
@@ -116,9 +112,7 @@ def _lowest_height(
 
 
 @inner
-def _pixel_steps(
-    data: ProblemArrays, frame: RotatedFrame, along: float, pitch: float
-) -> _PixelSteps:  # pragma: no cover - compiled
+def _pixel_steps(data: ProblemArrays, frame: RotatedFrame, along: float, pitch: float) -> _PixelSteps:
     """Return steps in the raster of `pitch` m along and across the line, at this distance along."""
     east, north = position_of(frame, along, 0.0)
     column, row = polymap(data.to_pixel, east, north)
@@ -130,9 +124,7 @@ def _pixel_steps(
 
 
 @compiled
-def find_obstacles(
-    data: ProblemArrays, frame: RotatedFrame, step: float, shrink: float = 0.0
-) -> Records:  # pragma: no cover - compiled
+def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink: float = 0.0) -> Records:
     """Return `OBSTACLE` records of the missiles for a grid with this step between stages.
 
     Shrink: see `Grid`.
@@ -156,9 +148,7 @@ def find_obstacles(
 
 
 @inner
-def _add_danger(
-    obstacles: Records, along: float, grid: Grid, low: int, high: int, price: Floats
-) -> None:  # pragma: no cover - compiled
+def _add_danger(obstacles: Records, along: float, grid: Grid, low: int, high: int, price: Floats) -> None:
     """Add the cost per m inside kill spheres, increasing inwards, to a stage's cells (layers, low..high)."""
     across, layers = grid.across, grid.layers
     pitch = across[1] - across[0] if across.size > 1 else 1.0
@@ -193,7 +183,7 @@ def set_cell_costs(
     low: int,
     high: int,
     price: Floats,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill the cost per m of a stage's cells (layers, low..high); inf if the ground is too near."""
     across, layers = grid.across, grid.layers
     step = frame.length / grid.stages
@@ -223,9 +213,7 @@ SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 
 
 @inner
-def layers_per_step(
-    data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float
-) -> Records:  # pragma: no cover - compiled
+def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float) -> Records:
     """Return `STEP_LAYERS` records (sideways, layers): climb and descent of a step on its course and at its height."""
     pitch = layers[1] - layers[0] if layers.size > 1 else 1.0
     out = np.zeros((2 * SIDEWAYS + 1, layers.size), dtype=STEP_LAYERS)
@@ -254,7 +242,7 @@ def relax(
     priced: int,
     count: int,
     length: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Relax `count` adjacent cells to as many of the next stage, with cell costs from `priced`.
 
     All arrays flat.
@@ -280,7 +268,7 @@ def relax_stage(
     step: float,
     pitch: float,
     ratio: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Relax one stage: costs (layers, across) before and after it, parent cells, and cost per m of the cells.
 
     spans: `SPAN` records (layers,) of the cells with a finite cost before. pitch: between layers, m.
@@ -304,9 +292,7 @@ def relax_stage(
 
 
 @inner
-def distance_to_goal(
-    columns: int, home: int, left: int, step: float, ratio: float, out: Floats
-) -> None:  # pragma: no cover - compiled
+def distance_to_goal(columns: int, home: int, left: int, step: float, ratio: float, out: Floats) -> None:
     """Return the shortest horizontal distance from each position across to the destination, `left` stages away, m."""
     for y in range(columns):
         aside = abs(y - home)
@@ -320,9 +306,7 @@ def distance_to_goal(
 
 
 @inner
-def prune(
-    after: Floats, spans: Records, ahead: Floats, rises: Floats, bound: float, low: int, high: int
-) -> None:  # pragma: no cover - compiled
+def prune(after: Floats, spans: Records, ahead: Floats, rises: Floats, bound: float, low: int, high: int) -> None:
     """Drop cells low..high from which no route reaches the destination within the bound.
 
     Note the remaining spans.
@@ -389,7 +373,7 @@ def cheapest_route(
 
 
 @compiled
-def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSearch:  # pragma: no cover - compiled
+def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSearch:
     """Return a search that is at the start."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
@@ -418,7 +402,7 @@ def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSea
 @compiled
 def continue_route(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, extra: Floats, bound: float, search: GridSearch, more: int
-) -> GridSearch:  # pragma: no cover - compiled
+) -> GridSearch:
     """Return the search after up to `more` further stages, or at the last one if no route comes further."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
@@ -445,7 +429,7 @@ def continue_route(
 
 
 @compiled
-def end_route(search: GridSearch) -> tuple[Records, float]:  # pragma: no cover - compiled
+def end_route(search: GridSearch) -> tuple[Records, float]:
     """Return `ROUTE_CELL` records (stages + 1,) of the route found, and its cost; empty if there is none."""
     goal, home, cost = search.goal, search.home, search.cost
     if search.spans[goal].first > home or search.spans[goal].last < home or cost[goal, home] == np.inf:
@@ -454,7 +438,7 @@ def end_route(search: GridSearch) -> tuple[Records, float]:  # pragma: no cover 
 
 
 @inner
-def trace_back(parents: Codes, layer: int, across: int) -> Records:  # pragma: no cover - compiled
+def trace_back(parents: Codes, layer: int, across: int) -> Records:
     """Return `ROUTE_CELL` records from the start to this cell of the last stage.
 
     Parents: (stages + 1, layers, across).

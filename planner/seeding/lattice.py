@@ -21,13 +21,12 @@ from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_lim
 from planner.evaluation.problem import ProblemArrays
 from planner.seeding.grids import position_of
 from planner.seeding.waypoint_fitting import leg_cost
+from world.arrays import Flags, Floats
 from world.by_reference import by_reference
 from world.kernels import Records, compiled, copy_into, inner
 
-Floats = NDArray[np.float64]
 Codes = NDArray[np.int64]
 Numbers = NDArray[np.int32]
-Flags = NDArray[np.bool_]
 Bytes = NDArray[np.int8]
 
 
@@ -41,7 +40,9 @@ TURN_COST = 0.1
 # A step is closed if its cost exceeds its length by this factor.
 CLOSED = 1.05
 # Status of a step.
-_UNKNOWN, _FREE, _SHUT = range(3)
+_UNKNOWN = 0
+_FREE = 1
+_SHUT = 2
 # Parent of a state of the start.
 _FIRST = -1
 # A point of a route: steps along and across from the start, and its layer.
@@ -71,9 +72,7 @@ class Lattice(NamedTuple):
 
 
 @inner
-def _set_position(
-    frame: RotatedFrame, lattice: Lattice, along: int, across: int, layer: int, out: Floats
-) -> None:  # pragma: no cover - compiled
+def _set_position(frame: RotatedFrame, lattice: Lattice, along: int, across: int, layer: int, out: Floats) -> None:
     """Fill the world position (3,) of a lattice point and layer."""
     out[0], out[1] = position_of(
         frame, (along - lattice.behind) * lattice.step, (across - lattice.right) * lattice.step
@@ -82,7 +81,7 @@ def _set_position(
 
 
 @compiled
-def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:  # pragma: no cover - compiled
+def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:
     """Return the maximum climb and descent (8, 2) of a step on each course, in layers."""
     out, a, b = np.zeros((8, 2), dtype=np.int64), np.zeros(3), np.zeros(3)
     _set_position(frame, lattice, lattice.behind, lattice.right, lattice.start_layer, a)
@@ -120,7 +119,7 @@ def _expand_state(
     state: int,
     courses: int,
     open_states: list[tuple[float, int]],
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Expand a state: relax its successors and push them with cost plus straight distance to the goal."""
     rises, course, cell = table.rises, state % 8, state // 8
     layer, place = cell % lattice.layers, cell // lattice.layers
@@ -185,9 +184,7 @@ def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Latt
 
 
 @compiled
-def _reach_start(
-    data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable
-) -> Codes:  # pragma: no cover - compiled
+def _reach_start(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable) -> Codes:
     """Return the states of the start, (k,), which are then reached."""
     first = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
     prescribed = _nearest_course(frame, data.start_course)
@@ -200,7 +197,7 @@ def _reach_start(
 @compiled
 def continue_lattice_search(
     data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, courses: int, search: LatticeSearch, max_expansions: int
-) -> LatticeSearch:  # pragma: no cover - compiled
+) -> LatticeSearch:
     """Return the search continued by up to `max_expansions` expansions.
 
     It has failed if the open list is empty.
@@ -229,24 +226,23 @@ def continue_lattice_search(
 
 
 @inner
-def _nearest_course(frame: RotatedFrame, course: float) -> int:  # pragma: no cover - compiled
+def _nearest_course(frame: RotatedFrame, course: float) -> int:
     """Return the index of the lattice course nearest to a course (rad, clockwise from north); -1 for NaN."""
     if math.isnan(course):
         return -1
     angle = 0.5 * math.pi - course - math.atan2(frame.sine, frame.cosine)
-    nearest: int = round(angle / (0.25 * math.pi)) % 8
-    return nearest
+    return round(angle / (0.25 * math.pi)) % 8
 
 
 @inner
-def _inside(data: ProblemArrays, point: Floats) -> bool:  # pragma: no cover - compiled
+def _inside(data: ProblemArrays, point: Floats) -> bool:
     """Return True if a point (3,) is on the map and between floor and ceiling."""
     inside: bool = data.west <= point[0] <= data.east and data.south <= point[1] <= data.north
     return inside and data.floor <= point[2] <= data.ceiling
 
 
 @compiled
-def trace_route(parents: Numbers, found: int, lattice: Lattice) -> Records:  # pragma: no cover - compiled
+def trace_route(parents: Numbers, found: int, lattice: Lattice) -> Records:
     """Return `LATTICE_CELL` records from the start to a state."""
     count, state = 0, found
     while state >= 0:
@@ -264,7 +260,7 @@ def trace_route(parents: Numbers, found: int, lattice: Lattice) -> Records:  # p
 
 
 @compiled
-def simplify_route(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no cover - compiled
+def simplify_route(data: ProblemArrays, points: Floats) -> Floats:
     """Simplify a route (k, 3) to as few points (j, 3) as possible by greedy line of sight.
 
     From each remaining point the leg goes to the furthest point that it reaches without a violation.

@@ -11,7 +11,6 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.evaluation.encoding import Encoding, WaypointFrames, frames_of
 from planner.evaluation.graded_scores import (
@@ -25,10 +24,8 @@ from planner.evaluation.graded_scores import (
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
 from planner.evaluation.problem import OBJECTIVES, VIOLATIONS, ProblemArrays
 from planner.plan import Objective
+from world.arrays import Floats, Ints
 from world.kernels import Record, Records, compiled, copy_into, inner
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # Price of a turn violation, length ratio per rad.
 TURN_PRICE = 2.0
@@ -161,7 +158,7 @@ def _triangular_basis(inner: int) -> tuple[Floats, Ints]:
 
 
 @inner
-def _make_candidate(data: ProblemArrays, waypoints: int) -> _Candidate:  # pragma: no cover - compiled
+def _make_candidate(data: ProblemArrays, waypoints: int) -> _Candidate:
     path = np.empty((waypoints, 3))
     copy_into(path[0], data.start)
     copy_into(path[-1], data.destination)
@@ -177,7 +174,7 @@ def _merit(
     candidate: _Candidate,
     best: float,
     shortest: float,
-) -> tuple[float, bool]:  # pragma: no cover - compiled
+) -> tuple[float, bool]:
     """Return the length ratio plus priced violations, and whether the path is feasible.
 
     Parts of a path's evaluation only add to its merit: it ends as soon as that reaches `best`, and `shortest` if the
@@ -208,7 +205,7 @@ def _merit(
 
 
 @inner
-def _price(violations: Record, objectives: Record) -> tuple[float, bool]:  # pragma: no cover - compiled
+def _price(violations: Record, objectives: Record) -> tuple[float, bool]:
     price, feasible = EXPOSURE_PRICE * objectives.kill_exposure, True
     if objectives.kill_exposure > 0.0:
         price += EXPOSED
@@ -223,9 +220,7 @@ def _price(violations: Record, objectives: Record) -> tuple[float, bool]:  # pra
 
 
 @compiled
-def _begin_search(
-    data: ProblemArrays, frames: WaypointFrames, start: Floats, steps: Floats
-) -> _State:  # pragma: no cover - compiled
+def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, steps: Floats) -> _State:
     """Return the search at a vector (d,), with moves of these initial steps (k,), which it modifies."""
     limits, candidate = precompute_limits(data), _make_candidate(data, start.size // 3 + 2)
     best, fit = _merit(data, limits, frames, start, candidate, math.inf, math.inf)
@@ -236,9 +231,7 @@ def _begin_search(
 
 
 @inner
-def _move_all(
-    box: _Box, moves: Floats, k: int, steps: Floats, before: Floats, here: Floats, trial: Floats
-) -> None:  # pragma: no cover - compiled
+def _move_all(box: _Box, moves: Floats, k: int, steps: Floats, before: Floats, here: Floats, trial: Floats) -> None:
     """Fill a trial (d,): the vector after move k, or after the whole round's displacement if k is beyond the last."""
     for d in range(here.size):
         step = steps[k] * moves[k, d] if k < moves.shape[0] else here[d] - before[d]
@@ -255,7 +248,7 @@ def _continue_search(
     state: _State,
     until: int,
     max_evaluations: int,
-) -> _State:  # pragma: no cover - compiled
+) -> _State:
     """Continue a search, with moves (k, d) of initial steps `first` (k,), for at least `max_evaluations`."""
     here, best, feasible, shortest, before, steps, move, alive, made, _ = state
     limits, candidate, trial = precompute_limits(data), _make_candidate(data, here.size // 3 + 2), here.copy()

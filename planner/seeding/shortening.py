@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
 from planner.evaluation.problem import ProblemArrays
@@ -25,10 +24,8 @@ from planner.seeding.shortening_model import (
     constraint_count,
     lagrangian,
 )
+from world.arrays import Floats
 from world.kernels import compiled, copy_into, inner
-
-Floats = NDArray[np.float64]
-
 
 # --- Newton steps and rounds ---
 
@@ -54,7 +51,7 @@ STILL = 0.05
 @inner
 def _newton_step(
     path: Floats, low: Floats, high: Floats, model: LagrangianModel, factor: Floats, step: Floats
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Fill the Newton step (n,) from a path within its box; returns its largest component, m."""
     size = step.size
     for row in range(size):
@@ -94,7 +91,7 @@ class Shortening(NamedTuple):
 @compiled
 def begin_shortening(
     data: ProblemArrays, path: Floats, samples: int, extra_margin: float, corners_too: bool
-) -> Shortening:  # pragma: no cover - compiled
+) -> Shortening:
     """Return the shortening of a path (w, 3) m before its first round.
 
     samples: of the ground on each leg. extra_margin: additional margin to spheres and ground, m. corners_too: see
@@ -116,9 +113,7 @@ class _Descent(NamedTuple):
 
 
 @compiled
-def continue_shortening(
-    data: ProblemArrays, under_way: Shortening, extra_margin: float, max_rounds: int
-) -> Shortening:  # pragma: no cover - compiled
+def continue_shortening(data: ProblemArrays, under_way: Shortening, extra_margin: float, max_rounds: int) -> Shortening:
     """Return the shortening after up to `max_rounds` further rounds."""
     here, active, multipliers, number, made, corners_too = under_way
     limits, size = precompute_limits(data), 3 * (here.shape[0] - 2)
@@ -155,7 +150,7 @@ def _descend(
     values: Floats,
     penalty: float,
     descent: _Descent,
-) -> int:  # pragma: no cover - compiled
+) -> int:
     """Minimise over a path (w, 3), in place, and fill the constraints' values at the end.
 
     Returns the number of models evaluated.

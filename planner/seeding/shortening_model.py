@@ -13,7 +13,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.evaluation.corners import (
     CORNER,
@@ -45,13 +44,10 @@ from planner.seeding.flown_corners import (
     leg_of,
     no_corners,
 )
+from world.arrays import Floats, Ints
 from world.frames import polymap
 from world.kernels import Records, copy_into, inner
 from world.terrain import pixel_height
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 
 # --- Active constraints of a round ---
 
@@ -94,7 +90,7 @@ class ActiveConstraints(NamedTuple):
 @inner
 def active_constraints(
     data: ProblemArrays, path: Floats, samples: int, extra_margin: float, corners_too: bool
-) -> ActiveConstraints:  # pragma: no cover - compiled
+) -> ActiveConstraints:
     """Return active constraints near a path (w, 3).
 
     Extra_margin: additional margin to spheres and ground, m.
@@ -131,7 +127,7 @@ def active_constraints(
 @inner
 def _turn_shares(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, legs: Records, before: Floats, after: Floats
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill the lengths that turns take of the legs before and after them, over the tangent of half the turn, (w,)."""
     corners = np.zeros(1, dtype=CORNER)
     for i in range(path.shape[0]):
@@ -157,7 +153,7 @@ def _turn_shares(
 @inner
 def _near_missiles(
     data: ProblemArrays, path: Floats, corners: Records, lags: Records, extra_margin: float
-) -> tuple[Ints, Floats]:  # pragma: no cover - compiled
+) -> tuple[Ints, Floats]:
     """Return legs and the missiles near them (p, 2), and the distances (p,) required from the missiles' centres, m."""
     missiles = data.missiles.missiles
     pairs, distances = [(0, 0) for _ in range(0)], [0.0 for _ in range(0)]
@@ -188,17 +184,14 @@ def _near_missiles(
 
 
 @inner
-def constraint_count(active: ActiveConstraints) -> int:  # pragma: no cover - compiled
+def constraint_count(active: ActiveConstraints) -> int:
     """Return the number of constraints of `lagrangian`."""
     legs = active.low.size
-    count: int = active.pairs.shape[0] + legs * (active.samples + 4) + (legs + 1) * (3 + SAMPLES)
-    return count
+    return active.pairs.shape[0] + legs * (active.samples + 4) + (legs + 1) * (3 + SAMPLES)
 
 
 @inner
-def carry_multipliers(
-    old: ActiveConstraints, multipliers: Floats, new: ActiveConstraints
-) -> Floats:  # pragma: no cover - compiled
+def carry_multipliers(old: ActiveConstraints, multipliers: Floats, new: ActiveConstraints) -> Floats:
     """Return the multipliers for new active constraints; those of new pairs of leg and missile start at 0."""
     out, many, before = np.zeros(constraint_count(new)), new.pairs.shape[0], old.pairs.shape[0]
     copy_into(out[many:], multipliers[before:])
@@ -241,9 +234,7 @@ class LagrangianModel(NamedTuple):
 
 
 @inner
-def _add(
-    value: float, first: int, points: int, multiplier: float, penalty: float, model: LagrangianModel
-) -> float:  # pragma: no cover - compiled
+def _add(value: float, first: int, points: int, multiplier: float, penalty: float, model: LagrangianModel) -> float:
     """Add a constraint on `points` waypoints from waypoint `first` to the model.
 
     Returns its contribution to the merit.
@@ -264,7 +255,7 @@ def _add(
 
 
 @inner
-def _add_length(path: Floats, model: LagrangianModel) -> float:  # pragma: no cover - compiled
+def _add_length(path: Floats, model: LagrangianModel) -> float:
     """Add the path's length to the model; returns the length, m."""
     total, size, unit = 0.0, model.gradient.size, np.empty(3)
     for i in range(path.shape[0] - 1):
@@ -294,7 +285,7 @@ def _add_length(path: Floats, model: LagrangianModel) -> float:  # pragma: no co
 
 
 @inner
-def _add_travel_cost(data: ProblemArrays, path: Floats, model: LagrangianModel) -> float:  # pragma: no cover - compiled
+def _add_travel_cost(data: ProblemArrays, path: Floats, model: LagrangianModel) -> float:
     """Add what the path costs to the model where that is not its length alone; returns the cost, m."""
     total, size, leg = 0.0, model.gradient.size, LegModel(np.zeros((2, 3)), np.zeros((2, 3, 2, 3)))
     for i in range(path.shape[0] - 1):
@@ -319,7 +310,7 @@ def _add_missiles(
     values: Floats,
     penalty: float,
     model: LagrangianModel,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Add the distances of legs from missiles, the first constraints.
 
     Returns their contribution to the merit.
@@ -354,7 +345,7 @@ def _add_ground(
     penalty: float,
     model: LagrangianModel,
     at: int,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Add the heights of leg samples above the required height, constraints from `at`.
 
     See `_add_missiles`.
@@ -390,7 +381,7 @@ def _add_corners(
     penalty: float,
     model: LagrangianModel,
     at: int,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Add the heights of flown corners above the required height, and lengths of steep arcs.
 
     See `_add_missiles`.
@@ -435,7 +426,7 @@ def _add_slopes(
     penalty: float,
     model: LagrangianModel,
     at: int,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Add slope margins of legs, as m of height, and lengths above the shortest leg; see `_add_missiles`."""
     merit, slopes = 0.0, model.slopes
     for i in range(path.shape[0] - 1):
@@ -464,7 +455,7 @@ def _add_turns(
     penalty: float,
     model: LagrangianModel,
     at: int,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Add turn margins, and lengths of legs that their turns leave over; see `_add_missiles`."""
     merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
     turn, of_before, of_after = np.zeros(count + 1), np.zeros((count + 1, 2)), np.zeros((count + 1, 2))
@@ -505,9 +496,7 @@ def _add_turns(
 
 
 @inner
-def _turn_slopes(
-    of_before: Floats, of_after: Floats, factor: float, slopes: Floats
-) -> None:  # pragma: no cover - compiled
+def _turn_slopes(of_before: Floats, of_after: Floats, factor: float, slopes: Floats) -> None:
     """Add a factor times the derivatives of a turn, by its legs before and after, to its waypoints (3, 3)."""
     for axis in range(2):
         slopes[0, axis] -= factor * of_before[axis]
@@ -525,7 +514,7 @@ def lagrangian(
     values: Floats,
     penalty: float,
     model: LagrangianModel,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the augmented length or cost of a path (w, 3), m.
 
     Fills the constraints' values and the model.

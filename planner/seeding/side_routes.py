@@ -10,7 +10,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.problem import ProblemArrays, required_clearance
@@ -30,18 +29,17 @@ from planner.seeding.grids import (
     set_cell_costs,
     trace_back,
 )
+from world.arrays import Codes, Floats, Ints
 from world.kernels import Records, compiled, inlined, inner
-
-Floats = NDArray[np.float64]
-Codes = NDArray[np.int32]
-Ints = NDArray[np.int64]
-
 
 # --- Costs of passing each obstacle on each side ---
 
 
 # Sides on which a route passes an obstacle: quadrants around its centre.
-LEFT, RIGHT, OVER, UNDER = range(4)
+LEFT = 0
+RIGHT = 1
+OVER = 2
+UNDER = 3
 # The cheapest route past an obstacle on one side: its cost (inf for none) and the cell through which it passes.
 PASSING = np.dtype(
     [("cost", np.float64), ("stage", np.int64), ("layer", np.int64), ("across", np.int64)],
@@ -74,7 +72,7 @@ def _relax_stage_back(
     step: float,
     pitch: float,
     ratio: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Relax one stage backwards: costs (layers, across) to the destination after and before it.
 
     spans: `SPAN` records (layers,) of the cells before it that are within the bound.
@@ -98,7 +96,7 @@ def _relax_stage_back(
 
 
 @inner
-def _bounded(reached: Floats, left: Floats, spans: Records, bound: float) -> None:  # pragma: no cover - compiled
+def _bounded(reached: Floats, left: Floats, spans: Records, bound: float) -> None:
     """Drop cells (layers, across) of one stage through which no route is within the bound."""
     for z in range(reached.shape[0]):
         for y in range(spans[z].first, spans[z].last + 1):
@@ -143,7 +141,7 @@ def grid_costs(
 
 
 @compiled
-def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> SideSearch:  # pragma: no cover - compiled
+def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> SideSearch:
     """Return a search that is at the start."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
@@ -169,7 +167,7 @@ def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> Si
 @compiled
 def continue_grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, search: SideSearch, more: int
-) -> SideSearch:  # pragma: no cover - compiled
+) -> SideSearch:
     """Return the search after up to `more` further stages, or ended if no route comes further."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step, required = frame.length / stages, required_clearance(data)
@@ -208,7 +206,7 @@ def continue_grid_costs(
 
 
 @inlined
-def side_of(aside: float, above: float) -> int:  # pragma: no cover - compiled
+def side_of(aside: float, above: float) -> int:
     """Return the side of a point given its offsets to the left of an obstacle's centre and above it."""
     if abs(aside) >= abs(above):
         return LEFT if aside >= 0.0 else RIGHT
@@ -216,9 +214,7 @@ def side_of(aside: float, above: float) -> int:  # pragma: no cover - compiled
 
 
 @compiled
-def cheapest_passings(
-    costs: GridCosts, grid: Grid, obstacles: Records, step: float
-) -> Records:  # pragma: no cover - compiled
+def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: float) -> Records:
     """Return `PASSING` records (obstacles, 4) of the cheapest route past each `OBSTACLE` on each side, by `side_of`.
 
     A route passes an obstacle at the stage nearest to its centre; obstacles beyond the ends have none.
@@ -242,7 +238,7 @@ def cheapest_passings(
 
 
 @compiled
-def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Records:  # pragma: no cover - compiled
+def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Records:
     """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route through a cell."""
     last, wide = costs.successors.shape[0] - 1, costs.successors.shape[2]
     cells = np.zeros(last + 1, dtype=ROUTE_CELL)

@@ -11,20 +11,16 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.evaluation.corners import CORNER, measure_corner
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
 from planner.evaluation.problem import ProblemArrays, clearance_at, required_clearance
 from planner.evaluation.threat_index import kill_density
 from planner.seeding.waypoint_fitting import ROUNDING, leg_cost
+from world.arrays import Flags, Floats, Ints
 from world.frames import polymap
 from world.kernels import Records, compiled, inlined, inner
 from world.terrain import pixel_height
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 # Cost, in m of path, per rad above the turn limit, or per 100 m by which a leg is too short for its turn.
 TURN_COST = 2e4
@@ -103,7 +99,7 @@ def waypoint_chains(
 @compiled
 def _advance(
     data: ProblemArrays, candidates: Floats, legs: Floats, bound: float, sweeps: _Sweeps, cursor: Records, max_legs: int
-) -> bool:  # pragma: no cover - compiled
+) -> bool:
     """Continue from the cursor until `max_legs` legs have been evaluated; returns whether all is done.
 
     legs: (w - 1, k, k) costs, filled on demand; a lower bound is negative. cursor: a `_CURSOR` record (1,).
@@ -134,9 +130,7 @@ def _advance(
 
 
 @compiled
-def _through(
-    data: ProblemArrays, candidates: Floats, bound: float, sweeps: _Sweeps
-) -> Floats:  # pragma: no cover - compiled
+def _through(data: ProblemArrays, candidates: Floats, bound: float, sweeps: _Sweeps) -> Floats:
     """Return the cost of the best path through each candidate, its turn there included.
 
     Inf above the bound.
@@ -167,7 +161,7 @@ def _extend(
     open_ends: Ints,
     lower_bounds: Floats,
     corners: Records,
-) -> int:  # pragma: no cover - compiled
+) -> int:
     """Extend partial paths with costs (w, k) to candidate k of waypoint i.
 
     Returns the number of legs evaluated.
@@ -210,7 +204,7 @@ def _extend(
 
 
 @inlined
-def _lowest(values: Floats, count: int) -> int:  # pragma: no cover - compiled
+def _lowest(values: Floats, count: int) -> int:
     """Return the index of the lowest of the first `count` values."""
     lowest = 0
     for k in range(1, count):
@@ -219,14 +213,14 @@ def _lowest(values: Floats, count: int) -> int:  # pragma: no cover - compiled
 
 
 @inlined
-def _distance(a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
+def _distance(a: Floats, b: Floats) -> float:
     return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
 
 
 @inner
 def _corner_cost(
     data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, c: Floats, corners: Records
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the cost of the turn at b between a and c: its excess over the limit, and the lack of leg length for it.
 
     corners: scratch, one record.
@@ -240,16 +234,24 @@ def _corner_cost(
     if data.legs_hold_turns:
         corner = corners[0]
         measure_corner(
-            data.aircraft, data.tracking, limits.wind, True,
-            ux / run, uy / run, vx / onward, vy / onward, b[2], corner,
-        )  # fmt: skip
+            data.aircraft,
+            data.tracking,
+            limits.wind,
+            True,
+            ux / run,
+            uy / run,
+            vx / onward,
+            vy / onward,
+            b[2],
+            corner,
+        )
         short = max(0.0, corner.before - TURN_SHARE * run) + max(0.0, corner.after - TURN_SHARE * onward)
         over += min(10.0, short / 100.0)
     return TURN_COST * over
 
 
 @compiled
-def free_points(data: ProblemArrays, points: Floats) -> Flags:  # pragma: no cover - compiled
+def free_points(data: ProblemArrays, points: Floats) -> Flags:
     """Return True for points (n, 3), world m, on the map, above the clearance and outside all kill spheres.
 
     >>> from planfly.workflow.airframe import load_airframe

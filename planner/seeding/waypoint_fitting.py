@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.evaluation.airspace_scores import airspace_excess
 from planner.evaluation.encoding import Encoding, RotatedFrame, WaypointFrames, frames_of, straight_frames
@@ -19,10 +18,8 @@ from planner.evaluation.problem import ProblemArrays
 from planner.evaluation.terrain_clearance import lag_length, segment_pixels, terrain_excess
 from planner.evaluation.threat_index import kill_density
 from planner.seeding.grids import KILL_COST
+from world.arrays import Floats, Ints
 from world.kernels import compiled, inner
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # Cost of depth (per m x km) and of slope excess (per unit), in m of path.
 DEPTH_COST = 2e4
@@ -32,9 +29,7 @@ ROUNDING = 1e-3
 
 
 @inner
-def leg_cost(
-    data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, enough: float
-) -> float:  # pragma: no cover - compiled
+def leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, enough: float) -> float:
     """Return the cost of one leg, in m of path: its length and its violations.
 
     A lower bound on it where that exceeds `enough`.
@@ -94,7 +89,7 @@ def leg_cost(
 @inner
 def _below(
     data: ProblemArrays, limits: PrecomputedLimits, east: float, north: float, run: float, low: float, high: float
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the largest distance of the aircraft below a long leg, m.
 
     Negative above. east, north: its unit course.
@@ -107,7 +102,7 @@ def _below(
 
 
 @compiled
-def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:  # pragma: no cover - compiled
+def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
     """Return candidates (w, c, 3) chosen at each waypoint to minimise the sum of leg costs.
 
     Number of legs evaluated.
@@ -167,10 +162,8 @@ FIRST_MOVES = (0.25, 0.2, 40.0)
 SHRINK = 0.7
 # Reduction of the moves in the last rounds.
 LAST_SHRINK = 0.6
-CLOSE_FIT, QUICK_FIT = (
-    WaypointFit(9, (0.0, 20.0, 60.0), 2, diagonal=True),
-    WaypointFit(5, (0.0, 20.0, 60.0), 2, diagonal=False),
-)
+CLOSE_FIT = WaypointFit(9, (0.0, 20.0, 60.0), 2, diagonal=True)
+QUICK_FIT = WaypointFit(5, (0.0, 20.0, 60.0), 2, diagonal=False)
 # Steps to the 26 neighbours and to the point itself, along, across and up.
 _NEIGHBOURS = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
 _AXIS_NEIGHBOURS = _NEIGHBOURS[np.abs(_NEIGHBOURS).sum(axis=1) <= 1.0]

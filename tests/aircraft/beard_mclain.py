@@ -8,10 +8,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import root
 
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 MASS = 11.0
 JX, JY, JZ, JXZ = 0.8244, 1.135, 1.759, 0.1204
@@ -100,13 +99,18 @@ def rates(states: Floats, commands: Floats, air: BookAtmosphere) -> Floats:
     force_y = side_force + MASS * air.gravity * math.cos(pitch) * math.sin(roll)
     force_z = -drag_force * sa - lift_force * ca + MASS * air.gravity * math.cos(pitch) * math.cos(roll)
 
-    moment_x = pressure * SPAN * (
-        ROLL_BETA * beta + half_span * (ROLL_P * p + ROLL_R * r) + ROLL_AILERON * aileron + ROLL_RUDDER * rudder
-    ) - torque  # fmt: skip
+    moment_x = (
+        pressure
+        * SPAN
+        * (ROLL_BETA * beta + half_span * (ROLL_P * p + ROLL_R * r) + ROLL_AILERON * aileron + ROLL_RUDDER * rudder)
+        - torque
+    )
     moment_y = pressure * CHORD * (CM_0 + CM_ALPHA * alpha + CM_Q * half_chord * q + CM_ELEVATOR * elevator)
-    moment_z = pressure * SPAN * (
-        YAW_BETA * beta + half_span * (YAW_P * p + YAW_R * r) + YAW_AILERON * aileron + YAW_RUDDER * rudder
-    )  # fmt: skip
+    moment_z = (
+        pressure
+        * SPAN
+        * (YAW_BETA * beta + half_span * (YAW_P * p + YAW_R * r) + YAW_AILERON * aileron + YAW_RUDDER * rudder)
+    )
 
     inertia = np.array([[JX, 0.0, -JXZ], [0.0, JY, 0.0], [-JXZ, 0.0, JZ]])
     spin = np.array([p, q, r])

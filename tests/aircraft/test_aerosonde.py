@@ -10,9 +10,8 @@ from aircraft.catalog import load_aircraft
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import Trim, attitude, full_throttle, idle, linearise, straight
 from tests.aircraft import beard_mclain as reference
+from world.arrays import Floats
 from world.kernels import Record
-
-Floats = NDArray[np.float64]
 
 CLEAN = Variation(parasite_drag=0.0)
 

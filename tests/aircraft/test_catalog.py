@@ -191,8 +191,14 @@ def test_a_folder_made_from_a_folder_brings_its_engines(tmp_path: Path) -> None:
     shutil.copy(first / "gains.toml", first / "notes.txt")
     made = make_own_folder(tmp_path / "second", read_aircraft(first))
     assert made == (
-        "Engines/prop.xml", "README.md", "ardupilot.parm", "ardupilot.toml", "gains.toml", "second.toml", "second.xml",
-    )  # fmt: skip
+        "Engines/prop.xml",
+        "README.md",
+        "ardupilot.parm",
+        "ardupilot.toml",
+        "gains.toml",
+        "second.toml",
+        "second.xml",
+    )
 
 
 @pytest.mark.parametrize(

@@ -106,8 +106,10 @@ def test_a_sink_sets_the_drag() -> None:
 
 
 def test_drag_falls_with_the_reynolds_number() -> None:
-    small, large = (size_aircraft(replace(FOAM, mass=m, span=s, cruise=v, stall=v / 1.5)).numbers for m, s, v in (
-        (1.0, 1.2, 15.0), (20.0, 3.5, 25.0)))  # fmt: skip
+    small, large = (
+        size_aircraft(replace(FOAM, mass=m, span=s, cruise=v, stall=v / 1.5)).numbers
+        for m, s, v in ((1.0, 1.2, 15.0), (20.0, 3.5, 25.0))
+    )
     ratio = (25.0 * large.chord) / (15.0 * small.chord)
     assert large.aero.drag_min / small.aero.drag_min == pytest.approx(ratio**-0.2)
 

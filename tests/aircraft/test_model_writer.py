@@ -22,16 +22,33 @@ BOOK = ModelNumbers(
     chord=0.18994,
     inertia=(0.8244, 1.135, 1.759, 0.1204),
     aero=AeroCoefficients(
-        lift_0=0.23, lift_alpha=5.61, lift_q=7.95, lift_elevator=0.13,
-        drag_min=0.043, drag_lift=1.0 / (math.pi * 0.9 * 2.8956**2 / 0.55),
-        pitch_0=0.0135, pitch_alpha=-2.74, pitch_q=-38.21, pitch_elevator=-0.99,
-        side_beta=-0.98, side_aileron=0.075, side_rudder=0.19,
-        roll_beta=-0.13, roll_p=-0.51, roll_r=0.25, roll_aileron=0.17, roll_rudder=0.0024,
-        yaw_beta=0.073, yaw_p=0.069, yaw_r=-0.095, yaw_aileron=-0.011, yaw_rudder=-0.069,
+        lift_0=0.23,
+        lift_alpha=5.61,
+        lift_q=7.95,
+        lift_elevator=0.13,
+        drag_min=0.043,
+        drag_lift=1.0 / (math.pi * 0.9 * 2.8956**2 / 0.55),
+        pitch_0=0.0135,
+        pitch_alpha=-2.74,
+        pitch_q=-38.21,
+        pitch_elevator=-0.99,
+        side_beta=-0.98,
+        side_aileron=0.075,
+        side_rudder=0.19,
+        roll_beta=-0.13,
+        roll_p=-0.51,
+        roll_r=0.25,
+        roll_aileron=0.17,
+        roll_rudder=0.0024,
+        yaw_beta=0.073,
+        yaw_p=0.069,
+        yaw_r=-0.095,
+        yaw_aileron=-0.011,
+        yaw_rudder=-0.069,
         stall_alpha=0.47,
     ),
     propulsion=ElectricMotor(BOOK_PROPELLER, 44.4, 60.0 / (2.0 * math.pi * 145.0), 0.042, 1.5),
-)  # fmt: skip
+)
 
 
 def _made(place: Path, numbers: ModelNumbers) -> Aircraft:
@@ -82,10 +99,18 @@ def test_each_factor_moves_what_it_is_named_for(tmp_path: Path) -> None:
     commands = level[4:]
     # Which accelerations (u, w, p, q) each factor moves; an idle propeller's drag only without throttle.
     moves = {
-        "zero-lift-drag": "uw", "induced-drag": "uw", "thrust": "u", "motor-speed": "up", "windmill-drag": "u",
-        "lift-slope": "uw", "pitch-stiffness": "q", "pitch-damping": "q", "elevator-power": "q", "roll-damping": "p",
+        "zero-lift-drag": "uw",
+        "induced-drag": "uw",
+        "thrust": "u",
+        "motor-speed": "up",
+        "windmill-drag": "u",
+        "lift-slope": "uw",
+        "pitch-stiffness": "q",
+        "pitch-damping": "q",
+        "elevator-power": "q",
+        "roll-damping": "p",
         "aileron-power": "p",
-    }  # fmt: skip
+    }
     assert set(moves) == set(FACTORS)
     for name, axes in moves.items():
         used = np.array([*commands[:3], 0.0]) if name == "windmill-drag" else commands

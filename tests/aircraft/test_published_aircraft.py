@@ -60,8 +60,13 @@ def test_the_ultra_stick_is_the_universitys() -> None:
     a, b = linearise(fdm, trim)
     v, w, p, q, r, elevator, aileron, rudder = 1, 2, 3, 4, 5, 0, 1, 2
     published = {
-        (p, p): -16.09328, (p, r): 3.36733, (r, p): 0.514002, (r, r): -2.775022, (r, v): 1.701517, (q, q): -15.80737,
-    }  # fmt: skip
+        (p, p): -16.09328,
+        (p, r): 3.36733,
+        (r, p): 0.514002,
+        (r, r): -2.775022,
+        (r, v): 1.701517,
+        (q, q): -15.80737,
+    }
     for at, value in published.items():
         assert a[at] == pytest.approx(value, rel=2e-3), at
     # A change of airspeed moves the propeller's speed at once here, with its inertia there.

@@ -9,15 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from benchmarks.task import make_task
 from planner.search.plan_path import plan_path
 from tests.instances import CEILING, CLIMB_DEG, DIVE_DEG, MAP, ground
 from tests.soak import note, scaled
+from world.arrays import Floats
 from world.scenario import Scenario, load_scenario
-
-Floats = NDArray[np.float64]
 
 KNOWN: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_name("best_known.json").read_text(encoding="utf-8"))
 NAMES = ("hard-07", "hard-15", "hard-30", "hard-60")
@@ -106,8 +104,10 @@ def default_ratios(name: str) -> list[float]:
         ratios.append(float(plan.objectives[0]) / KNOWN[name]["length_ratio"])
     note(
         f"planner: default plans of {name} over the best known",
-        plans=len(ratios), median=round(float(np.median(ratios)), 4), worst=round(max(ratios), 4),
-    )  # fmt: skip
+        plans=len(ratios),
+        median=round(float(np.median(ratios)), 4),
+        worst=round(max(ratios), 4),
+    )
     return ratios
 
 

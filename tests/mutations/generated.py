@@ -24,9 +24,18 @@ _SIGNS: dict[type[ast.operator], tuple[str, str]] = {
     ast.Div: ("/", "*"),
 }
 _NAMES = {
-    "min": "max", "max": "min", "sin": "cos", "cos": "sin", "any": "all", "all": "any", "argmin": "argmax",
-    "argmax": "argmin", "minimum": "maximum", "maximum": "minimum", "nanargmin": "nanargmax",
-}  # fmt: skip
+    "min": "max",
+    "max": "min",
+    "sin": "cos",
+    "cos": "sin",
+    "any": "all",
+    "all": "any",
+    "argmin": "argmax",
+    "argmax": "argmin",
+    "minimum": "maximum",
+    "maximum": "minimum",
+    "nanargmin": "nanargmax",
+}
 
 
 def limit_mutants() -> list[Mutant]:

@@ -16,9 +16,19 @@ from subprocess import PIPE, Popen
 
 # Nothing of ours: a fork imports that as the mutant has left it.  Hypothesis is left to pytest, which rewrites it.
 _IMPORTED = (
-    "numba", "scipy.linalg", "scipy.optimize", "scipy.interpolate", "matplotlib.pyplot", "jsbsim", "mcap.reader",
-    "pydantic", "pymavlink.mavutil", "pyproj", "pytest", "rasterio",
-)  # fmt: skip
+    "numba",
+    "scipy.linalg",
+    "scipy.optimize",
+    "scipy.interpolate",
+    "matplotlib.pyplot",
+    "jsbsim",
+    "mcap.reader",
+    "pydantic",
+    "pymavlink.mavutil",
+    "pyproj",
+    "pytest",
+    "rasterio",
+)
 _OPTIONS = ("-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--no-header", "--tb=line")
 
 

@@ -50,8 +50,12 @@ class Served:
         self.lines: list[str] = []
         self.process = subprocess.Popen(
             [*command, "--to", f"127.0.0.1:{to}", *argv],
-            cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
-        )  # fmt: skip
+            cwd=folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
         try:
@@ -139,10 +143,16 @@ def scheduler() -> Iterator[str]:
     from distributed import LocalCluster
 
     with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", host="127.0.0.1",
-        scheduler_kwargs={"dashboard": False}, dashboard_address="127.0.0.1:0", worker_dashboard_address=None,
+        n_workers=1,
+        threads_per_worker=1,
+        processes=False,
+        protocol="tcp",
+        host="127.0.0.1",
+        scheduler_kwargs={"dashboard": False},
+        dashboard_address="127.0.0.1:0",
+        worker_dashboard_address=None,
         memory_limit=0,
-    ) as cluster:  # fmt: skip
+    ) as cluster:
         yield cluster.scheduler_address
 
 

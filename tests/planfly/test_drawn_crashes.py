@@ -11,15 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import planfly
 from logs.verdict.findings import Finding
 from tests.soak import scaled
+from world.arrays import Floats
 from world.frames import to_geo, to_map
 from world.scenario import load_scenario
-
-Floats = NDArray[np.float64]
 
 WORLD = load_scenario("jacksboro-air")
 SEED = 620

@@ -10,14 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from planfly.cli import main
 from tests.soak import note, scaled
+from world.arrays import Floats
 from world.frames import to_geo
 from world.scenario import load_scenario
-
-Floats = NDArray[np.float64]
 
 WORLD = load_scenario("jacksboro-air")
 SEED = 350

@@ -152,8 +152,11 @@ def test_types_are_seen_by_a_checker(tmp_path: Path) -> None:
     )
     done = subprocess.run(
         [sys.executable, "-m", "mypy", "--strict", "--no-incremental", "--follow-imports=silent", "script.py"],
-        capture_output=True, text=True, check=False, cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
         env=os.environ | {"MYPYPATH": str(ROOT)},
-    )  # fmt: skip
+    )
     assert 'Revealed type is "bool"' in done.stdout.replace("builtins.", "")
     assert 'Unexpected keyword argument "sead"' in done.stdout

@@ -30,19 +30,22 @@ KINDS = tuple(DAMAGE) if SOAK else (",".join(DAMAGE),)
 WPL = "\n".join(
     [
         "QGC WPL 110",
-        *("\t".join(line.split()) for line in (
-            "0 1 0 16 0 0 0 0 46.0 8.0 0 1",
-            "1 0 3 22 0 0 0 0 46.0 8.0 100 1",
-            "2 0 3 16 0 0 0 0 46.004 8.0 110 1",
-            "3 0 3 18 2 0 200 0 46.008 8.004 110 1",
-            "4 0 2 178 0 24 -1 0 0 0 0 1",
-            "5 0 3 16 0 0 0 0 46.004 8.006 110 1",
-            "6 0 2 177 2 1 0 0 0 0 0 1",
-            "7 0 3 16 0 0 0 0 46.0 8.006 100 1",
-        )),
+        *(
+            "\t".join(line.split())
+            for line in (
+                "0 1 0 16 0 0 0 0 46.0 8.0 0 1",
+                "1 0 3 22 0 0 0 0 46.0 8.0 100 1",
+                "2 0 3 16 0 0 0 0 46.004 8.0 110 1",
+                "3 0 3 18 2 0 200 0 46.008 8.004 110 1",
+                "4 0 2 178 0 24 -1 0 0 0 0 1",
+                "5 0 3 16 0 0 0 0 46.004 8.006 110 1",
+                "6 0 2 177 2 1 0 0 0 0 0 1",
+                "7 0 3 16 0 0 0 0 46.0 8.006 100 1",
+            )
+        ),
         "",
     ]
-)  # fmt: skip
+)
 
 
 def make_valid(folder: Path) -> None:
@@ -69,9 +72,13 @@ def test_hostile_files_are_judged_or_refused(kind: str, tmp_path: Path) -> None:
     while first < count:
         done = subprocess.run(
             [sys.executable, "-m", "tests.soak.meet_hostile_files", kind, str(first), str(count - first)],
-            cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUTF8": "1"}, capture_output=True, text=True,
-            check=False, timeout=7200,
-        )  # fmt: skip
+            cwd=tmp_path,
+            env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUTF8": "1"},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=7200,
+        )
         lines = [json.loads(line) for line in done.stdout.splitlines()]
         # Of a valid file that is refused, damaged copies would say nothing.
         assert [line["valid"] for line in lines if "valid" in line and line["valid"]["code"] == 2] == []
@@ -84,9 +91,10 @@ def test_hostile_files_are_judged_or_refused(kind: str, tmp_path: Path) -> None:
         crashes.append((begun[-1], done.returncode, done.stderr[-300:]))
         first = begun[-1] + 1
     wrong = [
-        line for line in found
+        line
+        for line in found
         if line["trace"] or line["code"] not in ANSWERS or (line["code"] == 2 and _lines(line["said"]) != 1)
-    ]  # fmt: skip
+    ]
     note(
         f"hostile {kind}",
         count=len(found),

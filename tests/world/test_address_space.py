@@ -27,10 +27,14 @@ LIMIT = 480_000 * 1024
 def test_openblas_is_not_loaded_where_it_would_look_for_room_without_end() -> None:
     """At 480,000 kB SciPy's OpenBLAS finds none for its buffers, and held the process until it was killed."""
     done = subprocess.run(
-        [sys.executable, "-m", "planfly", "fly", "a.waypoints"], capture_output=True, text=True, check=False,
-        timeout=60, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        [sys.executable, "-m", "planfly", "fly", "a.waypoints"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (LIMIT, LIMIT)),
-    )  # fmt: skip
+    )
     assert done.returncode == 1
     (said,) = done.stderr.splitlines()
     assert said.startswith(

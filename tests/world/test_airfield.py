@@ -20,8 +20,13 @@ FIELD: dict[str, Any] = {
     "home": {"east_m": -2400.0, "north_m": 50.0},
     "launch": {"method": "catapult", "course_deg": 90.0, "speed_mps": 20.0, "length_m": 5.0, "incline_deg": 10.0},
     "landing": {
-        "lat_deg": 46.0, "lon_deg": 8.0, "course_deg": 270, "length_m": 150.0, "width_m": 30.0,
-        "approach_m": 700.0, "slope_deg": 5.0,
+        "lat_deg": 46.0,
+        "lon_deg": 8.0,
+        "course_deg": 270,
+        "length_m": 150.0,
+        "width_m": 30.0,
+        "approach_m": 700.0,
+        "slope_deg": 5.0,
     },
     "returns": {
         "require": ["rtl"],
@@ -32,7 +37,7 @@ FIELD: dict[str, Any] = {
             {"east_m": 900.0, "north_m": 1.0, "amsl_m": 700.0},
         ],
     },
-}  # fmt: skip
+}
 
 
 def hill(east: float, north: float) -> float:
@@ -54,8 +59,12 @@ def test_the_tables_become_places_courses_and_heights() -> None:
     # The made scenario has its origin there.
     assert (strip.east, strip.north) == pytest.approx((0.0, 0.0), abs=1e-6)
     assert (strip.course, strip.length, strip.width, strip.approach, strip.slope) == (
-        math.radians(270.0), 150.0, 30.0, 700.0, math.radians(5.0),
-    )  # fmt: skip
+        math.radians(270.0),
+        150.0,
+        30.0,
+        700.0,
+        math.radians(5.0),
+    )
     returns = scenario.returns
     assert returns is not None
     assert (returns.require, returns.rtl_altitude, returns.rtl_autoland) == (("rtl",), 180.0, 3)
@@ -151,7 +160,8 @@ CASES = {
     "a short final": (LAND + "approach_m = 9", "approach_m: 9: allowed 200..5000"),
     "a flat glide": (LAND + "slope_deg = 0.5", "slope_deg: 0.5: allowed 1..20"),
     "returns that ask nothing": (
-        "[returns]", "returns: require: missing; give require, rtl_altitude_m, rtl_autoland or rally",
+        "[returns]",
+        "returns: require: missing; give require, rtl_altitude_m, rtl_autoland or rally",
     ),
     "returns that require nothing": ("[returns]\nrequire = []", "returns: require: missing; give require"),
     "a return that does not arm": ("[returns]\nrtl_autoland = 0", "returns.rtl_autoland: 0: allowed 1, 2 or 3"),
@@ -167,7 +177,7 @@ CASES = {
         "[returns]\nrally = [{east_m = 0, north_m = 0, amsl_m = 300}, {east_m = 0, north_m = 0, amsl_m = 200}]",
         "returns.rally[1]: 200 m AMSL: not above the terrain, which is at 200 m",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", CASES)

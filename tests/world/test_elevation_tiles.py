@@ -78,8 +78,12 @@ def test_the_outline_is_that_of_all_tiles(tmp_path: Path) -> None:
 def test_another_tile_is_another_terrain(tmp_path: Path) -> None:
     folder = four(tmp_path / "dem", 0)
     before = open_raster(str(folder)).sha256
-    write_raster(folder / "11.tif", made_tile()[ROWS // 2 :, COLS // 2 :] + 1, "EPSG:4326",
-                 from_origin(WEST + COLS // 2 * PITCH, NORTH - ROWS // 2 * PITCH, PITCH, PITCH))  # fmt: skip
+    write_raster(
+        folder / "11.tif",
+        made_tile()[ROWS // 2 :, COLS // 2 :] + 1,
+        "EPSG:4326",
+        from_origin(WEST + COLS // 2 * PITCH, NORTH - ROWS // 2 * PITCH, PITCH, PITCH),
+    )
     assert open_raster(str(folder)).sha256 != before
 
 

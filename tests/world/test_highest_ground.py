@@ -4,14 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
+from world.arrays import Floats
 from world.frames import fit_polymap
 from world.highest_ground import highest_in_cells
 from world.terrain import Terrain, gridded
-
-Floats = NDArray[np.float64]
 
 
 def rough(spacing: float, turned: float, seed: int) -> tuple[Terrain, Floats, Floats]:

@@ -26,7 +26,7 @@ OUTER = record_dtype("first", ("leg", np.int64), ("inner", INNER), ("done", np.b
 
 
 @compiled
-def _mark(record: Record, east: float) -> float:  # pragma: no cover - compiled
+def _mark(record: Record, east: float) -> float:
     record.inner.east = east
     record.leg += 2
     record.done = True
@@ -35,22 +35,22 @@ def _mark(record: Record, east: float) -> float:  # pragma: no cover - compiled
 
 
 @compiled
-def _divide(a: float, b: float) -> float:  # pragma: no cover - compiled
+def _divide(a: float, b: float) -> float:
     return a / b
 
 
 @inlined
-def _twice(a: float) -> float:  # pragma: no cover - compiled
+def _twice(a: float) -> float:
     return 2.0 * a
 
 
 @inner
-def _thrice(a: float) -> float:  # pragma: no cover - compiled
+def _thrice(a: float) -> float:
     return 3.0 * a
 
 
 @compiled
-def _add_twice(values: np.ndarray, out: np.ndarray) -> None:  # pragma: no cover - compiled
+def _add_twice(values: np.ndarray, out: np.ndarray) -> None:
     for k in range(values.size):
         out[k] += _twice(values[k])
 
@@ -182,7 +182,7 @@ class Sites(NamedTuple):
 
 
 @compiled
-def _sum_site(site: Site) -> float:  # pragma: no cover - compiled
+def _sum_site(site: Site) -> float:
     total = site.place.east + site.number + site.record.leg + site.record.inner.north + (1000.0 if site.flag else 0.0)
     for k in range(site.table.shape[0]):
         total += site.table[k, 1] + site.place.values[k]
@@ -190,7 +190,7 @@ def _sum_site(site: Site) -> float:  # pragma: no cover - compiled
 
 
 @compiled
-def _sum_sites(sites: Sites) -> float:  # pragma: no cover - compiled
+def _sum_sites(sites: Sites) -> float:
     return sites.weight * _sum_site(sites.site)
 
 
@@ -212,7 +212,7 @@ def test_kernels_read_what_stands_behind_a_pointer() -> None:
 
 
 @inner
-def _power(base: float, exponent: int) -> float:  # pragma: no cover - compiled
+def _power(base: float, exponent: int) -> float:
     power = 1.0
     for _ in range(exponent):
         power *= base

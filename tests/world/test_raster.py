@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 import rasterio
-from numpy.typing import NDArray
 from pyproj import Transformer
 from rasterio.transform import Affine
 from scipy.interpolate import RegularGridInterpolator
@@ -39,11 +38,10 @@ from tests.world.made.elevation_files import (
     write_npz,
     write_raster,
 )
+from world.arrays import Floats
 from world.errors import TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import open_raster, read_terrain, tile_bounds
-
-Floats = NDArray[np.float64]
 
 
 @pytest.mark.parametrize(
@@ -339,9 +337,20 @@ def test_a_large_tile_is_read_by_its_window(tmp_path: Path, crs: str) -> None:
     east, up = Transformer.from_crs("EPSG:4326", crs, always_xy=True).transform(8.05, 46.065)
     column, row = int((east - west) / pitch), int((north - up) / pitch)
     with rasterio.open(
-        path, "w", driver="GTiff", width=side, height=side, count=1, dtype="float32", crs=crs, nodata=-9999.0,
-        transform=from_origin(west, north, pitch, pitch), tiled=True, sparse_ok=True, compress="deflate",
-    ) as out:  # fmt: skip
+        path,
+        "w",
+        driver="GTiff",
+        width=side,
+        height=side,
+        count=1,
+        dtype="float32",
+        crs=crs,
+        nodata=-9999.0,
+        transform=from_origin(west, north, pitch, pitch),
+        tiled=True,
+        sparse_ok=True,
+        compress="deflate",
+    ) as out:
         block = np.full((1600, 1600), 321.0, dtype=np.float32)
         out.write(block, 1, window=rasterio.windows.Window(column - 800, row - 800, 1600, 1600))
     tracemalloc.start()

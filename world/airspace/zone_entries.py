@@ -23,9 +23,17 @@ _SCENARIO_KEY_PREFIXES = ("floor", "ceiling", "radius")
 _LIMITS = {"lowerLimit": "floor", "lowerCeiling": "floor", "upperLimit": "ceiling", "upperCeiling": "ceiling"}
 _UNITS = {0: 1.0, "M": 1.0, 1: 0.3048, "FT": 0.3048, 6: 30.48, "FL": 30.48}
 _DATUMS = {
-    0: "agl", "GND": "agl", "AGL": "agl", "SFC": "agl", 1: "amsl", "MSL": "amsl", 2: "standard", "STD": "standard",
-    "AMSL": "amsl", "WGS84": "ellipsoid",
-}  # fmt: skip
+    0: "agl",
+    "GND": "agl",
+    "AGL": "agl",
+    "SFC": "agl",
+    1: "amsl",
+    "MSL": "amsl",
+    2: "standard",
+    "STD": "standard",
+    "AMSL": "amsl",
+    "WGS84": "ellipsoid",
+}
 # Largest difference between a flight level (a pressure altitude) and its altitude at 1,013.25 hPa, m, for sea-level
 # pressures of 965 to 1,060 hPa (27 ft per hPa, ICAO Doc 7488).
 FLIGHT_LEVEL_ERROR = 400.0

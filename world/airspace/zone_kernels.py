@@ -106,9 +106,7 @@ def _level(level: ZoneLevel | None, absent: float) -> tuple[float, bool]:
 
 
 @inlined
-def box_distance(
-    records: ZoneRecords, z: int, west: float, east: float, south: float, north: float
-) -> float:  # pragma: no cover - compiled
+def box_distance(records: ZoneRecords, z: int, west: float, east: float, south: float, north: float) -> float:
     """Return the horizontal distance between the box of zone z and another box, m; 0 if they meet."""
     zone = records.zones[z]
     across = max(0.0, zone.west - east, west - zone.east)
@@ -117,7 +115,7 @@ def box_distance(
 
 
 @inlined
-def distance_to_edge(edge: Record, east: float, north: float) -> float:  # pragma: no cover - compiled
+def distance_to_edge(edge: Record, east: float, north: float) -> float:
     """Return the horizontal distance from a place to one edge, m."""
     step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
     off_e, off_n = east - edge.east, north - edge.north
@@ -129,9 +127,7 @@ def distance_to_edge(edge: Record, east: float, north: float) -> float:  # pragm
 
 
 @inner
-def nearest_edge(
-    records: ZoneRecords, z: int, east: float, north: float
-) -> tuple[float, int]:  # pragma: no cover - compiled
+def nearest_edge(records: ZoneRecords, z: int, east: float, north: float) -> tuple[float, int]:
     """Return the horizontal distance from a place to the outline of zone z, m, negative inside, and the nearest edge.
 
     The edge number is -1 for a cylinder, which has no edges.
@@ -162,14 +158,14 @@ def nearest_edge(
 
 
 @compiled
-def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> float:  # pragma: no cover - compiled
+def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> float:
     """Return the horizontal distance from a place to the outline of zone z, m; negative inside its shape."""
     away, _ = nearest_edge(records, z, east, north)
     return away
 
 
 @compiled_inline
-def outside_band(zone: Record, up: float, ground: float) -> float:  # pragma: no cover - compiled
+def outside_band(zone: Record, up: float, ground: float) -> float:
     """Return the height below a zone's floor or above its ceiling, m.
 
     Negative between them, to the nearer one.
@@ -186,7 +182,7 @@ def outside_band(zone: Record, up: float, ground: float) -> float:  # pragma: no
 @inner
 def inside_share(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, first: float, last: float
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the fraction of the segment a-b inside the shape of zone z, within its part from ``first`` to ``last``.
 
     first, last: fractions of the segment, 0 and 1 for all of it.  Exact: entries and exits alternate, so that the sum
@@ -228,9 +224,7 @@ def inside_share(
 
 
 @inlined
-def _between(
-    edge: Record, ax: float, ay: float, dx: float, dy: float, run2: float
-) -> tuple[float, float]:  # pragma: no cover - compiled
+def _between(edge: Record, ax: float, ay: float, dx: float, dy: float, run2: float) -> tuple[float, float]:
     """Return the squared distance from an edge's first corner to the segment, and its fraction of the segment."""
     share = ((edge.east - ax) * dx + (edge.north - ay) * dy) / run2 if run2 > 0.0 else 0.0
     share = min(1.0, max(0.0, share))
@@ -239,9 +233,7 @@ def _between(
 
 
 @inner
-def segment_distance(
-    records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float
-) -> tuple[float, float]:  # pragma: no cover - compiled
+def segment_distance(records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
     """Return the smallest horizontal distance from the segment a-b to the shape of zone z, m, and its fraction of a-b.
 
     The distance is 0 if the segment meets the shape, at a fraction inside it or on its outline; `edge_distance` gives

@@ -4,16 +4,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
 from world.airspace.zones import Cylinder, Polygon, Ring, Zone, ZoneLevel, is_hole, make_cylinder, make_polygon
+from world.arrays import Floats
 from world.errors import ScenarioError
 from world.frames import GeoOrigin, to_map
 from world.scenario_tables import ZoneTable
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
 
 # ----------------------------------------------------------------------
 # Rings of latitudes and longitudes on a map: edges are straight in degrees, with extra corners where they bend.

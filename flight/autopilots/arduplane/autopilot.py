@@ -25,7 +25,6 @@ from flight.autopilots.arduplane.parameters import (
 from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.autopilots.autopilot import (
     Autopilot,
-    Floats,
     GroundAutopilot,
     LandingGlide,
     SpeedLimits,
@@ -39,6 +38,7 @@ from flight.mission.ground_ways import Approach, GroundWays, TakeOff
 from flight.mission.itinerary import Loiter
 from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
+from world.arrays import Floats
 from world.kernels import Record
 from world.scenario_tables import FlightTable, Navigation
 from world.wind import Turbulence

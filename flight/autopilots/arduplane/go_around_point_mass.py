@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.point_mass import PointMass
@@ -32,10 +31,9 @@ from flight.autopilots.arduplane.rtl_point_mass import (
 )
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.mission.return_path import LandingStart, nearest_landing
+from world.arrays import Floats
 from world.kernels import Record, Records
 from world.wind import mean_wind_speed
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,10 +122,26 @@ def fly_go_arounds(
         most = most_seconds(starts[k], ends[1:], aircraft) + max(0.0, top - float(starts[k]["up"]))
         way = np.zeros((int(most) + 2, 3))
         fly_stages(
-            starts[k], ends, law, staged, climb, aircraft.record, aircraft.excess, aircraft.power, around.heights,
-            around.to_pixel, around.spheres, around.radii, around.known, most,
-            -math.inf, -math.inf, False, way, flown[k],
-        )  # fmt: skip
+            starts[k],
+            ends,
+            law,
+            staged,
+            climb,
+            aircraft.record,
+            aircraft.excess,
+            aircraft.power,
+            around.heights,
+            around.to_pixel,
+            around.spheres,
+            around.radii,
+            around.known,
+            most,
+            -math.inf,
+            -math.inf,
+            False,
+            way,
+            flown[k],
+        )
         return way[: int(flown[k]["rows"])].copy()
 
     found = []

@@ -20,7 +20,6 @@ real touchdown sink rate is known less well: see `docs/measured.md`.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
@@ -52,11 +51,9 @@ from flight.simulation.tick import (
     fill_tick,
     status_in_air,
 )
+from world.arrays import Floats, Heights
 from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, record_dtype
-from world.terrain import Heights
-
-Floats = NDArray[np.float64]
 
 # Maximum number of points of an aircraft that may touch the ground: JSBSim's own models have up to 19.
 CONTACTS = 24
@@ -153,7 +150,7 @@ _MOTOR_START_TIMEOUT_S = 10.0
 
 
 @compiled
-def ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
+def ground_tick(block: Floats, heights: Heights) -> int:
     """Advance the block of a `flight.simulation.tick.Workspace` by one tick.
 
     Return a key of its `ENDS`, or 0 to fly on.
@@ -174,9 +171,18 @@ def ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - c
     elif ground.stage == IN_AIR:
         look_ahead(work, heights, waypoints, own.parameters, memory)
         fly_as_ardupilot(
-            work.state, work.estimated, pieces, path.node[: settings.nodes], waypoints, work.gains, work.memory,
-            own.parameters, memory, work.commands, work.timing.dt,
-        )  # fmt: skip
+            work.state,
+            work.estimated,
+            pieces,
+            path.node[: settings.nodes],
+            waypoints,
+            work.gains,
+            work.memory,
+            own.parameters,
+            memory,
+            work.commands,
+            work.timing.dt,
+        )
         if ground.lands and memory.leg >= ground.landing_leg:
             ground.stage = ON_GLIDE
     else:
@@ -187,7 +193,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - c
 
 
 @inner
-def update_ground_contact(state: Record, clearance: float, ground: Record) -> None:  # pragma: no cover - compiled
+def update_ground_contact(state: Record, clearance: float, ground: Record) -> None:
     """Update which points touch the ground, which is level as in JSBSim.
 
     state: of `flight.dynamics.state.STATE`.  clearance: of the center of gravity, m.  ground: of `GROUND_STATE`.
@@ -204,7 +210,7 @@ def update_ground_contact(state: Record, clearance: float, ground: Record) -> No
 
 
 @inner
-def ended(work: Record, ground: Record) -> int:  # pragma: no cover - compiled
+def ended(work: Record, ground: Record) -> int:
     """Return how the flight has ended, a key of `ENDS`, or 0 to fly on.
 
     work: of `flight.simulation.tick.WORKSPACE`.  ground: of `GROUND_STATE`, whose stage any law may set.
@@ -241,9 +247,7 @@ def ended(work: Record, ground: Record) -> int:  # pragma: no cover - compiled
 
 
 @inner
-def _tick_take_off(
-    work: Record, own: Record, waypoints: Records, pieces: Records
-) -> None:  # pragma: no cover - compiled
+def _tick_take_off(work: Record, own: Record, waypoints: Records, pieces: Records) -> None:
     """Run one tick of the take-off: fill the commands, and at its end begin the first leg."""
     state, estimated, ground, memory = work.state, work.estimated, own.ground, own.memory
     dt, staged = work.timing.dt, own.staged
@@ -279,9 +283,7 @@ def _tick_take_off(
 
 
 @inner
-def _set_take_off_parameters(
-    estimated: Record, parameters: Record, staged: Record, ground: Record
-) -> None:  # pragma: no cover - compiled
+def _set_take_off_parameters(estimated: Record, parameters: Record, staged: Record, ground: Record) -> None:
     """Set the take-off's parameters: speed by pitch, fixed pitch, and a bank limit that grows with height."""
     staged.tecs_speed_weight = 2.0
     staged.tecs_pitch_min = 0.0
@@ -296,15 +298,14 @@ def _set_take_off_parameters(
 
 
 @inner
-def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) -> float:  # pragma: no cover - compiled
+def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) -> float:
     """Return the fraction of the minimum pitch that remains near the take-off's end.
 
     The pitch is reduced from where the climb would reach the end within TKOFF_PLIM_SEC.
     """
     left = ground.top - estimated.up
     if ground.leveling > 0.0:
-        share: float = min(1.0, max(0.0, left / ground.leveling))
-        return share
+        return min(1.0, max(0.0, left / ground.leveling))
     soon = left <= parameters.takeoff_leveling * estimated.velocity_up
     if soon and left > 0.0 and estimated.velocity_up > 0.1 and estimated.up - ground.base >= _MIN_LEVELING_HEIGHT_M:
         ground.leveling = left
@@ -312,9 +313,7 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
 
 
 @inner
-def _hold_heading(
-    state: Record, estimated: Record, parameters: Record, ground: Record, memory: Record
-) -> None:  # pragma: no cover - compiled
+def _hold_heading(state: Record, estimated: Record, parameters: Record, ground: Record, memory: Record) -> None:
     """Demand the side acceleration to the held heading, or zero before it is known."""
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     if ground.fast > 0.0 or speed > _COURSE_SPEED_MPS:
@@ -332,7 +331,7 @@ def _hold_heading(
 @inner
 def _begin_first_leg(
     estimated: Record, waypoints: Records, pieces: Records, guided: Record, ground: Record, memory: Record
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Begin the leg that follows the take-off, from here."""
     ground.stage = IN_AIR
     memory.leg = ground.leg
@@ -347,7 +346,7 @@ def _begin_first_leg(
 
 
 @inner
-def _tick_landing(work: Record, own: Record) -> None:  # pragma: no cover - compiled
+def _tick_landing(work: Record, own: Record) -> None:
     """Run one tick of the landing."""
     state, estimated, ground, memory = work.state, work.estimated, own.ground, own.memory
     dt, staged = work.timing.dt, own.staged
@@ -377,7 +376,7 @@ def _tick_landing(work: Record, own: Record) -> None:  # pragma: no cover - comp
 @inner
 def _follow_line_to_point(
     estimated: Record, parameters: Record, ground: Record, memory: Record
-) -> tuple[float, float, float, float]:  # pragma: no cover - compiled
+) -> tuple[float, float, float, float]:
     """Demand the side acceleration along the line to the landing point and beyond.
 
     Return the distance to the point along the line (m), the flown fraction of the line, the angle between course and
@@ -392,9 +391,13 @@ def _follow_line_to_point(
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     length = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
     angle, aim = l1_angles(
-        estimated, memory.from_east, memory.from_north, memory.from_east + far * unit_e,
-        memory.from_north + far * unit_n, length,
-    )  # fmt: skip
+        estimated,
+        memory.from_east,
+        memory.from_north,
+        memory.from_east + far * unit_e,
+        memory.from_north + far * unit_n,
+        length,
+    )
     memory.cross_track_sum = l1_integrate(aim, memory.cross_track_sum, parameters.navl1_xtrack_i, NAVIGATION_TICK)
     if not math.isnan(aim):
         angle += aim + memory.cross_track_sum
@@ -405,7 +408,7 @@ def _follow_line_to_point(
 @inner
 def _update_stage(
     estimated: Record, parameters: Record, ground: Record, memory: Record, left: tuple[float, float, float, float]
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Change to the approach and to the flare when it is time.
 
     left: as `_follow_line_to_point` returns it.
@@ -434,9 +437,7 @@ def _update_stage(
 
 
 @inner
-def _demand_glide(
-    estimated: Record, parameters: Record, ground: Record, memory: Record, left: float
-) -> None:  # pragma: no cover - compiled
+def _demand_glide(estimated: Record, parameters: Record, ground: Record, memory: Record, left: float) -> None:
     """Demand the altitude of the glide, and in the flare a sink rate that blends to its final value.
 
     left: m before the point.
@@ -467,7 +468,7 @@ def _demand_glide(
 @inner
 def _set_landing_parameters(
     estimated: Record, parameters: Record, staged: Record, ground: Record, share: float
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Set the landing's parameters.
 
     share: flown fraction of the line.

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.navigator import navigate_legs, target_of
@@ -22,11 +21,10 @@ from flight.simulation.tick import (
     end_return,
     end_tick,
 )
+from world.arrays import Floats, Heights
 from world.frames import polymap
 from world.kernels import Record, Records, compiled, inner, record_dtype
-from world.terrain import Heights, pixel_height
-
-Floats = NDArray[np.float64]
+from world.terrain import pixel_height
 
 # ----------------------------------------------------------------------
 # Memory of ArduPlane's control law from tick to tick.
@@ -102,43 +100,38 @@ _MIN_ROLL_LIMIT_RAD = math.radians(25.0)
 
 
 @inner
-def wanted_bank(side_acceleration: float, pitch: float, parameters: Record) -> float:  # pragma: no cover - compiled
+def wanted_bank(side_acceleration: float, pitch: float, parameters: Record) -> float:
     """Return the bank for a side acceleration (m/s^2), within ROLL_LIMIT_DEG, rad.
 
     pitch: rad.
     """
     level = math.cos(min(math.radians(60.0), max(-math.radians(60.0), pitch)))
     wanted = math.atan(side_acceleration / (GRAVITY * level))
-    limited: float = min(parameters.roll_limit, max(-parameters.roll_limit, wanted))
-    return limited
+    return min(parameters.roll_limit, max(-parameters.roll_limit, wanted))
 
 
 @inner
-def min_airspeed(bank: float, parameters: Record) -> float:  # pragma: no cover - compiled
+def min_airspeed(bank: float, parameters: Record) -> float:
     """Return the minimum equivalent airspeed in a demanded bank (rad), m/s.
 
     It is AIRSPEED_MIN divided by the root of cos bank, for the load factor of the turn.
     """
     load = math.sqrt(math.cos(min(math.radians(85.0), abs(bank)))) if parameters.stall_prevention > 0.0 else 1.0
-    slowest: float = parameters.airspeed_min / load
-    return slowest
+    return parameters.airspeed_min / load
 
 
 @inner
-def stall_bank(airspeed: float, slowest: float) -> float:  # pragma: no cover - compiled
+def stall_bank(airspeed: float, slowest: float) -> float:
     """Return the bank that an airspeed allows without a stall, rad; at least 25 degrees.
 
     airspeed, slowest: flown airspeed and minimum airspeed of straight flight, both equivalent or both true, m/s.
     """
     spare = max(1.0, airspeed / slowest)
-    bank: float = max(_MIN_ROLL_LIMIT_RAD, math.acos(min(1.0, 1.0 / (spare * spare))))
-    return bank
+    return max(_MIN_ROLL_LIMIT_RAD, math.acos(min(1.0, 1.0 / (spare * spare))))
 
 
 @inner
-def roll_demand(
-    side_acceleration: float, pitch: float, airspeed: float, parameters: Record
-) -> float:  # pragma: no cover - compiled
+def roll_demand(side_acceleration: float, pitch: float, airspeed: float, parameters: Record) -> float:
     """Return the bank for a side acceleration (m/s^2), limited by ROLL_LIMIT_DEG and the stall, rad.
 
     pitch: rad.  airspeed: equivalent, m/s.
@@ -147,8 +140,7 @@ def roll_demand(
     if parameters.stall_prevention <= 0.0:
         return wanted
     limit = stall_bank(airspeed, parameters.airspeed_min)
-    demanded: float = min(limit, max(-limit, wanted))
-    return demanded
+    return min(limit, max(-limit, wanted))
 
 
 # ----------------------------------------------------------------------
@@ -198,9 +190,7 @@ _UNDERSPEED_EXIT_DELAY_S = 3.0
 
 
 @inner
-def demand_height(
-    estimated: Record, b: Record, parameters: Record, own: Record, dt: float
-) -> None:  # pragma: no cover - compiled
+def demand_height(estimated: Record, b: Record, parameters: Record, own: Record, dt: float) -> None:
     """Update the altitude demand for the current leg, with its rate limit and its lag.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
@@ -232,9 +222,7 @@ def demand_height(
 
 
 @inner
-def _leg_altitude(
-    estimated: Record, b: Record, parameters: Record, own: Record
-) -> float:  # pragma: no cover - compiled
+def _leg_altitude(estimated: Record, b: Record, parameters: Record, own: Record) -> float:
     """Return the altitude on the leg's slope at the aircraft, or of the leg's end if the leg is a step.
 
     The slope of a leg to a loiter leads to the loiter's center; on the loiter the loiter's altitude applies.
@@ -265,9 +253,7 @@ def _leg_altitude(
 
 
 @inner
-def _leg_altitude_above_terrain(
-    estimated: Record, b: Record, parameters: Record, own: Record
-) -> float:  # pragma: no cover - compiled
+def _leg_altitude_above_terrain(estimated: Record, b: Record, parameters: Record, own: Record) -> float:
     """Return the altitude setpoint of a leg above terrain at the aircraft, m AMSL.
 
     The height above ground changes linearly along the leg, or at once if it changes by less than GLIDE_SLOPE_MIN.  Rise
@@ -283,16 +269,14 @@ def _leg_altitude_above_terrain(
     progress = ((estimated.east - own.from_east) * leg_e + (estimated.north - own.from_north) * leg_n) / run
     change = end - own.from_above_ground
     if own.on_circle or progress >= 1.0 or abs(change) < parameters.glide_slope_min:
-        height: float = own.ground + end + own.rise_ahead
-        return height
+        return own.ground + end + own.rise_ahead
     remaining = 1.0 - max(0.0, progress)
     height = end - change * remaining
     if change > 0.0 and 0.0 < parameters.glide_slope_threshold < here - height:
         # Above a climb by more than the threshold, the climb is redrawn from here.
         remaining_change = end - here if end - here >= parameters.glide_slope_min else 0.0
         own.from_above_ground, height = end - remaining_change / remaining, end - remaining_change
-    asked: float = own.ground + height + max(0.0, own.rise_ahead + min(0.0, change))
-    return asked
+    return own.ground + height + max(0.0, own.rise_ahead + min(0.0, change))
 
 
 @inner
@@ -328,9 +312,7 @@ def look_ahead(
 
 
 @inner
-def _return_altitude(
-    estimated: Record, b: Record, parameters: Record, own: Record
-) -> float:  # pragma: no cover - compiled
+def _return_altitude(estimated: Record, b: Record, parameters: Record, own: Record) -> float:
     """Return the altitude setpoint of an RTL, m: on a straight slope down, or at once if it climbs.
 
     The slope leads from where the RTL began to the center of its loiter; on the loiter the target's altitude applies
@@ -346,14 +328,11 @@ def _return_altitude(
     leg_e, leg_n = b.centre_east - own.from_east, b.centre_north - own.from_north
     run = max(1e-6, leg_e * leg_e + leg_n * leg_n)
     progress = ((estimated.east - own.from_east) * leg_e + (estimated.north - own.from_north) * leg_n) / run
-    altitude: float = min(own.from_up, end + slope_fall * (1.0 - min(1.0, max(0.0, progress))))
-    return altitude
+    return min(own.from_up, end + slope_fall * (1.0 - min(1.0, max(0.0, progress))))
 
 
 @inner
-def _estimate_airspeed(
-    state: Record, estimated: Record, parameters: Record, own: Record, dt: float
-) -> None:  # pragma: no cover - compiled
+def _estimate_airspeed(state: Record, estimated: Record, parameters: Record, own: Record, dt: float) -> None:
     """Estimate airspeed and its rate with a complementary filter of acceleration and airspeed.
 
     The acceleration along the nose gives the fast changes, the measured airspeed the slow ones.  An accelerometer along
@@ -380,9 +359,7 @@ def _estimate_airspeed(
 
 
 @inner
-def is_underspeed(
-    estimated: Record, parameters: Record, own: Record, slowest: float, dt: float
-) -> bool:  # pragma: no cover - compiled
+def is_underspeed(estimated: Record, parameters: Record, own: Record, slowest: float, dt: float) -> bool:
     """Return True while speed has priority over altitude (`AP_TECS::_detect_underspeed`).
 
     slowest: AIRSPEED_MIN, true, m/s.
@@ -396,14 +373,13 @@ def is_underspeed(
         own.under = False
     is_full_throttle = own.throttle_demand >= _FULL_THROTTLE_FRACTION * parameters.throttle_max
     own.under = (is_slow and is_full_throttle) or (own.under and estimated.up < own.height_demand)
-    under: bool = own.under
-    return under
+    return own.under
 
 
 @inner
 def update_tecs(
     state: Record, estimated: Record, parameters: Record, own: Record, airspeed: float, factor: float, dt: float
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Update the throttle and pitch demands for the altitude demand and an airspeed (m/s, true).
 
     state: a record of `flight.dynamics.state.STATE`.  factor: ratio of true to equivalent airspeed.  The others are as
@@ -438,9 +414,16 @@ def update_tecs(
 
 @inner
 def _set_throttle(
-    state: Record, parameters: Record, own: Record, spe_error: float, ste_error: float, ste_rate: float,
-    max_rate: float, min_rate: float, dt: float,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    state: Record,
+    parameters: Record,
+    own: Record,
+    spe_error: float,
+    ste_error: float,
+    ste_rate: float,
+    max_rate: float,
+    min_rate: float,
+    dt: float,
+) -> None:
     """Set the throttle demand from the STE error (m^2/s^2) and the STE rate (m^2/s^3).
 
     Follows `AP_TECS::_update_throttle_with_airspeed`.
@@ -474,7 +457,7 @@ def _set_throttle(
 
 
 @inner
-def wind_up_throttle(parameters: Record, own: Record) -> None:  # pragma: no cover - compiled
+def wind_up_throttle(parameters: Record, own: Record) -> None:
     """Set the STE integrator to its value at full throttle, as at every update of a climb-out.
 
     `AP_TECS::_update_throttle_with_airspeed` does so during take-off and an aborted landing; the throttle stays open
@@ -487,9 +470,16 @@ def wind_up_throttle(parameters: Record, own: Record) -> None:  # pragma: no cov
 
 @inner
 def _set_pitch(
-    state: Record, parameters: Record, own: Record, spe_error: float, ske_error: float, spe_rate: float,
-    ske_rate: float, underspeed: bool, dt: float,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    state: Record,
+    parameters: Record,
+    own: Record,
+    spe_error: float,
+    ske_error: float,
+    spe_rate: float,
+    ske_rate: float,
+    underspeed: bool,
+    dt: float,
+) -> None:
     """Set the pitch demand from the balance between potential and kinetic energy.
 
     Follows `AP_TECS::_update_pitch`.  spe_error, ske_error: m^2/s^2.  spe_rate, ske_rate: m^2/s^3.
@@ -546,7 +536,7 @@ _MAX_PITCH_RATE_RADPS = math.radians(40.0)
 
 
 @compiled
-def arduplane_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
+def arduplane_tick(block: Floats, heights: Heights) -> int:
     """Advance the block of a `flight.simulation.tick.Workspace` by one tick.
 
     Return a key of its `ENDS`, or 0 to fly on.
@@ -560,10 +550,18 @@ def arduplane_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
         return NOT_A_NUMBER
     look_ahead(work, heights, path.waypoint[: settings.waypoints], own.parameters, own.memory)
     fly_as_ardupilot(
-        work.state, work.estimated, path.piece[: settings.pieces], path.node[: settings.nodes],
-        path.waypoint[: settings.waypoints], work.gains, work.memory, own.parameters, own.memory,
-        work.commands, work.timing.dt,
-    )  # fmt: skip
+        work.state,
+        work.estimated,
+        path.piece[: settings.pieces],
+        path.node[: settings.nodes],
+        path.waypoint[: settings.waypoints],
+        work.gains,
+        work.memory,
+        own.parameters,
+        own.memory,
+        work.commands,
+        work.timing.dt,
+    )
     return end_tick(work)
 
 
@@ -580,7 +578,7 @@ def fly_as_ardupilot(
     own: Record,
     commands: Record,
     dt: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill the commands for one tick of ``dt`` seconds, and update the memories.
 
     parameters: a record of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
@@ -622,7 +620,7 @@ def fly_as_ardupilot(
 @inner
 def begin_law(
     state: Record, estimated: Record, waypoints: Records, memory: Record, parameters: Record, own: Record
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Initialise the law in steady flight at the first waypoint."""
     own.begun = True
     own.from_east, own.from_north, own.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
@@ -653,7 +651,7 @@ def follow_attitude(
     factor: float,
     commands: Record,
     dt: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Drive roll and pitch to their demands with the lags of ArduPlane's controllers, and set throttle."""
     own.roll_demand = roll_demand(own.side_acceleration, state.pitch, state.airspeed / factor, parameters)
     before = memory.bank_rate

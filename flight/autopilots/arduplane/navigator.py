@@ -40,9 +40,7 @@ _MIN_EXIT_DISTANCE_RATIO = 1.05
 
 
 @compiled
-def turn_distance(
-    acceptance: float, turn: float, radius: float, length: float, air_density_factor: float
-) -> float:  # pragma: no cover - compiled
+def turn_distance(acceptance: float, turn: float, radius: float, length: float, air_density_factor: float) -> float:
     """Return the distance before a waypoint at which ArduPlane turns to the next leg, m.
 
     The result is 0 if it flies on to the waypoint.
@@ -58,14 +56,11 @@ def turn_distance(
 
 
 @inner
-def past_line(
-    estimated: Record, from_east: float, from_north: float, east: float, north: float
-) -> bool:  # pragma: no cover - compiled
+def past_line(estimated: Record, from_east: float, from_north: float, east: float, north: float) -> bool:
     """Return True past the line across the leg at its end (east, north), and for a leg without length."""
     leg_e, leg_n = east - from_east, north - from_north
     ahead_e, ahead_n = east - estimated.east, north - estimated.north
-    passed: bool = ahead_e * leg_e + ahead_n * leg_n <= 0.0
-    return passed
+    return ahead_e * leg_e + ahead_n * leg_n <= 0.0
 
 
 @inner
@@ -76,7 +71,7 @@ def navigate_legs(
     own: Record,
     air_density_factor: float,
     dt: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Demand a side acceleration for the current leg, and change to the next leg when it is time.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
@@ -107,16 +102,23 @@ def navigate_legs(
 
 
 @inner
-def target_of(b: Record) -> tuple[float, float]:  # pragma: no cover - compiled
+def target_of(b: Record) -> tuple[float, float]:
     """Return east and north (m) of a waypoint of the route, or of the center if it belongs to a loiter."""
     return (b.centre_east, b.centre_north) if b.circle != 0.0 and not b.returns else (b.east, b.north)
 
 
 @inner
 def _follow_line(
-    estimated: Record, east: float, north: float, parameters: Record, own: Record, length: float, speed: float,
-    dt: float, straight: bool,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    estimated: Record,
+    east: float,
+    north: float,
+    parameters: Record,
+    own: Record,
+    length: float,
+    speed: float,
+    dt: float,
+    straight: bool,
+) -> None:
     """Demand the side acceleration along the line from the leg's start to its end, m.
 
     straight: True for a line from the aircraft itself (`Plane::verify_nav_wp` without crosstrack).
@@ -130,7 +132,7 @@ def _follow_line(
 
 
 @inner
-def _turn_at(waypoints: Records, b: Record, own: Record) -> float:  # pragma: no cover - compiled
+def _turn_at(waypoints: Records, b: Record, own: Record) -> float:
     """Return the turn angle at b that ArduPlane uses, rad, positive.
 
     Next to a loiter that is the turn from or to the loiter's center.
@@ -147,7 +149,7 @@ def _turn_at(waypoints: Records, b: Record, own: Record) -> float:  # pragma: no
 
 
 @inner
-def _begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> None:  # pragma: no cover - compiled
+def _begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> None:
     """Begin a leg: its line leads from its waypoint to the next, or from the aircraft if past the end."""
     a, b = waypoints[leg], waypoints[leg + 1]
     own.leg = leg
@@ -166,9 +168,14 @@ def _begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> 
 
 @inner
 def _is_leg_over(
-    estimated: Record, b: Record, turn: float, parameters: Record, own: Record, length: float,
+    estimated: Record,
+    b: Record,
+    turn: float,
+    parameters: Record,
+    own: Record,
+    length: float,
     air_density_factor: float,
-) -> bool:  # pragma: no cover - compiled  # fmt: skip
+) -> bool:
     """Return True if the leg to b is over: b is within the turn distance, or the line across it passed.
 
     turn: of the route at b, rad.
@@ -188,9 +195,16 @@ def _is_leg_over(
 
 @inner
 def _loiter(
-    estimated: Record, waypoints: Records, b: Record, parameters: Record, own: Record, length: float, speed: float,
-    air_density_factor: float, dt: float,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    estimated: Record,
+    waypoints: Records,
+    b: Record,
+    parameters: Record,
+    own: Record,
+    length: float,
+    speed: float,
+    air_density_factor: float,
+    dt: float,
+) -> None:
     """Fly to a loiter and around it until it is over and the aircraft heads for what follows.
 
     b: the corner of the route that stands for the loiter; its circle has the radius at its altitude.
@@ -217,9 +231,7 @@ def _loiter(
 
 
 @inner
-def _update_loiter_progress(
-    estimated: Record, b: Record, own: Record, dt: float
-) -> None:  # pragma: no cover - compiled
+def _update_loiter_progress(estimated: Record, b: Record, own: Record, dt: float) -> None:
     """Update the time and the angle around a loiter, from its capture on."""
     bearing = math.atan2(estimated.east - b.centre_east, estimated.north - b.centre_north)
     if own.loitering:
@@ -236,7 +248,7 @@ def _update_loiter_progress(
 
 
 @inner
-def _is_loiter_done(estimated: Record, b: Record, own: Record) -> bool:  # pragma: no cover - compiled
+def _is_loiter_done(estimated: Record, b: Record, own: Record) -> bool:
     """Return True once the loiter's turns, time or altitude are done."""
     if not own.loitering:
         return False
@@ -244,19 +256,14 @@ def _is_loiter_done(estimated: Record, b: Record, own: Record) -> bool:  # pragm
         if not own.at_height and own.circled >= own.next_look:
             own.at_height = abs(estimated.up - own.up_before) < LOITER_ALTITUDE_TOLERANCE_M
             own.next_look, own.up_before = own.next_look + _ALTITUDE_CHECK_INTERVAL_LAPS * 2.0 * math.pi, estimated.up
-        done: bool = own.at_height
-        return done
+        return own.at_height
     if math.isnan(b.stays):
-        around: bool = own.circled > b.turns * 2.0 * math.pi
-        return around
-    waited: bool = own.stayed > b.stays
-    return waited
+        return own.circled > b.turns * 2.0 * math.pi
+    return own.stayed > b.stays
 
 
 @inner
-def _is_lined_up(
-    estimated: Record, onward: Record, b: Record, radius: float, own: Record
-) -> bool:  # pragma: no cover - compiled
+def _is_lined_up(estimated: Record, onward: Record, b: Record, radius: float, own: Record) -> bool:
     """Return True if the course leads to the place after loiter b, or if none can.
 
     No course from the loiter leads to a place inside its circle (radius, m).
@@ -266,16 +273,13 @@ def _is_lined_up(
         return True
     bearing = math.atan2(east - estimated.east, north - estimated.north)
     heading_error = abs(wrap(bearing - math.atan2(estimated.velocity_east, estimated.velocity_north)))
-    lined_up: bool = heading_error <= _EXIT_HEADING_TOLERANCE_RAD + _EXIT_HEADING_GROWTH_RAD * math.floor(
+    return heading_error <= _EXIT_HEADING_TOLERANCE_RAD + _EXIT_HEADING_GROWTH_RAD * math.floor(
         abs(own.waited) / (2.0 * math.pi)
     )
-    return lined_up
 
 
 @inner
-def _navigate_rtl(
-    estimated: Record, b: Record, parameters: Record, own: Record, air_density_factor: float
-) -> None:  # pragma: no cover - compiled
+def _navigate_rtl(estimated: Record, b: Record, parameters: Record, own: Record, air_density_factor: float) -> None:
     """Demand the side acceleration of an RTL (`ModeRTL::update`, ArduPlane/mode_rtl.cpp).
 
     The aircraft turns to the center of the RTL loiter at once, from any leg; the radius grows with altitude as the
@@ -303,7 +307,7 @@ def _navigate_rtl(
 
 
 @inner
-def _join_landing(estimated: Record, waypoints: Records, b: Record, own: Record) -> None:  # pragma: no cover - compiled
+def _join_landing(estimated: Record, waypoints: Records, b: Record, own: Record) -> None:
     """Leave the RTL loiter for the landing sequence, if there is one, once it is flown near its altitude.
 
     `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1.  The leg begins at the aircraft.
@@ -326,7 +330,7 @@ def _join_landing(estimated: Record, waypoints: Records, b: Record, own: Record)
 @inner
 def _loiter_acceleration(
     estimated: Record, b: Record, radius: float, parameters: Record, own: Record, length: float, speed: float
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the side acceleration of a loiter, m/s^2 (`AP_L1_Control::update_loiter`).
 
     It steers straight to the center until the circle demands the sharper turn, and then around the circle.
@@ -348,5 +352,4 @@ def _loiter_acceleration(
         correction = max(correction, 0.0)
     circling = direction * (correction + around * around / max(0.5 * radius, distance))
     own.on_circle = not (error > 0.0 and direction * capture < direction * circling)
-    demanded: float = circling if own.on_circle else capture
-    return demanded
+    return circling if own.on_circle else capture

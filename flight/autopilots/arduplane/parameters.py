@@ -10,15 +10,12 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.autopilots.autopilot import Candidate
 from flight.autopilots.parameter_origin import ARDUPILOT
 from flight.autopilots.parameter_set import Definition, ParameterSet, ParameterTable
+from world.arrays import Floats
 from world.kernels import Record, record_dtype
-
-Floats = NDArray[np.float64]
-
 
 # ArduPlane release of this law, its parameters and defaults.
 RELEASE = "4.6"

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
 from aircraft.catalog import Aircraft, model_hash
@@ -18,11 +17,10 @@ from aircraft.envelope import GRAVITY, Envelope
 from flight.dynamics.envelope_tables import read_tables, write_tables
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
 from flight.dynamics.trim import trim
+from world.arrays import Floats
 from world.kernels import Record, inner, record_dtype
 from world.least_squares import least_squares
 from world.wind import Wind, mean_wind_speed
-
-Floats = NDArray[np.float64]
 
 # Number of throttles in the grid of trims, from 0 to 1.
 _THROTTLE_COUNT = 21
@@ -190,11 +188,10 @@ def _induced_drag(speeds: Floats, excess: Floats) -> float:
 
 
 @inner
-def angle_of_attack(state: Record, aircraft: Record) -> float:  # pragma: no cover - compiled
+def angle_of_attack(state: Record, aircraft: Record) -> float:
     """Return the angle of attack at an airspeed in a bank, rad."""
     load = 1.0 / max(0.3, math.cos(state.roll))
-    attack: float = aircraft.alpha + aircraft.alpha_lift * load / (state.airspeed * state.airspeed)
-    return attack
+    return aircraft.alpha + aircraft.alpha_lift * load / (state.airspeed * state.airspeed)
 
 
 @inner
@@ -207,7 +204,7 @@ def move_on(
     excess: Floats,
     power: Floats,
     dt: float,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Move a point mass by ``dt`` s on a path angle (rad, to the air), and return the power used, W."""
     thrust = excess_power(excess, throttle, state.airspeed, motion.up, aircraft)
     tilt = math.tan(min(1.2, abs(state.roll)))
@@ -229,7 +226,7 @@ def move_on(
 @inner
 def _electric_power(
     thrust: float, excess: Floats, power: Floats, airspeed: float, amsl: float, aircraft: Record
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return electric power at a specific excess power, W, by the parabola of `Envelope.power`."""
     if not aircraft.has_power:
         return 0.0
@@ -252,19 +249,16 @@ def _electric_power(
 
 
 @inner
-def excess_power(
-    excess: Floats, throttle: float, airspeed: float, amsl: float, aircraft: Record
-) -> float:  # pragma: no cover - compiled
+def excess_power(excess: Floats, throttle: float, airspeed: float, amsl: float, aircraft: Record) -> float:
     """Return specific excess power in straight flight at a throttle, an airspeed and an altitude, m/s."""
     x = min(1.0, max(0.0, throttle)) * (excess.shape[0] - 1)
     i = min(excess.shape[0] - 2, int(x))
     low, high = _interpolate(excess[i], airspeed, amsl, aircraft), _interpolate(excess[i + 1], airspeed, amsl, aircraft)
-    value: float = low + (x - i) * (high - low)
-    return value
+    return low + (x - i) * (high - low)
 
 
 @inner
-def _interpolate(table: Floats, airspeed: float, amsl: float, aircraft: Record) -> float:  # pragma: no cover - compiled
+def _interpolate(table: Floats, airspeed: float, amsl: float, aircraft: Record) -> float:
     """Return the value of a table (v, h) at an airspeed and an altitude, bilinear, with extended edges."""
     x = min(table.shape[0] - 1.0, max(0.0, (airspeed - aircraft.slowest) / aircraft.speed_step))
     y = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.height_step))
@@ -272,5 +266,4 @@ def _interpolate(table: Floats, airspeed: float, amsl: float, aircraft: Record) 
     p, q = x - i, y - j
     low = (1.0 - q) * table[i, j] + q * table[i, j + 1]
     high = (1.0 - q) * table[i + 1, j] + q * table[i + 1, j + 1]
-    value: float = (1.0 - p) * low + p * high
-    return value
+    return (1.0 - p) * low + p * high

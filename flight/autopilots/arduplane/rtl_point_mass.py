@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.law import (
@@ -40,14 +39,13 @@ from flight.guidance.navigation_error import MOTION
 from flight.mission.itinerary import UNLIMITED
 from flight.mission.return_path import LandingStart, ReturnCircle
 from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M, RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
+from world.arrays import Floats, Heights
 from world.frames import POLYMAP, PolyMapRecord
 from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, read_only, record_dtype
 from world.scenario import Scenario
-from world.terrain import Heights, ground_height
+from world.terrain import ground_height
 from world.wind import mean_wind_speed
-
-Floats = NDArray[np.float64]
 
 # Progress around the RTL loiter since the aircraft captured it at the target altitude.
 _LOITER_PROGRESS = record_dtype(
@@ -211,10 +209,26 @@ def fly_returns(
     floor, apart = (np.full(len(starts), -math.inf),) * 2 if least is None else least
     for k, ends in enumerate(stages):
         fly_stages(
-            starts[k], ends, law, law, NO_CLIMB, aircraft.record, aircraft.excess, aircraft.power, around.heights,
-            around.to_pixel, around.spheres, around.radii, around.known, times[k],
-            float(floor[k]), float(apart[k]), engine_out, way, flown[k],
-        )  # fmt: skip
+            starts[k],
+            ends,
+            law,
+            law,
+            NO_CLIMB,
+            aircraft.record,
+            aircraft.excess,
+            aircraft.power,
+            around.heights,
+            around.to_pixel,
+            around.spheres,
+            around.radii,
+            around.known,
+            times[k],
+            float(floor[k]),
+            float(apart[k]),
+            engine_out,
+            way,
+            flown[k],
+        )
         if keep:
             ways.append(way[: int(flown[k]["rows"])].copy())
     return SwiftReturns(flown, tuple(ways))
@@ -289,10 +303,26 @@ def most_seconds(start: Record, stages: Records, aircraft: PointMass) -> float:
 
 @compiled
 def fly_stages(
-    start: Record, stages: Records, parameters: Record, staged: Record, climb: Record, aircraft: Record, excess: Floats,
-    power: Floats, heights: Heights, to_pixel: PolyMapRecord, spheres: Floats, radii: Floats, known: bool, most: float,
-    floor: float, apart: float, engine_out: bool, way: Floats, out: Record,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    start: Record,
+    stages: Records,
+    parameters: Record,
+    staged: Record,
+    climb: Record,
+    aircraft: Record,
+    excess: Floats,
+    power: Floats,
+    heights: Heights,
+    to_pixel: PolyMapRecord,
+    spheres: Floats,
+    radii: Floats,
+    known: bool,
+    most: float,
+    floor: float,
+    apart: float,
+    engine_out: bool,
+    way: Floats,
+    out: Record,
+) -> None:
     """Fly from stage to stage for ``most`` s at the longest, and fill in the outcome.
 
     climb: whether the first stage is a climb, and up to which altitude.  staged: the parameters of that climb.
@@ -353,7 +383,7 @@ def fly_stages(
 
 
 @inner
-def _store_position(here: Record, way: Floats, out: Record) -> None:  # pragma: no cover - compiled
+def _store_position(here: Record, way: Floats, out: Record) -> None:
     """Store a position while there is room."""
     if out.rows < way.shape[0]:
         way[out.rows, 0], way[out.rows, 1], way[out.rows, 2] = here.east, here.north, here.up
@@ -361,7 +391,7 @@ def _store_position(here: Record, way: Floats, out: Record) -> None:  # pragma: 
 
 
 @inner
-def _record_arrival(here: Record, time: float, engine_out: bool, out: Record) -> None:  # pragma: no cover - compiled
+def _record_arrival(here: Record, time: float, engine_out: bool, out: Record) -> None:
     """Record time and altitude of the first arrival at the loiter."""
     if math.isnan(out.to_circle):
         out.to_circle, out.circle_up = time, here.up
@@ -372,28 +402,34 @@ def _record_arrival(here: Record, time: float, engine_out: bool, out: Record) ->
 
 @inner
 def _is_stage_complete(
-    here: Record, b: Record, own: Record, circling: Record, climb: Record, waits: bool, is_first: bool, time: float,
-    is_last: bool, wide: float, dt: float,
-) -> bool:  # pragma: no cover - compiled  # fmt: skip
+    here: Record,
+    b: Record,
+    own: Record,
+    circling: Record,
+    climb: Record,
+    waits: bool,
+    is_first: bool,
+    time: float,
+    is_last: bool,
+    wide: float,
+    dt: float,
+) -> bool:
     """Return True if the next stage begins.
 
     waits: True while the aircraft flies straight on, until the engine failure is noticed.
     """
     if waits:
-        late: bool = time >= ENGINE_FAILURE_REACTION_S
-        return late
+        return time >= ENGINE_FAILURE_REACTION_S
     if climb.climbs and is_first:
         # The climb ends no earlier than it has begun.
-        high: bool = time > 0.0 and here.up > climb.top
-        return high
-    through: bool = _is_target_reached(here, b, own, circling, is_last, wide, dt)
-    return through
+        return time > 0.0 and here.up > climb.top
+    return _is_target_reached(here, b, own, circling, is_last, wide, dt)
 
 
 @inner
 def _demand_climb(
     state: Record, motion: Record, staged: Record, own: Record, climb: Record, wanted: float, factor: float, dt: float
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Demand a climb straight ahead: wings level, the pitch of its parameters, and the throttle opened.
 
     wanted: equivalent airspeed, m/s.
@@ -414,19 +450,17 @@ def _demand_climb(
 @inner
 def _is_target_reached(
     here: Record, b: Record, own: Record, circling: Record, is_last: bool, wide: float, dt: float
-) -> bool:  # pragma: no cover - compiled
+) -> bool:
     """Return True if a stage is over: waypoint reached, last loiter flown, or loiter left for the landing.
 
     b: its waypoint.  wide: distance from the center, m, within which the aircraft has arrived at the loiter.
     dt: s since the last call.
     """
     if b.circle == 0.0:
-        reached: bool = own.leg > 0
-        return reached
+        return own.leg > 0
     high = abs(here.up - b.up)
     if not is_last:
-        joins: bool = own.on_circle and high < LANDING_JOIN_ALTITUDE_TOLERANCE_M
-        return joins
+        return own.on_circle and high < LANDING_JOIN_ALTITUDE_TOLERANCE_M
     off_e, off_n = here.east - b.centre_east, here.north - b.centre_north
     bearing = math.atan2(off_e, off_n)
     if circling.seconds > 0.0:
@@ -436,8 +470,7 @@ def _is_target_reached(
         math.hypot(off_e, off_n) < max(RTL_ARRIVAL_RADIUS_M, wide) and high < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
     ):
         circling.seconds += dt
-    around: bool = circling.seconds > UNLIMITED and abs(circling.turned) >= 2.0 * math.pi
-    return around
+    return circling.seconds > UNLIMITED and abs(circling.turned) >= 2.0 * math.pi
 
 
 @inner
@@ -453,9 +486,7 @@ def _initialise_outcome(start: Record, estimated: Record, known: bool, out: Reco
 
 
 @inner
-def _load_stage(
-    stages: Records, at: int, waypoints: Records, estimated: Record, own: Record
-) -> None:  # pragma: no cover - compiled
+def _load_stage(stages: Records, at: int, waypoints: Records, estimated: Record, own: Record) -> None:
     """Set both waypoints to a stage, on a leg from here, or from the last waypoint if that was reached."""
     stage, reached = stages[at], own.leg > 0
     for k in range(1, 3):
@@ -476,7 +507,7 @@ def _load_stage(
 @inner
 def _initialise_law(
     start: Record, parameters: Record, aircraft: Record, excess: Floats, state: Record, own: Record
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill the state from the motion over the ground, and the law's memory as after a long steady flight.
 
     Follows `flight.autopilots.arduplane.law.begin_law`, but on a slope: the altitude setpoint leads by its lag.
@@ -506,9 +537,17 @@ def _initialise_law(
 
 @inner
 def _update_demands(
-    state: Record, estimated: Record, waypoints: Records, parameters: Record, own: Record, aircraft: Record,
-    excess: Floats, factor: float, unpowered: bool, dt: float,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    state: Record,
+    estimated: Record,
+    waypoints: Records,
+    parameters: Record,
+    own: Record,
+    aircraft: Record,
+    excess: Floats,
+    factor: float,
+    unpowered: bool,
+    dt: float,
+) -> None:
     """Update the demands of bank, altitude, throttle and pitch on the leg to the second waypoint."""
     b = waypoints[1]
     navigate_legs(estimated, waypoints[: 2 if b.circle != 0.0 else 3], parameters, own, factor, dt)
@@ -522,9 +561,17 @@ def _update_demands(
 
 @inner
 def _demand_throttle_and_pitch(
-    state: Record, motion: Record, parameters: Record, own: Record, aircraft: Record, excess: Floats, wanted: float,
-    factor: float, unpowered: bool, dt: float,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    state: Record,
+    motion: Record,
+    parameters: Record,
+    own: Record,
+    aircraft: Record,
+    excess: Floats,
+    wanted: float,
+    factor: float,
+    unpowered: bool,
+    dt: float,
+) -> None:
     """Demand throttle and pitch by TECS, or in a turn without thrust the pitch for an airspeed.
 
     wanted: equivalent airspeed, m/s.  In a bank it grows as the root of the load factor, at the same angle of attack.
@@ -554,7 +601,7 @@ def _update_clearances(
     radii: Floats,
     known: bool,
     out: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Update the clearances above ground and outside each sphere, and end the RTL where they demand it."""
     for m in range(spheres.shape[0]):
         radius = radii[m]

@@ -9,7 +9,6 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
@@ -23,11 +22,10 @@ from flight.autopilots.arduplane.navigator import MAX_ACCEPTANCE_M, navigate_leg
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import ERRORS, MOTION
+from world.arrays import Floats
 from world.kernels import Record, Records, compiled, field_names, inner, record_dtype
 from world.scenario_tables import Navigation
 from world.wind import Turbulence
-
-Floats = NDArray[np.float64]
 
 # A corner is over where the aircraft stays this close to the next leg, m ...
 _SETTLED_CROSS_TRACK_M = 2.0
@@ -129,7 +127,7 @@ def _fill(
     fly_over: bool,
     corners: Records,
     waypoints: Records,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill `CORNER_TRACKING` records (turns, speeds) by flights along three waypoints."""
     for i in range(turns.size):
         for j in range(speeds.size):
@@ -161,7 +159,7 @@ def _fly_corner(
     acceptance: float,
     fly_over: bool,
     waypoints: Records,
-) -> tuple[float, float]:  # pragma: no cover - compiled
+) -> tuple[float, float]:
     """Return the greatest distance from the two legs, and the length of the second until it is settled, m.
 
     The first leg leads north to the origin.  turn: rad, to the right.  speed: over the ground, m/s.

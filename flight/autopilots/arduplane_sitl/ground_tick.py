@@ -6,9 +6,6 @@ reports only the mission's items: the rest is found from positions and altitudes
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from flight.autopilots.arduplane.ground_law import (
     APPROACHING,
     ARDUPLANE_GROUND,
@@ -28,10 +25,8 @@ from flight.simulation.tick import (
     begin_tick,
     fill_tick,
 )
+from world.arrays import Floats, Heights
 from world.kernels import Record, compiled, inner
-from world.terrain import Heights
-
-Floats = NDArray[np.float64]
 
 # Height above its standing position at which an aircraft on a runway has lifted off, m.
 _LIFT_OFF_HEIGHT_M = 2.0
@@ -43,7 +38,7 @@ _MIN_FLARE_HEIGHT_M = 6.0
 
 
 @compiled
-def program_ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
+def program_ground_tick(block: Floats, heights: Heights) -> int:
     """Run a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
 
     The program has set the commands in the block.
@@ -66,7 +61,7 @@ def program_ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no c
 
 
 @inner
-def find_phase(true: Record, ground: Record, on_last_leg: bool) -> None:  # pragma: no cover - compiled
+def find_phase(true: Record, ground: Record, on_last_leg: bool) -> None:
     """Change to the next phase when it is time.
 
     true: of `flight.guidance.navigation_error.MOTION`.

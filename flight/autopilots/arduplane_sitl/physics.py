@@ -58,8 +58,10 @@ def parse_servo_packet(data: bytes) -> ServoPacket:
         raise FlightError(
             f"speaks another version of the physics interface: a packet of {len(data)} bytes that begins with {magic};"
             f" allowed: {allowed}",
-            field="packet", value=magic, allowed=allowed,
-        )  # fmt: skip
+            field="packet",
+            value=magic,
+            allowed=allowed,
+        )
     numbers = form.unpack(data)
     return ServoPacket(numbers[2], numbers[3:])
 
@@ -142,8 +144,9 @@ class PhysicsPort:
                     raise FlightError(
                         f"does not understand the physics it is sent: asked for frame {self._frame} again for"
                         f" {SILENCE:.0f} s (another version of the interface?)",
-                        field="frame", value=self._frame,
-                    )  # fmt: skip
+                        field="frame",
+                        value=self._frame,
+                    )
                 raise FlightError(f"silent for {SILENCE:.0f} s; ended", field="frame", value=self._frame)
 
     def answer(self, data: bytes) -> None:

@@ -9,9 +9,6 @@ law alone.  None uses the wind: all steer by the velocity over the ground.  No c
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from aircraft.envelope import GRAVITY
 from aircraft.tracking import density_factor
 from flight.guidance.inner_loops import follow_roll, roll_model, steer_elevator
@@ -26,12 +23,10 @@ from flight.guidance.lateral_reference_laws import (
 )
 from flight.guidance.path import find_on_path, max_curvature, mean_curvature, profile
 from flight.simulation.tick import NOT_A_NUMBER, PATH_ROW, WORKSPACE, WORKSPACE_NUMBERS, begin_tick, end_tick
+from world.arrays import Floats, Heights
 from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner
 from world.scenario_tables import Guidance
-from world.terrain import Heights
-
-Floats = NDArray[np.float64]
 
 # Value of `memory.law` for planfly's own law.
 CROSS_TRACK = 0
@@ -69,7 +64,7 @@ LEAD_TICK = 1.0 / 60.0
 
 
 @compiled
-def planfly_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
+def planfly_tick(block: Floats, heights: Heights) -> int:
     """Advance the block of a `flight.simulation.tick.Workspace` by one tick.
 
     Return a key of its `ENDS`, or 0 to fly on.
@@ -80,9 +75,16 @@ def planfly_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - 
     if not begin_tick(work, heights):
         return NOT_A_NUMBER
     guide(
-        work.state, work.estimated, path.piece[: settings.pieces], path.node[: settings.nodes],
-        path.waypoint[: settings.waypoints], work.gains, work.memory, work.commands, work.timing.dt,
-    )  # fmt: skip
+        work.state,
+        work.estimated,
+        path.piece[: settings.pieces],
+        path.node[: settings.nodes],
+        path.waypoint[: settings.waypoints],
+        work.gains,
+        work.memory,
+        work.commands,
+        work.timing.dt,
+    )
     return end_tick(work)
 
 
@@ -97,7 +99,7 @@ def guide(
     memory: Record,
     commands: Record,
     dt: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill the commands for one tick of ``dt`` seconds, and update the memory.
 
     state: a record of `flight.dynamics.state.STATE`.
@@ -129,7 +131,7 @@ def _path_bank_command(
     memory: Record,
     course: float,
     dt: float,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the bank command, rad: curvature ahead, plus a second-order law on the cross-track error."""
     speed = max(5.0, math.hypot(estimated.velocity_east, estimated.velocity_north))
     ground_course = math.atan2(estimated.velocity_east, estimated.velocity_north)
@@ -165,7 +167,7 @@ def _path_bank_command(
 
 
 @inner
-def _limit_nose_angle(wanted: float, nose: float, max_bank: float) -> float:  # pragma: no cover - compiled
+def _limit_nose_angle(wanted: float, nose: float, max_bank: float) -> float:
     """Return the demanded bank, or less where it would turn the nose too far from the course, rad.
 
     At `_NOSE_LIMIT_RAD` the nose is almost perpendicular to the course.  Turning further would gain nothing against a
@@ -182,7 +184,7 @@ def _limit_nose_angle(wanted: float, nose: float, max_bank: float) -> float:  # 
 @inner
 def _correct_roll_offset(
     curvature: float, gains: Record, memory: Record, turn: float, speed: float, crab: float, dt: float
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the acceleration (m/s^2 to the right) that corrects the offset from rolling into arcs.
 
     No aircraft steps into an arc: `aside` is the planned offset from the path where the curvature jumps.
@@ -209,7 +211,7 @@ def _lateral_correction(
     off_course: float,
     crab: float,
     dt: float,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the acceleration to the right that corrects cross-track error and disturbances, m/s^2."""
     frequency = gains.cross_track_frequency
     rate_gain = 2.0 * gains.cross_track_damping * frequency
@@ -225,16 +227,15 @@ def _lateral_correction(
 
 
 @inner
-def _pressure_ratio(state: Record, gains: Record) -> float:  # pragma: no cover - compiled
+def _pressure_ratio(state: Record, gains: Record) -> float:
     """Return the ratio of the dynamic pressure to its value at the reference airspeed."""
-    share: float = (state.airspeed / gains.reference_airspeed) ** 2
-    return share
+    return (state.airspeed / gains.reference_airspeed) ** 2
 
 
 @inner
 def _unexplained_acceleration(
     state: Record, estimated: Record, gains: Record, memory: Record, speed: float, crab: float, dt: float
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the smoothed lateral acceleration that neither lift nor ailerons explain, m/s^2 to the right."""
     if memory.last_velocity_east != 0.0 or memory.last_velocity_north != 0.0:
         gained_east = estimated.velocity_east - memory.last_velocity_east
@@ -247,14 +248,13 @@ def _unexplained_acceleration(
     memory.last_velocity_east = estimated.velocity_east
     memory.last_velocity_north = estimated.velocity_north
     memory.last_velocity_up = estimated.velocity_up
-    side_now: float = memory.unexplained_acceleration
-    return side_now
+    return memory.unexplained_acceleration
 
 
 @inner
 def _l1_bank_command(
     state: Record, estimated: Record, waypoints: Records, gains: Record, memory: Record, dt: float
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the bank command, rad, of L1 on the current leg, with its own switching between legs."""
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     damping = gains.l1_damping
@@ -272,14 +272,13 @@ def _l1_bank_command(
         angle += aim + memory.l1_sum
     pitch = min(1.0, max(-1.0, state.pitch))
     wanted = math.atan(l1_acceleration(angle, speed, length, damping) / (GRAVITY * math.cos(pitch)))
-    bank: float = min(memory.max_bank, max(-memory.max_bank, wanted))
-    return bank
+    return min(memory.max_bank, max(-memory.max_bank, wanted))
 
 
 @inner
 def _field_bank_command(
     estimated: Record, curvature: float, gains: Record, memory: Record, course: float, dt: float
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the bank command, rad: an orbit's own bank, and a PI law on the field's course."""
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     wanted_course = field_course(
@@ -304,7 +303,7 @@ def steer_height(
     commands: Record,
     course: float,
     dt: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Set elevator from the altitude profile through the load factor, and throttle from the airspeed."""
     airspeed = max(8.0, state.airspeed)
     along = max(1.0, estimated.velocity_east * math.sin(course) + estimated.velocity_north * math.cos(course))
@@ -339,7 +338,7 @@ def _max_upward_acceleration(
     airspeed: float,
     rate_gain: float,
     dt: float,
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return the maximum upward acceleration that the energy allows, m/s^2.
 
     The specific excess power now, plus the power of the unused throttle, is the climb rate at a steady airspeed.  The
@@ -365,8 +364,7 @@ def _max_upward_acceleration(
     slowest = max(safe, memory.speed_command - gains.slow_margin)
     excess = min(memory.airspeed - slowest, airspeed - safe)
     climb = memory.energy_rate + left + excess * airspeed / (GRAVITY * _SPEED_RECOVERY_TIME_S)
-    ceiling: float = rate_gain * (climb - climb_rate)
-    return ceiling
+    return rate_gain * (climb - climb_rate)
 
 
 @inner
@@ -379,7 +377,7 @@ def _set_throttle(
     ahead_slope: float,
     along: float,
     dt: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Set throttle for level flight, for the slope relative to the air, and for the airspeed error."""
     slow = memory.speed_command - airspeed
     if memory.arc_speed > 0.0:
@@ -396,9 +394,7 @@ def _set_throttle(
 
 
 @inner
-def steer_bank(
-    state: Record, gains: Record, memory: Record, commands: Record, bank: float, dt: float
-) -> None:  # pragma: no cover - compiled
+def steer_bank(state: Record, gains: Record, memory: Record, commands: Record, bank: float, dt: float) -> None:
     """Set aileron from a bank command through a roll model, and rudder for coordination and damping.
 
     The model answers the command as a critically damped oscillator within the limits of roll rate and acceleration, so

@@ -8,15 +8,7 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
-from flight.autopilots.autopilot import (
-    Autopilot,
-    Floats,
-    MissionChecks,
-    SpeedLimits,
-    StoredAutopilot,
-    StoredParameters,
-    Tick,
-)
+from flight.autopilots.autopilot import Autopilot, MissionChecks, SpeedLimits, StoredAutopilot, StoredParameters, Tick
 from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE
 from flight.autopilots.px4.law import PX4, px4_tick
@@ -25,6 +17,7 @@ from flight.autopilots.px4.tracking_error import altitude_miss_probability, trac
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
+from world.arrays import Floats
 from world.kernels import Record
 from world.scenario_tables import NEWEST_PX4, FlightTable, Navigation, Px4Version
 from world.wind import Turbulence

@@ -26,7 +26,7 @@ _MIN_GROUND_SPEED_MPS = 1.0
 
 
 @inner
-def feasibility(airspeed: float, across: float, along: float) -> float:  # pragma: no cover - compiled
+def feasibility(airspeed: float, across: float, along: float) -> float:
     """Return the feasibility of a course (0..1): 1 with airspeed to spare, 0 where the wind prevails.
 
     across, along: of the wind to the course, m/s.
@@ -37,7 +37,7 @@ def feasibility(airspeed: float, across: float, along: float) -> float:  # pragm
 
 
 @inner
-def error_bound(ground_speed: float, time: float) -> float:  # pragma: no cover - compiled
+def error_bound(ground_speed: float, time: float) -> float:
     """Return the track error (m) beyond which guidance approaches the track at right angles.
 
     time: NPFG's time constant, s.
@@ -48,7 +48,7 @@ def error_bound(ground_speed: float, time: float) -> float:  # pragma: no cover 
 
 
 @inner
-def straight_period(parameters: Record) -> float:  # pragma: no cover - compiled
+def straight_period(parameters: Record) -> float:
     """Return the period on a straight track, s: NPFG_PERIOD, or more if the roll lag requires it."""
     period: float = parameters.npfg_period
     if parameters.npfg_lower_bound > 0.0:
@@ -58,20 +58,19 @@ def straight_period(parameters: Record) -> float:  # pragma: no cover - compiled
 
 
 @inner
-def switch_distance(ground_speed: float, parameters: Record) -> float:  # pragma: no cover - compiled
+def switch_distance(ground_speed: float, parameters: Record) -> float:
     """Return the distance before a waypoint at which guidance would turn to the next leg, m.
 
     It is NPFG_SW_DST_MLT times the bound of the track error.
     """
     time = straight_period(parameters) * parameters.npfg_damping
-    distance: float = min(MAX_SWITCH_DISTANCE, parameters.npfg_switch_share * error_bound(ground_speed, time))
-    return distance
+    return min(MAX_SWITCH_DISTANCE, parameters.npfg_switch_share * error_bound(ground_speed, time))
 
 
 @inner
 def adapted_period(
     airspeed: float, wind_speed: float, curvature: float, feasible: float, proximity: float, parameters: Record
-) -> float:  # pragma: no cover - compiled
+) -> float:
     """Return a period that is stable with the roll lag and short enough for a curve in wind, s.
 
     feasible: feasibility of the track, 0..1.  proximity: to the track, 0..1.
@@ -96,7 +95,7 @@ def adapted_period(
 @inner
 def heading_for(
     course_east: float, course_north: float, wind_east: float, wind_north: float, airspeed: float
-) -> tuple[float, float]:  # pragma: no cover - compiled
+) -> tuple[float, float]:
     """Return the air velocity (m/s, east and north) that flies a course (a unit vector) in a wind.
 
     If no heading flies the course, return the velocity whose ground track deviates least from it.
@@ -114,9 +113,7 @@ def heading_for(
 
 
 @inner
-def turn_share(
-    air_east: float, air_north: float, want_east: float, want_north: float
-) -> float:  # pragma: no cover - compiled
+def turn_share(air_east: float, air_north: float, want_east: float, want_north: float) -> float:
     """Return the sine of the angle from the air velocity to a demanded one, positive to the right.
 
     The result is 1 or -1 beyond 90 degrees.
@@ -141,7 +138,7 @@ def follow_track(
     airspeed_demand: float,
     parameters: Record,
     own: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Demand the side acceleration that leads onto a track, m/s^2 to the right, into ``own``.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
@@ -198,7 +195,7 @@ def follow_leg(
     airspeed_demand: float,
     parameters: Record,
     own: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Follow the line from the leg's start to its end b (m), or steer straight to one of them.
 
     Before the start, further away than the switch distance, the aircraft steers to the start; past the end, back to the
@@ -218,16 +215,34 @@ def follow_leg(
     if straight:
         size = max(1e-3, math.hypot(aim_east, aim_north))
         follow_track(
-            estimated, estimated.east, estimated.north, aim_east / size, aim_north / size, 0.0,
-            wind_east, wind_north, airspeed_demand, parameters, own,
-        )  # fmt: skip
+            estimated,
+            estimated.east,
+            estimated.north,
+            aim_east / size,
+            aim_north / size,
+            0.0,
+            wind_east,
+            wind_north,
+            airspeed_demand,
+            parameters,
+            own,
+        )
         return
     along_east, along_north = leg_east / length, leg_north / length
     along = from_east * along_east + from_north * along_north
     follow_track(
-        estimated, own.from_east + along * along_east, own.from_north + along * along_north, along_east, along_north,
-        0.0, wind_east, wind_north, airspeed_demand, parameters, own,
-    )  # fmt: skip
+        estimated,
+        own.from_east + along * along_east,
+        own.from_north + along * along_north,
+        along_east,
+        along_north,
+        0.0,
+        wind_east,
+        wind_north,
+        airspeed_demand,
+        parameters,
+        own,
+    )
 
 
 @inner
@@ -241,7 +256,7 @@ def follow_circle(
     airspeed_demand: float,
     parameters: Record,
     own: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Follow a loiter about a center (m).
 
     radius: m, positive to the right.  The others are as `follow_track` takes them.
@@ -255,14 +270,22 @@ def follow_circle(
         out_east, out_north = out_east / distance, out_north / distance
     side, size = math.copysign(1.0, radius), max(1.0, abs(radius))
     follow_track(
-        estimated, middle_east + size * out_east, middle_north + size * out_north, side * out_north, -side * out_east,
-        side / size, wind_east, wind_north, airspeed_demand, parameters, own,
-    )  # fmt: skip
+        estimated,
+        middle_east + size * out_east,
+        middle_north + size * out_north,
+        side * out_north,
+        -side * out_east,
+        side / size,
+        wind_east,
+        wind_north,
+        airspeed_demand,
+        parameters,
+        own,
+    )
 
 
 @inner
-def wanted_bank(side_acceleration: float, parameters: Record) -> float:  # pragma: no cover - compiled
+def wanted_bank(side_acceleration: float, parameters: Record) -> float:
     """Return the bank for a side acceleration (m/s^2), within FW_R_LIM, rad."""
     wanted = math.atan(side_acceleration / GRAVITY)
-    limited: float = min(parameters.roll_limit, max(-parameters.roll_limit, wanted))
-    return limited
+    return min(parameters.roll_limit, max(-parameters.roll_limit, wanted))

@@ -7,7 +7,6 @@ gains are tuned to the aircraft and do not belong to the law.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from flight.autopilots.px4.lateral import wanted_bank
@@ -27,10 +26,8 @@ from flight.simulation.tick import (
     end_return,
     end_tick,
 )
+from world.arrays import Floats, Heights
 from world.kernels import Record, Records, compiled, inner, record_dtype
-from world.terrain import Heights
-
-Floats = NDArray[np.float64]
 
 # Memory of PX4's control law from tick to tick.
 PX4_MEMORY = record_dtype(
@@ -80,7 +77,7 @@ LONGEST_WAIT = 300.0
 
 
 @compiled
-def px4_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
+def px4_tick(block: Floats, heights: Heights) -> int:
     """Advance the block of a `flight.simulation.tick.Workspace` by one tick.
 
     Return a key of its `ENDS`, or 0 to fly on.
@@ -97,10 +94,20 @@ def px4_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - comp
     wind_east = air.wind_east * place.north_cos + air.wind_north * place.north_sin
     wind_north = air.wind_north * place.north_cos - air.wind_east * place.north_sin
     fly_as_px4(
-        work.state, work.estimated, path.piece[: settings.pieces], path.node[: settings.nodes],
-        path.waypoint[: settings.waypoints], wind_east, wind_north, work.gains, work.memory, own.parameters,
-        own.memory, work.commands, work.timing.dt,
-    )  # fmt: skip
+        work.state,
+        work.estimated,
+        path.piece[: settings.pieces],
+        path.node[: settings.nodes],
+        path.waypoint[: settings.waypoints],
+        wind_east,
+        wind_north,
+        work.gains,
+        work.memory,
+        own.parameters,
+        own.memory,
+        work.commands,
+        work.timing.dt,
+    )
     return end_tick(work)
 
 
@@ -119,7 +126,7 @@ def fly_as_px4(
     own: Record,
     commands: Record,
     dt: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill the commands for one tick of ``dt`` seconds, and update the memories.
 
     wind: velocity of the air, m/s.
@@ -157,9 +164,7 @@ def fly_as_px4(
 
 
 @inner
-def _end_mission(
-    estimated: Record, b: Record, memory: Record, parameters: Record, own: Record, dt: float
-) -> None:  # pragma: no cover - compiled
+def _end_mission(estimated: Record, b: Record, memory: Record, parameters: Record, own: Record, dt: float) -> None:
     """End the flight past the last waypoint b once it is at its altitude, or after a timeout.
 
     At the mission's end PX4 loiters without end (`MissionBase::setEndOfMissionItems`): the flight joins that loiter
@@ -183,7 +188,7 @@ def _end_mission(
 @inner
 def _initialise_law(
     state: Record, estimated: Record, waypoints: Records, memory: Record, parameters: Record, own: Record, factor: float
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Initialise the law in steady flight at the first waypoint."""
     own.begun = True
     own.from_east, own.from_north, own.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
@@ -211,7 +216,7 @@ def _follow_attitude(
     own: Record,
     commands: Record,
     dt: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Drive roll and pitch to their demands with the lags of PX4's controllers, and set throttle."""
     before = memory.bank_rate
     rate = (own.roll_demand - memory.bank) / (ROLL_LAG * parameters.roll_time)

@@ -35,7 +35,7 @@ _MIN_EXIT_DISTANCE_RATIO = 1.05
 
 
 @inner
-def reach_radius(ground_speed: float, parameters: Record) -> float:  # pragma: no cover - compiled
+def reach_radius(ground_speed: float, parameters: Record) -> float:
     """Return the distance to a waypoint within which it is reached, m."""
     radius: float = parameters.acceptance
     if parameters.anticipates:
@@ -44,12 +44,11 @@ def reach_radius(ground_speed: float, parameters: Record) -> float:  # pragma: n
 
 
 @inner
-def past_waypoint(estimated: Record, b: Record, own: Record) -> bool:  # pragma: no cover - compiled
+def past_waypoint(estimated: Record, b: Record, own: Record) -> bool:
     """Return True past the plane across the leg at its end b; False for a leg without length."""
     leg_east, leg_north = b.east - own.from_east, b.north - own.from_north
     ahead = (estimated.east - b.east) * leg_east + (estimated.north - b.north) * leg_north
-    past: bool = leg_east * leg_east + leg_north * leg_north > 1e-6 and ahead > 0.0
-    return past
+    return leg_east * leg_east + leg_north * leg_north > 1e-6 and ahead > 0.0
 
 
 @inner
@@ -62,7 +61,7 @@ def navigate(
     parameters: Record,
     own: Record,
     dt: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Follow the current leg, demand its altitude, and change to the next leg when it is time.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
@@ -86,7 +85,7 @@ def navigate(
 
 
 @inner
-def flown_to(waypoints: Records, own: Record) -> int:  # pragma: no cover - compiled
+def flown_to(waypoints: Records, own: Record) -> int:
     """Return the index of the waypoint that is flown to; gates are passed on the leg to it."""
     target: int = own.leg + 1
     while waypoints[target].gate:
@@ -95,19 +94,25 @@ def flown_to(waypoints: Records, own: Record) -> int:  # pragma: no cover - comp
 
 
 @inner
-def _past_gate(estimated: Record, gate: Record, b: Record) -> bool:  # pragma: no cover - compiled
+def _past_gate(estimated: Record, gate: Record, b: Record) -> bool:
     """Return True past the plane through a gate, at right angles to the line from it to the waypoint b."""
     onward_east, onward_north = b.east - gate.east, b.north - gate.north
     ahead = (estimated.east - gate.east) * onward_east + (estimated.north - gate.north) * onward_north
-    past: bool = ahead >= 0.0
-    return past
+    return ahead >= 0.0
 
 
 @inner
 def _follow_plain_leg(
-    estimated: Record, waypoints: Records, target: int, wind_east: float, wind_north: float, airspeed_demand: float,
-    parameters: Record, own: Record, dt: float,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    estimated: Record,
+    waypoints: Records,
+    target: int,
+    wind_east: float,
+    wind_north: float,
+    airspeed_demand: float,
+    parameters: Record,
+    own: Record,
+    dt: float,
+) -> None:
     """Follow the leg to a waypoint, and circle at it while the aircraft is too high or too low.
 
     At the last waypoint of a mission the aircraft circles once it is reached.
@@ -141,9 +146,16 @@ def _follow_plain_leg(
 
 @inner
 def _loiter(
-    estimated: Record, waypoints: Records, b: Record, wind_east: float, wind_north: float, airspeed_demand: float,
-    parameters: Record, own: Record, dt: float,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    estimated: Record,
+    waypoints: Records,
+    b: Record,
+    wind_east: float,
+    wind_north: float,
+    airspeed_demand: float,
+    parameters: Record,
+    own: Record,
+    dt: float,
+) -> None:
     """Fly to a loiter and around it until it is over.
 
     b: the corner of the route that stands for the loiter.
@@ -177,22 +189,21 @@ def _loiter(
 
 
 @inner
-def is_last(waypoints: Records, own: Record) -> bool:  # pragma: no cover - compiled
+def is_last(waypoints: Records, own: Record) -> bool:
     """Return True if nothing follows the current target, other corners of the same loiter excluded."""
     target = flown_to(waypoints, own)
     b = waypoints[target]
-    last: bool = target + 1 >= waypoints.shape[0] or (b.circle != 0.0 and waypoints[-1].stop == b.stop)
-    return last
+    return target + 1 >= waypoints.shape[0] or (b.circle != 0.0 and waypoints[-1].stop == b.stop)
 
 
 @inner
-def _setpoint_position(b: Record) -> tuple[float, float]:  # pragma: no cover - compiled
+def _setpoint_position(b: Record) -> tuple[float, float]:
     """Return east and north (m) of a waypoint's setpoint, which for a loiter is its center."""
     return (b.centre_east, b.centre_north) if b.circle != 0.0 else (b.east, b.north)
 
 
 @inner
-def _is_on_exit_course(estimated: Record, onward: Record, b: Record) -> bool:  # pragma: no cover - compiled
+def _is_on_exit_course(estimated: Record, onward: Record, b: Record) -> bool:
     """Return True if the course leads to the setpoint after loiter b, or if none can.
 
     No course is required to a setpoint too close to the loiter's center.  onward: the waypoint after the loiter.
@@ -206,9 +217,14 @@ def _is_on_exit_course(estimated: Record, onward: Record, b: Record) -> bool:  #
 
 @inner
 def _navigate_rtl(
-    estimated: Record, b: Record, wind_east: float, wind_north: float, airspeed_demand: float, parameters: Record,
+    estimated: Record,
+    b: Record,
+    wind_east: float,
+    wind_north: float,
+    airspeed_demand: float,
+    parameters: Record,
     own: Record,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+) -> None:
     """Fly an RTL: climb in a circle if need be, go straight to the target at that altitude, descend there.
 
     Follows PX4's `src/modules/navigator/rtl_direct.cpp`; the aircraft never descends before it is over its target.
@@ -224,9 +240,16 @@ def _navigate_rtl(
     if not own.climbed:
         own.height_asked = return_altitude
         follow_circle(
-            estimated, own.from_east, own.from_north, parameters.loiter_radius, wind_east, wind_north,
-            airspeed_demand, parameters, own,
-        )  # fmt: skip
+            estimated,
+            own.from_east,
+            own.from_north,
+            parameters.loiter_radius,
+            wind_east,
+            wind_north,
+            airspeed_demand,
+            parameters,
+            own,
+        )
         return
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     distance = math.hypot(b.centre_east - estimated.east, b.centre_north - estimated.north)
@@ -241,7 +264,7 @@ def _navigate_rtl(
 
 
 @inner
-def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> None:  # pragma: no cover - compiled
+def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> None:
     """Begin a leg: its line joins both waypoints, and after a loiter starts from the loiter's center.
 
     After a loiter by turns, which PX4 does not fly, it starts where the loiter is left.
@@ -266,7 +289,7 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> N
 
 
 @inner
-def past_corner(estimated: Record, b: Record) -> bool:  # pragma: no cover - compiled
+def past_corner(estimated: Record, b: Record) -> bool:
     """Return True if an aircraft on a loiter has passed the corner of the route for this part of it."""
     corner = math.atan2(b.east - b.centre_east, b.north - b.centre_north)
     here = math.atan2(estimated.east - b.centre_east, estimated.north - b.centre_north)
@@ -275,9 +298,7 @@ def past_corner(estimated: Record, b: Record) -> bool:  # pragma: no cover - com
 
 
 @inner
-def leg_height(
-    end_east: float, end_north: float, end_up: float, early: float, own: Record
-) -> float:  # pragma: no cover - compiled
+def leg_height(end_east: float, end_north: float, end_up: float, early: float, own: Record) -> float:
     """Return a leg's altitude setpoint at the aircraft, m: a slope that ends ``early`` m before its end.
 
     PX4 calls it a first-order hold.  The slope uses the smallest horizontal distance to the end that was reached on
@@ -287,5 +308,4 @@ def leg_height(
     nearest = min(own.nearest, length)
     if length <= early or nearest <= early:
         return end_up
-    asked: float = own.from_up + (end_up - own.from_up) * (length - nearest) / (length - early)
-    return asked
+    return own.from_up + (end_up - own.from_up) * (length - nearest) / (length - early)

@@ -18,7 +18,7 @@ _UNDERSPEED_FRACTION = 0.15
 
 
 @inner
-def lead_height(parameters: Record, own: Record, dt: float) -> None:  # pragma: no cover - compiled
+def lead_height(parameters: Record, own: Record, dt: float) -> None:
     """Move the altitude reference towards the setpoint, within its limits (`TECSAltitudeReferenceModel`).
 
     It climbs by FW_T_CLMB_R_SP and sinks by FW_T_SINK_R_SP at most, and decelerates in time, with FW_T_VERT_ACC.
@@ -34,9 +34,7 @@ def lead_height(parameters: Record, own: Record, dt: float) -> None:  # pragma: 
 
 
 @inner
-def estimate_airspeed(
-    measured: float, parameters: Record, own: Record, dt: float
-) -> None:  # pragma: no cover - compiled
+def estimate_airspeed(measured: float, parameters: Record, own: Record, dt: float) -> None:
     """Update the airspeed filter with a measured airspeed (m/s) (`TECSAirspeedFilter`).
 
     The measured rate is taken as 0, as in PX4.
@@ -54,7 +52,7 @@ def estimate_airspeed(
 @inner
 def update_tecs(
     state: Record, estimated: Record, parameters: Record, own: Record, wanted: float, factor: float, dt: float
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Update the throttle and pitch demands for the altitude setpoint and an airspeed, into ``own``.
 
     state: a record of `flight.dynamics.state.STATE`.  estimated: of `flight.guidance.navigation_error.MOTION`.
@@ -81,7 +79,7 @@ def update_tecs(
 
 
 @inner
-def underspeed(airspeed: float, parameters: Record) -> float:  # pragma: no cover - compiled
+def underspeed(airspeed: float, parameters: Record) -> float:
     """Return the underspeed ratio (0..1): the priority of speed over altitude (`_detectUnderspeed`).
 
     airspeed: equivalent, m/s.
@@ -89,8 +87,7 @@ def underspeed(airspeed: float, parameters: Record) -> float:  # pragma: no cove
     ramp = _UNDERSPEED_FRACTION * parameters.airspeed_trim
     start = max(0.0, parameters.airspeed_min - ramp)
     full = max(0.0, start - ramp)
-    share: float = 1.0 - min(1.0, max(0.0, (airspeed - full) / max(1e-3, start - full)))
-    return share
+    return 1.0 - min(1.0, max(0.0, (airspeed - full) / max(1e-3, start - full)))
 
 
 @inner
@@ -102,7 +99,7 @@ def _set_pitch(
     acceleration: float,
     underspeed_ratio: float,
     dt: float,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Set the pitch demand from the SEB rate of a climb rate (m/s) and an acceleration (m/s^2)."""
     speed = own.airspeed
     weight = parameters.speed_weight * (1.0 - underspeed_ratio) + 2.0 * underspeed_ratio
@@ -130,9 +127,16 @@ def _set_pitch(
 
 @inner
 def _set_throttle(
-    state: Record, estimated: Record, parameters: Record, own: Record, climb_rate: float, acceleration: float,
-    underspeed_ratio: float, factor: float, dt: float,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    state: Record,
+    estimated: Record,
+    parameters: Record,
+    own: Record,
+    climb_rate: float,
+    acceleration: float,
+    underspeed_ratio: float,
+    factor: float,
+    dt: float,
+) -> None:
     """Set the throttle demand from the STE rate of a climb rate (m/s) and an acceleration (m/s^2)."""
     max_rate, min_rate = GRAVITY * parameters.climb_max, -GRAVITY * parameters.sink_min
     roll_drag = parameters.roll_to_throttle * (1.0 / max(0.1, math.cos(state.roll)) - 1.0)

@@ -8,7 +8,6 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
@@ -18,11 +17,10 @@ from flight.autopilots.px4.navigator import navigate, reach_radius
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import ERRORS, MOTION
+from world.arrays import Floats
 from world.kernels import Record, Records, compiled, field_names, inner, record_dtype
 from world.scenario_tables import Navigation
 from world.wind import W20, Turbulence
-
-Floats = NDArray[np.float64]
 
 # A corner is over where the aircraft stays this close to the next leg, m ...
 _SETTLED_CROSS_TRACK_M = 2.0
@@ -142,7 +140,7 @@ def _corners(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats
 @compiled
 def _fill(
     parameters: Record, airspeed: float, turns: Floats, speeds: Floats, corners: Records, waypoints: Records
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill `CORNER_TRACKING` records (turns, speeds) by flights along three waypoints."""
     for i in range(turns.size):
         for j in range(speeds.size):
@@ -156,7 +154,7 @@ def _fill(
 @inner
 def _fly_corner(
     parameters: Record, airspeed: float, turn: float, speed: float, waypoints: Records
-) -> tuple[float, float]:  # pragma: no cover - compiled
+) -> tuple[float, float]:
     """Return the greatest distance from the two legs, and the length of the second until it is settled, m.
 
     The first leg leads north to the origin.  turn: rad, to the right.  speed: over the ground, m/s.

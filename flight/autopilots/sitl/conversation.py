@@ -93,8 +93,10 @@ class Conversation:
         if news.vehicle != mavlink.MAV_TYPE_FIXED_WING:
             raise FlightError(
                 f"is no {kind}: its heartbeat says vehicle type {news.vehicle}; 1, a fixed wing, flies",
-                field="vehicle type", value=news.vehicle, allowed="1, a fixed wing, flies",
-            )  # fmt: skip
+                field="vehicle type",
+                value=news.vehicle,
+                allowed="1, a fixed wing, flies",
+            )
         for message, interval in wanted.items():
             self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval)
         self._command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
@@ -148,10 +150,21 @@ class Conversation:
         place = MissionItem(0, int(Command.DO_SET_HOME), int(Frame.GLOBAL), (0.0,) * 4, home.lat_deg, home.lon_deg, 0.0)
         self._link.send(
             mavlink.MAVLink_command_int_message(
-                SYSTEM, COMPONENT, int(Frame.GLOBAL), int(Command.DO_SET_HOME), 0, 0,
-                0.0, 0.0, 0.0, 0.0, place.x, place.y, home.alt,
+                SYSTEM,
+                COMPONENT,
+                int(Frame.GLOBAL),
+                int(Command.DO_SET_HOME),
+                0,
+                0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                place.x,
+                place.y,
+                home.alt,
             )
-        )  # fmt: skip
+        )
 
     def _send_until_accepted(self, command: int, ask: Callable[[], None], what: str) -> Talk:
         acknowledged = self._news.acknowledged

@@ -155,9 +155,22 @@ def motion_on_rail(end: RailEnd, time: float, pushed: float, origin: tuple[float
     force = to_body((end.roll, end.pitch, end.yaw), specific_force)
     airspeed = math.hypot(velocity_north - end.wind_north, velocity_east - end.wind_east, velocity_down)
     return BodyMotion(
-        time, 0.0, 0.0, 0.0, *force, north, east, origin[2] - end.amsl + remaining * rise,
-        end.roll, end.pitch, end.yaw, velocity_north, velocity_east, velocity_down, airspeed,
-    )  # fmt: skip
+        time,
+        0.0,
+        0.0,
+        0.0,
+        *force,
+        north,
+        east,
+        origin[2] - end.amsl + remaining * rise,
+        end.roll,
+        end.pitch,
+        end.yaw,
+        velocity_north,
+        velocity_east,
+        velocity_down,
+        airspeed,
+    )
 
 
 def to_body(attitude: tuple[float, float, float], vector: tuple[float, float, float]) -> tuple[float, float, float]:

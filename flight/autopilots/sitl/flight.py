@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from aircraft.contacts import contacts_of
@@ -41,13 +40,10 @@ from flight.simulation.tick import (
     end_return,
     end_tick,
 )
+from world.arrays import Floats, Heights
 from world.errors import CrashError, FlightError
 from world.frames import to_geo
 from world.kernels import Record, Records, compiled, inner
-from world.terrain import Heights
-
-Floats = NDArray[np.float64]
-
 
 # ----------------------------------------------------------------------
 # One tick of a flight under another program's control: find the state on the path, make the wind, fill a row.
@@ -58,7 +54,7 @@ _SEARCHED_PIECES = 4
 
 
 @compiled
-def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
+def autopilot_tick(block: Floats, heights: Heights) -> int:
     """Run a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
 
     The other program has set the commands in the block.  The flight completes where it passes the end of the path, once
@@ -116,7 +112,7 @@ def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record)
 
 
 @inner
-def end_circling(true: Record, b: Record, memory: Record, dt: float) -> None:  # pragma: no cover - compiled
+def end_circling(true: Record, b: Record, memory: Record, dt: float) -> None:
     """Update the time on a loiter without end, and end the flight after `UNLIMITED`.
 
     The time runs from where the aircraft, near the circle, first flies around its center in its direction faster than
@@ -141,7 +137,7 @@ def end_circling(true: Record, b: Record, memory: Record, dt: float) -> None:  #
 
 
 @inner
-def beyond_end(true: Record, waypoints: Records) -> tuple[float, float]:  # pragma: no cover - compiled
+def beyond_end(true: Record, waypoints: Records) -> tuple[float, float]:
     """Return the distance to the right of the last leg, and the distance past its end, m."""
     a, b = waypoints[waypoints.shape[0] - 2], waypoints[waypoints.shape[0] - 1]
     length = math.hypot(b.east - a.east, b.north - a.north)

@@ -48,10 +48,13 @@ class AutopilotNews:
 
 # Formats of integer parameters: PX4 sends the bytes of the integer, ArduPilot a float of the same value.
 _INTEGER_FORMATS = {
-    mavlink.MAV_PARAM_TYPE_UINT8: "<B3x", mavlink.MAV_PARAM_TYPE_INT8: "<b3x",
-    mavlink.MAV_PARAM_TYPE_UINT16: "<H2x", mavlink.MAV_PARAM_TYPE_INT16: "<h2x",
-    mavlink.MAV_PARAM_TYPE_UINT32: "<I", mavlink.MAV_PARAM_TYPE_INT32: "<i",
-}  # fmt: skip
+    mavlink.MAV_PARAM_TYPE_UINT8: "<B3x",
+    mavlink.MAV_PARAM_TYPE_INT8: "<b3x",
+    mavlink.MAV_PARAM_TYPE_UINT16: "<H2x",
+    mavlink.MAV_PARAM_TYPE_INT16: "<h2x",
+    mavlink.MAV_PARAM_TYPE_UINT32: "<I",
+    mavlink.MAV_PARAM_TYPE_INT32: "<i",
+}
 
 
 class AutopilotLink(ABC):

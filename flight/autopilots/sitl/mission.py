@@ -19,9 +19,8 @@ from flight.mission.items import Command, Frame, Home, MissionItem, is_navigatio
 from flight.mission.itinerary import loiter_of
 from flight.mission.route import Route, ends_at_plain_waypoint
 from flight.simulation.setup import FlightSetup
+from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
-
-Floats = NDArray[np.float64]
 
 # Distance from the end of the route to the extra waypoint, m.
 STRAIGHT_ON = 1000.0
@@ -134,8 +133,7 @@ def _waypoint(seq: int, point: Floats, acceptance: float, origin: GeoOrigin) -> 
 def _extra_point(route: Route) -> Floats:
     east, north, _ = route.waypoints[-1] - route.waypoints[-2]
     step = STRAIGHT_ON / math.hypot(east, north)
-    further: Floats = route.waypoints[-1] + np.array([step * east, step * north, 0.0])
-    return further
+    return route.waypoints[-1] + np.array([step * east, step * north, 0.0])
 
 
 def _renumber(kept: list[MissionItem]) -> tuple[MissionItem, ...]:

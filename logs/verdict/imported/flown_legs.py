@@ -19,8 +19,7 @@ from logs.verdict.tolerances import (
     PARTIAL_LEG_MIN_S,
     PLAN_MISMATCH_DISTANCE_M,
 )
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)

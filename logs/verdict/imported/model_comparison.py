@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup, MissionStretch
 from flight.simulation.track import ROLL, Track
@@ -13,9 +12,8 @@ from logs.verdict.imported.flown_legs import FlownLegs
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track, along_across
 from logs.verdict.measures.turns import CornerPass, corner_passes, measure_turn
+from world.arrays import Floats
 from world.errors import LogError
-
-Floats = NDArray[np.float64]
 
 # Spacing along a leg of the places at which the flights are compared, m.
 STEP = 10.0

@@ -27,8 +27,7 @@ from logs.verdict.tolerances import (
     PLAN_TOLERANCE_RAD,
     WAYPOINT_PASS_MARGIN_M,
 )
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)

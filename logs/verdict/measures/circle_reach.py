@@ -8,7 +8,6 @@ A circle drawn around the center says nothing about the hazards next to it.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.route import ends_at_plain_waypoint
 from logs.verdict.measures.path_moves import MOVE
@@ -18,10 +17,9 @@ from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.tolerances import CLEARANCE_TOLERANCE_M, HEIGHT_TOLERANCE_M, LOITER_SWING_RADII, ROUNDING_M
 from world.airspace.zones import Cylinder, Zone
 from world.airspace.zones_on_map import CIRCLE_CORNERS, zone_rings
+from world.arrays import Floats
 from world.kernels import Records
 from world.threats import threat_label
-
-Floats = NDArray[np.float64]
 
 # Least number of rings along which a disc is checked; between the limits there is one per step of the terrain raster.
 _MIN_RINGS = 24

@@ -7,14 +7,12 @@ and ends at the last waypoint before the landing point.  Phases are found from p
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.ground_ways import GroundWays, airborne_route
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import FlownGround, RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track
-
-Flags = NDArray[np.bool_]
+from world.arrays import Flags
 
 # Time after the last waypoint at which the airborne part ends, s: an autopilot turns before the waypoint.
 _END_DELAY_S = 2.0

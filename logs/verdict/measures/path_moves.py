@@ -8,17 +8,13 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.guidance.path import FlyByPath, arc_point, profile
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
+from world.arrays import Floats, Heights
 from world.frames import PolyMapRecord, polymap
 from world.kernels import Record, Records, inner, record_dtype
-
-Floats = NDArray[np.float64]
-Heights = NDArray[np.float32]
-
 
 # A move.  east, north, up: m, of its start.  course_east, course_north: unit vector of its course there, both 0 for a
 # vertical move.  length: m, horizontal.  curvature: 1/m, positive to the right.  climb, bend: m; at the fraction f of a
@@ -40,7 +36,7 @@ MOVE = record_dtype(
 
 
 @inner
-def move_point(move: Record, share: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
+def move_point(move: Record, share: float) -> tuple[float, float, float]:
     """Return east, north and up (m) at a fraction of a move."""
     run = share * move.length
     ahead, aside = run, 0.0
@@ -92,9 +88,21 @@ def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -
             length, lasts = last - first, (last - first) / speeds[leg]
             climb, curved = (slope - bend * half) * length, 0.5 * bend * length * length
             rows.append(
-                (east, north, up, math.sin(course), math.cos(course), length, piece.curvature, climb, curved,
-                 clock, lasts, leg)
-            )  # fmt: skip
+                (
+                    east,
+                    north,
+                    up,
+                    math.sin(course),
+                    math.cos(course),
+                    length,
+                    piece.curvature,
+                    climb,
+                    curved,
+                    clock,
+                    lasts,
+                    leg,
+                )
+            )
             clock += lasts
     return np.array(rows, MOVE)
 
@@ -144,9 +152,7 @@ BLOCK_MOVES = 64
 
 
 @inner
-def move_blocks(
-    moves: Records, heights: Heights, to_pixel: PolyMapRecord, pitch: float, above_ground: bool
-) -> Records:  # pragma: no cover - compiled
+def move_blocks(moves: Records, heights: Heights, to_pixel: PolyMapRecord, pitch: float, above_ground: bool) -> Records:
     """Return blocks, (b,) of `BLOCK`; the ground is read only if a zone limit is given above ground."""
     blocks = np.zeros((moves.shape[0] + BLOCK_MOVES - 1) // BLOCK_MOVES, BLOCK)
     for b in range(blocks.shape[0]):
@@ -168,9 +174,7 @@ def move_blocks(
 
 
 @inner
-def _steepest(
-    block: Record, heights: Heights, to_pixel: PolyMapRecord, pitch: float
-) -> float:  # pragma: no cover - compiled
+def _steepest(block: Record, heights: Heights, to_pixel: PolyMapRecord, pitch: float) -> float:
     """Return the steepest slope that the bilinear ground can have under a block, m per m.
 
     NaN adds nothing.

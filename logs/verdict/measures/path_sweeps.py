@@ -9,16 +9,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from logs.verdict.tolerances import MAX_PLAUSIBLE_POSITION_M, SPHERE_FAR_DIAGONALS, SPHERE_STAY_TOLERANCE_S
+from world.arrays import Floats, Heights
 from world.frames import PolyMapRecord
 from world.geometry import segment_exposure, sphere_window
 from world.kernels import compiled, inner, read_only
-from world.terrain import Heights, Terrain, segment_clearance
-
-Floats = NDArray[np.float64]
-
+from world.terrain import Terrain, segment_clearance
 
 # Number of segments that share one bounding box.
 _BLOCK_SEGMENTS = 256
@@ -36,9 +33,7 @@ def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) ->
 
 
 @compiled
-def _path_clearance(
-    heights: Heights, to_pixel: PolyMapRecord, points: Floats
-) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
+def _path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
     count = max(0, points.shape[0] - 1)
     low, at = np.empty(count), np.empty(count)
     for k in range(count):
@@ -82,14 +77,11 @@ def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, s
     (30.0, 8.0)
     """
     given = (read_only(np.ascontiguousarray(array)) for array in (points, time, centres, radii, scales))
-    visits: SphereVisits = _path_spheres(*given)
-    return visits
+    return _path_spheres(*given)
 
 
 @compiled
-def _path_spheres(
-    points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats
-) -> SphereVisits:  # pragma: no cover - compiled
+def _path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
     boxes = _boxes(points)
     count = centres.shape[0]
     out = SphereVisits(
@@ -116,7 +108,7 @@ def _path_spheres(
 
 
 @inner
-def _boxes(points: Floats) -> _Boxes:  # pragma: no cover - compiled
+def _boxes(points: Floats) -> _Boxes:
     segments = max(0, points.shape[0] - 1)
     count = -(-segments // _BLOCK_SEGMENTS)
     out = _Boxes(np.empty((count, 3)), np.empty((count, 3)), np.empty(count))
@@ -134,7 +126,7 @@ def _boxes(points: Floats) -> _Boxes:  # pragma: no cover - compiled
 
 
 @inner
-def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
+def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, float]:
     """Return the least and the greatest distance of a block's box from a point."""
     low2 = 0.0
     high2 = 0.0
@@ -148,9 +140,7 @@ def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, fl
 
 
 @inner
-def _closest(
-    points: Floats, time: Floats, block: int, centre: Floats, m: int, out: SphereVisits
-) -> None:  # pragma: no cover - compiled
+def _closest(points: Floats, time: Floats, block: int, centre: Floats, m: int, out: SphereVisits) -> None:
     """Update the closest distance to sphere m and its time with one block."""
     for k in range(block * _BLOCK_SEGMENTS, min(points.shape[0] - 1, (block + 1) * _BLOCK_SEGMENTS)):
         length2 = 0.0
@@ -177,7 +167,7 @@ def _inside(
     scale: float,
     m: int,
     out: SphereVisits,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Add one block's time and exposure inside sphere m."""
     last = min(points.shape[0] - 1, (block + 1) * _BLOCK_SEGMENTS)
     k = block * _BLOCK_SEGMENTS

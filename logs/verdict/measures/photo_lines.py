@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import Camera
 from flight.mission.surveys import LineAxis, PhotoLine, Survey, survey_plan
@@ -22,9 +21,7 @@ from logs.verdict.tolerances import (
     PHOTO_OFFSET_FRACTION,
     PHOTO_STEP_M,
 )
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from world.arrays import Flags, Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,8 +162,7 @@ def over_ground(requirements: RouteRequirements, places: Floats) -> Floats:
     """
     ground, home = requirements.setup.scenario.terrain, requirements.setup.mission.home
     if ground is not None:
-        heights: Floats = places[:, 2] - ground.height(places[:, 0], places[:, 1])
-        return heights
+        return places[:, 2] - ground.height(places[:, 0], places[:, 1])
     return places[:, 2] - (float(requirements.points[:, 2].min()) if home is None else home.alt)
 
 

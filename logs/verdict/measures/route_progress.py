@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from flight.mission.route import Route
 from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
 from logs.verdict.tolerances import CAPTURE_RADIUS_M
+from world.arrays import Floats
 from world.kernels import compiled, read_only
 
-Floats = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
 # Distance between neighbouring samples of route and track, m; larger if the table would exceed `_MAX_CELLS`.
@@ -146,9 +146,7 @@ def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> 
 
 
 @compiled
-def _lay(
-    track: Floats, places: Floats, radii: Floats, capture: float, anywhere: bool
-) -> Numbers:  # pragma: no cover - compiled
+def _lay(track: Floats, places: Floats, radii: Floats, capture: float, anywhere: bool) -> Numbers:
     """Lay a track (n, 2) along places (m, 2), both forward only, with the least sum of costs.
 
     The cost of a row is min(distance, capture)^2; a place without a row of its own costs `_SKIP_FRACTION` of that and

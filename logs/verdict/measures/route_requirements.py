@@ -31,11 +31,9 @@ from logs.verdict.places import Place
 from logs.verdict.tolerances import MAX_FLY_BY_OFFSET_RADII, SPEED_TOLERANCE_MPS, U_TURN_RAD
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.airspace.zones import Zone
+from world.arrays import Floats
 from world.errors import MissionError
 from world.geometry import fly_by_offset, leg_courses, leg_runs, leg_slopes, signed_turns, tangent_length
-
-Floats = NDArray[np.float64]
-
 
 # ----------------------------------------------------------------------
 # The zones by which a flight is judged: the scenario's zones, then the zones of the mission's own fence.

@@ -38,12 +38,8 @@ from logs.verdict.tolerances import (
     TURN_EXCLUSION_M,
     ZERO_CURRENT_A,
 )
+from world.arrays import Flags, Floats, Singles
 from world.kernels import compiled
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
-Flags = NDArray[np.bool_]
-
 
 # ----------------------------------------------------------------------
 # Course and slope of flown legs, by least squares if a leg is long enough.
@@ -339,7 +335,7 @@ def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, 
 
 
 @compiled
-def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) -> Floats:  # pragma: no cover - compiled
+def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) -> Floats:
     """Return the airspeed gained from rising air (m/s) in rows 0..stop, as it fades.
 
     For an aircraft that holds its path.

@@ -27,11 +27,10 @@ from logs.verdict.tolerances import (
     MAX_PLAUSIBLE_SPEED_MPS,
     MAX_PLAUSIBLE_VALUE,
 )
+from world.arrays import Floats
 from world.kernels import compiled, read_only
 
-Floats = NDArray[np.float64]
 RowNumbers = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
 
 
 # A waypoint was not passed if the route from the track's end to it is longer than its arrival distance and this, m.
@@ -288,7 +287,7 @@ def _passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tupl
 @compiled
 def _align(
     position: Floats, marks: Floats, first: RowNumbers, until: RowNumbers, step: int, capture: float
-) -> tuple[RowNumbers, NDArray[np.bool_]]:  # pragma: no cover - compiled
+) -> tuple[RowNumbers, NDArray[np.bool_]]:
     """Find the chord (of ``step`` rows) of each mark, in time order.
 
     The sum of min(distance, capture)^2 is the least.  By dynamic programming; among equal assignments the earliest.

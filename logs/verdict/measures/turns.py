@@ -11,9 +11,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.slopes import leg_course
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
 from logs.verdict.tolerances import SETTLING_WATCH_TIME_S
-
-Floats = NDArray[np.float64]
-
+from world.arrays import Floats
 
 # ----------------------------------------------------------------------
 # Corners of an imported flight: the nearest pass, and how far past the new leg the flight went.

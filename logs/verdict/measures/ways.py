@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import TAKEOFFS, Command, MissionItem
 from flight.simulation.track import Track
@@ -17,9 +16,9 @@ from logs.verdict.places import Place
 from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.wording import place_text
 from world.airspace.zone_kernels import zone_records
+from world.arrays import Floats
 from world.terrain import Terrain
 
-Floats = NDArray[np.float64]
 # Altitudes (m AMSL) at increasing runs (m from the path's start).
 Profile = list[tuple[float, float]]
 

@@ -12,17 +12,13 @@ depth of the rows alone (0.5 m off), and support neither arcs, heights above gro
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from logs.verdict.measures.path_moves import BLOCK_MOVES, move_blocks, move_point
 from world.airspace.zone_kernels import ZoneRecords, box_distance, distance_to_edge, nearest_edge, outside_band
+from world.arrays import Heights
 from world.frames import POLYMAP, PolyMapRecord
 from world.kernels import Record, Records, compiled, inlined, inner, read_only, record_dtype
 from world.terrain import Terrain, ground_height
-
-Heights = NDArray[np.float32]
-Floats = NDArray[np.float64]
-
 
 # ----------------------------------------------------------------------
 # Parts of a move near a zone, compiled: how far beyond the zone's limit they can be between their ends.
@@ -49,7 +45,7 @@ PART = record_dtype(
 @inner
 def look_at_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
-) -> tuple[float, float, int]:  # pragma: no cover - compiled
+) -> tuple[float, float, int]:
     """Return a place's distances outside zone z's shape and band, m, and its nearest edge.
 
     Negative inside.  NaN for a band given above ground if the ground there is not known.
@@ -63,7 +59,7 @@ def look_at_zone(
 
 
 @inlined
-def beyond_limit(exclusion: bool, away: float, off: float) -> float:  # pragma: no cover - compiled
+def beyond_limit(exclusion: bool, away: float, off: float) -> float:
     """Return how far beyond a zone's limit a place is, m.
 
     This is the shortest move, level or vertical, to comply again; negative for a place that complies, the
@@ -79,7 +75,7 @@ def beyond_limit(exclusion: bool, away: float, off: float) -> float:  # pragma: 
 
 
 @inlined
-def copy_part(source: Record, target: Record) -> None:  # pragma: no cover - compiled
+def copy_part(source: Record, target: Record) -> None:
     """Copy one part to another."""
     target.first, target.last = source.first, source.last
     target.east, target.north, target.away, target.off = source.east, source.north, source.away, source.off
@@ -88,9 +84,7 @@ def copy_part(source: Record, target: Record) -> None:  # pragma: no cover - com
 
 
 @inlined
-def between_ends(
-    exclusion: bool, part: Record, run: float, rise: float, farthest: float
-) -> tuple[float, float]:  # pragma: no cover - compiled
+def between_ends(exclusion: bool, part: Record, run: float, rise: float, farthest: float) -> tuple[float, float]:
     """Return the least and greatest distance beyond a zone's limit between a part's ends, m.
 
     run: length of the part, m.  rise: the largest change of its height in the band.  farthest: upper bound of its
@@ -110,9 +104,7 @@ def between_ends(
 
 
 @inner
-def farthest_from_outline(
-    records: ZoneRecords, z: int, move: Record, part: Record, run: float
-) -> float:  # pragma: no cover - compiled
+def farthest_from_outline(records: ZoneRecords, z: int, move: Record, part: Record, run: float) -> float:
     """Return an upper bound, m, of a part's distance beyond zone z's outline.
 
     It follows from the edges nearest to the part's ends.  The distance from one edge, or from a center, is greatest at
@@ -197,7 +189,7 @@ def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) ->
 @compiled
 def _path_zones(
     moves: Records, records: ZoneRecords, heights: Heights, to_pixel: PolyMapRecord, pitch: float
-) -> Records:  # pragma: no cover - compiled
+) -> Records:
     count = records.zones.shape[0]
     visits = np.zeros(count, VISIT)
     above_ground = False
@@ -236,7 +228,7 @@ def _visit(
     known: float,
     parts: Records,
     visit: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill in how a path meets zone z; known: m, depths below it need not be exact.
 
     In three rounds: the moves' ends alone; the deepest place, which is near the best of those ends; and, if the zone is
@@ -275,7 +267,7 @@ def _visit_block(
     known: float,
     parts: Records,
     visit: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Add consecutive moves to a visit; turn: the round, numbered as in `_visit`."""
     part = parts[0]
     part.to_east, part.to_north, up = move_point(moves[0], 0.0)
@@ -308,7 +300,7 @@ def _bisect_move(
     known: float,
     parts: Records,
     visit: Record,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Bisect a move, the first of the parts, until each part is certain, and add the parts to a visit.
 
     ordered: bisect until each part is known to be on one side of the limit, and add the parts in order of time;
@@ -360,14 +352,14 @@ def _bisect_move(
 
 
 @inner
-def _is_unknown(exclusion: bool, part: Record) -> bool:  # pragma: no cover - compiled
+def _is_unknown(exclusion: bool, part: Record) -> bool:
     """Return True if both ends depend on unknown ground: the whole part between them is then unknown."""
     before, after = beyond_limit(exclusion, part.away, part.off), beyond_limit(exclusion, part.to_away, part.to_off)
     return before != before and after != after
 
 
 @inner
-def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) -> None:  # pragma: no cover - compiled
+def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
     """Update the deepest place of a visit with a part's ends, and note unknown ground."""
     for at_end in range(2):
         depth = beyond_limit(exclusion, part.away, part.off)
@@ -381,7 +373,7 @@ def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) ->
 
 
 @inner
-def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> None:  # pragma: no cover - compiled
+def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
     """Add a part of a move that violates, complies, or crosses the limit once, to a visit."""
     before, after = beyond_limit(exclusion, part.away, part.off), beyond_limit(exclusion, part.to_away, part.to_off)
     if not (before > 0.0 or after > 0.0):

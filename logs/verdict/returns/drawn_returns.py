@@ -10,7 +10,6 @@ from itertools import groupby, pairwise
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from logs.verdict.returns.judge_glides import NOT_ASKED, Glide, Glides, Reach
 from logs.verdict.returns.judge_returns import (
@@ -25,9 +24,7 @@ from logs.verdict.returns.judge_returns import (
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.suggest_returns import meets_return_limits
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from world.arrays import Flags, Floats
 
 # Largest number of return paths that are drawn.
 MAX_WAYS = 3

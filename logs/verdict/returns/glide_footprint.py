@@ -10,12 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.polygon import orient
 
-from logs.verdict.returns.glide_map import Flags, GlideMap
+from logs.verdict.returns.glide_map import GlideMap
+from world.arrays import Flags, Floats
 
-Floats = NDArray[np.float64]
 # An outline (k, 2) in m, closed, and its holes.
 Part = tuple[Floats, ...]
 

@@ -24,14 +24,12 @@ from aircraft.envelope import ground_speed
 from flight.autopilots.arduplane.point_mass import PointMass, excess_power
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from world.airspace.zone_kernels import ZoneRecords, edge_distance
+from world.arrays import Codes, Flags, Floats
 from world.highest_ground import highest_in_cells
 from world.kernels import Record, Records, compiled, inner, record_dtype
 from world.terrain import Terrain
 from world.wind import mean_wind_speed
 
-Floats = NDArray[np.float64]
-Codes = NDArray[np.int32]
-Flags = NDArray[np.bool_]
 # Rows and columns of cells (c, 2).
 Cells = NDArray[np.int64]
 
@@ -181,7 +179,7 @@ def bar_zones(made: GlideMap, flat: Flags, zones: ZoneRecords, above: float) -> 
 @compiled
 def _bar_zone(
     flat: Flags, ground: Floats, zones: ZoneRecords, z: int, west: float, south: float, cell: float, above: float
-) -> None:  # pragma: no cover - compiled
+) -> None:
     zone = zones.zones[z]
     rows, columns = flat.shape
     for i in range(
@@ -266,9 +264,7 @@ def glide_slopes(aircraft: PointMass, airspeed: float, low: float, top: float) -
 
 
 @compiled
-def _fill_slopes(
-    aircraft: Record, excess: Floats, airspeed: float, courses: Floats, low: float, table: Floats
-) -> None:  # pragma: no cover - compiled
+def _fill_slopes(aircraft: Record, excess: Floats, airspeed: float, courses: Floats, low: float, table: Floats) -> None:
     for h in range(table.shape[1]):
         amsl = low + h * _ALTITUDE_STEP_M
         true = airspeed * true_by_equivalent(amsl)
@@ -328,18 +324,47 @@ def least_heights(made: GlideMap, cells: Cells, slopes: GlideSlopes, top: float)
         lowest = float(need.min())
         heads: Codes = np.full(max(1, math.ceil((top - lowest) / band) + 2), -1, dtype=np.int32)
         _search(
-            made.floor, made.low, made.high, need, origin, onward, moves, between, slopes.table, slopes.low,
-            slopes.pitch, made.cell, lowest, band, top, heads, np.full((need.size, 2), -1, dtype=np.int32),
-        )  # fmt: skip
+            made.floor,
+            made.low,
+            made.high,
+            need,
+            origin,
+            onward,
+            moves,
+            between,
+            slopes.table,
+            slopes.low,
+            slopes.pitch,
+            made.cell,
+            lowest,
+            band,
+            top,
+            heads,
+            np.full((need.size, 2), -1, dtype=np.int32),
+        )
     return Needs(made, need, origin, onward)
 
 
 @compiled
 def _search(
-    floor: Floats, low: Floats, high: Floats, need: Floats, origin: Codes, onward: Codes, moves: Records,
-    between: Records, slopes: Floats, slopes_low: float, pitch: float, cell: float, lowest: float, band: float,
-    top: float, heads: Codes, links: Codes,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    floor: Floats,
+    low: Floats,
+    high: Floats,
+    need: Floats,
+    origin: Codes,
+    onward: Codes,
+    moves: Records,
+    between: Records,
+    slopes: Floats,
+    slopes_low: float,
+    pitch: float,
+    cell: float,
+    lowest: float,
+    band: float,
+    top: float,
+    heads: Codes,
+    links: Codes,
+) -> None:
     """Settle cells by altitude, band after band.
 
     heads: (b,) the first cell of each band, -1 for none.  links: (cells, 2) a cell's neighbours in its band.
@@ -377,9 +402,16 @@ def _search(
 
 @inner
 def _step_start_altitude(
-    floor: Floats, low: Floats, high: Floats, between: Records, move: Record, row: int, column: int, here: float,
+    floor: Floats,
+    low: Floats,
+    high: Floats,
+    between: Records,
+    move: Record,
+    row: int,
+    column: int,
+    here: float,
     loss: float,
-) -> float:  # pragma: no cover - compiled  # fmt: skip
+) -> float:
     """Return the least start altitude of a step that ends in a cell, above all cells between, or NaN."""
     wanted = here + loss
     for k in range(move.first, move.last):
@@ -400,13 +432,13 @@ def _step_start_altitude(
 
 
 @inner
-def _out_of_spheres(up: float, low: float, high: float) -> float:  # pragma: no cover - compiled
+def _out_of_spheres(up: float, low: float, high: float) -> float:
     """Return an altitude, or the top of the spheres that contain it."""
     return high if low < up < high else up
 
 
 @inner
-def _insert(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
+def _insert(cell: int, band: int, heads: Codes, links: Codes) -> None:
     """Insert a cell at the head of a band."""
     first = heads[band]
     links[cell, 0], links[cell, 1] = -1, first
@@ -416,7 +448,7 @@ def _insert(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma
 
 
 @inner
-def _remove(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
+def _remove(cell: int, band: int, heads: Codes, links: Codes) -> None:
     """Remove a cell from its band, if it is in it."""
     before, after = links[cell, 0], links[cell, 1]
     if before >= 0:

@@ -10,7 +10,6 @@ needed to reach the speed of the turn is included.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.law import stall_bank
@@ -18,12 +17,10 @@ from flight.autopilots.arduplane.point_mass import PointMass, excess_power
 from flight.autopilots.arduplane.rtl_point_mass import ENGINE_FAILURE_REACTION_S, ReturnEnvironment
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from logs.verdict.returns.glide_map import GlideMap, Needs, steps
+from world.arrays import Codes, Floats
 from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, record_dtype
 from world.wind import mean_wind_speed
-
-Floats = NDArray[np.float64]
-Codes = NDArray[np.int32]
 
 # Step in which a turn is checked, rad.
 _TURN_STEP_RAD = math.radians(10.0)
@@ -53,9 +50,20 @@ def heights_left(
     glider.airspeed, glider.bank = airspeed, bank
     glider.west, glider.south, glider.cell = made.west, made.south, made.cell
     _look_ahead(
-        starts, around.spheres, around.radii, made.floor, needs.need, needs.origin, needs.onward, steps()[0], glider,
-        aircraft.record, aircraft.excess, left, reached,
-    )  # fmt: skip
+        starts,
+        around.spheres,
+        around.radii,
+        made.floor,
+        needs.need,
+        needs.origin,
+        needs.onward,
+        steps()[0],
+        glider,
+        aircraft.record,
+        aircraft.excess,
+        left,
+        reached,
+    )
     return left, reached
 
 
@@ -67,9 +75,20 @@ def place_of(made: GlideMap, cell: int) -> tuple[float, float, float]:
 
 @compiled
 def _look_ahead(
-    starts: Records, spheres: Floats, radii: Floats, floor: Floats, need: Floats, origin: Codes, onward: Codes,
-    moves: Records, glider: Record, aircraft: Record, excess: Floats, left: Floats, reached: Codes,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
+    starts: Records,
+    spheres: Floats,
+    radii: Floats,
+    floor: Floats,
+    need: Floats,
+    origin: Codes,
+    onward: Codes,
+    moves: Records,
+    glider: Record,
+    aircraft: Record,
+    excess: Floats,
+    left: Floats,
+    reached: Codes,
+) -> None:
     """Fill in the altitude left and the place reached, for each start by the better of both turns."""
     turnings = np.zeros(1, _TURNING)
     here = turnings[0]
@@ -124,9 +143,7 @@ def _look_ahead(
 
 
 @inner
-def _is_clear(
-    here: Record, floor: Floats, spheres: Floats, radii: Floats, glider: Record
-) -> bool:  # pragma: no cover - compiled
+def _is_clear(here: Record, floor: Floats, spheres: Floats, radii: Floats, glider: Record) -> bool:
     """Return True if a place is on the map, above the ground's margin, and outside every kill sphere."""
     i, j = round((here.north - glider.south) / glider.cell), round((here.east - glider.west) / glider.cell)
     if not (0 <= i < floor.shape[0] and 0 <= j < floor.shape[1]) or not here.up >= floor[i, j]:
@@ -139,9 +156,7 @@ def _is_clear(
 
 
 @inner
-def _best_cell(
-    here: Record, need: Floats, worst: float, glider: Record
-) -> tuple[float, int, int]:  # pragma: no cover - compiled
+def _best_cell(here: Record, need: Floats, worst: float, glider: Record) -> tuple[float, int, int]:
     """Return the best of a place's cell and its neighbours: altitude left, row and column.
 
     A cell's center may lie in a sphere that the place itself is outside of.  worst: height lost per metre to a center.
@@ -159,9 +174,7 @@ def _best_cell(
 
 
 @inner
-def _remaining_turn(
-    here: Record, i: int, j: int, side: float, onward: Codes, moves: Records, glider: Record
-) -> float:  # pragma: no cover - compiled
+def _remaining_turn(here: Record, i: int, j: int, side: float, onward: Codes, moves: Records, glider: Record) -> float:
     """Return the rest of a turn to the path on from a cell, rad; negative beyond it, 0 at the path's end."""
     for _ in range(_LOOKAHEAD_STEPS):
         m = onward[i, j]
@@ -173,5 +186,4 @@ def _remaining_turn(
     away_north = glider.south + i * glider.cell - here.north
     if math.hypot(away_east, away_north) < 2.0 * glider.cell:
         return 0.0
-    rest: float = side * wrap(math.atan2(away_east, away_north) - here.course)
-    return rest
+    return side * wrap(math.atan2(away_east, away_north) - here.course)

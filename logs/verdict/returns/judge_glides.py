@@ -20,22 +20,12 @@ from flight.autopilots.arduplane.rtl_point_mass import RETURN_ARRIVED, RETURN_GR
 from flight.mission.placing import landing_places
 from flight.mission.return_path import ReturnCircle, ReturnTarget
 from logs.verdict.returns.glide_footprint import GlideFootprint
-from logs.verdict.returns.glide_map import (
-    Cells,
-    Flags,
-    GlideMap,
-    bar_zones,
-    glide_map,
-    glide_slopes,
-    landable,
-    least_heights,
-)
+from logs.verdict.returns.glide_map import Cells, GlideMap, bar_zones, glide_map, glide_slopes, landable, least_heights
 from logs.verdict.returns.glide_reach import heights_left, place_of
 from logs.verdict.returns.judge_returns import ReturnWorld
 from logs.verdict.returns.return_starts import ReturnStarts
+from world.arrays import Flags, Floats
 from world.kernels import Record
-
-Floats = NDArray[np.float64]
 
 # Height above ground that a glide keeps until it arrives, m.  ArduPlane's law without thrust was at most 13 m too high,
 # and the elevation file has its own error.

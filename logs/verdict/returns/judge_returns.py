@@ -14,7 +14,6 @@ from itertools import groupby
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft, find_again
 from flight.autopilots.arduplane.autopilot import ArduPlane
@@ -46,12 +45,11 @@ from logs.verdict.measures.route_requirements import Airspace, airspace_of
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.tolerances import CLEARANCE_TOLERANCE_M, ENERGY_RESERVE_FRACTION
+from world.arrays import Floats
 from world.errors import MissionError
 from world.kernels import Record, Records
 from world.scenario import Scenario
 from world.wind import mean_wind_speed
-
-Floats = NDArray[np.float64]
 
 # Outcome of a return, the worst first: it hits the ground, enters a missile's sphere, violates a zone, does not arrive,
 # uses more energy than available, leaves the elevation data, differs too much between the point mass and JSBSim, goes

@@ -11,11 +11,9 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track
 from logs.verdict.measures.flown_phases import by_the_ground
 from logs.verdict.measures.path_moves import path_moves
+from world.arrays import Flags, Floats
 from world.geometry import leg_courses
 from world.kernels import Records
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # Time over which velocities are computed for a track without velocities, s.
 _VELOCITY_WINDOW_S = 1.0

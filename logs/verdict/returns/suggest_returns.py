@@ -27,10 +27,8 @@ from logs.verdict.returns.judge_returns import (
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
+from world.arrays import Flags, Floats
 from world.kernels import Records
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # Margin that is kept beyond each limit, m: twice the error of the point mass.
 MARGIN = 15.0

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -13,8 +12,7 @@ from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import stay_inside
 from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.wording import place_text
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 
 def bounds_findings(

@@ -4,7 +4,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import OVER_HOME, Command
 from logs.verdict.findings import GROUND_WAY, Finding, make_finding, message
@@ -21,10 +20,9 @@ from logs.verdict.tolerances import (
     GROUND_LEG_CLEARANCE_M,
     HOME_ERROR_M,
 )
+from world.arrays import Floats
 from world.frames import to_map
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
 
 
 def clearance_findings(

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.go_around_point_mass import aborted_at, climb_rows, fly_go_arounds
 from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT, RETURN_OFF_TERRAIN, RETURN_TIMEOUT
@@ -38,10 +37,9 @@ from logs.verdict.tolerances import (
     LINE_UP_DISTANCE_M,
     MIN_LEG_LENGTH_M,
 )
+from world.arrays import Floats
 from world.kernels import Record, Records
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
 
 # Step of the heights above home that are tried, m.
 _HEIGHT_STEP_M = 5.0

@@ -16,9 +16,6 @@ import math
 from itertools import groupby
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from flight.mission.items import Command
 from flight.mission.placing import SAME_PLACE
 from logs.verdict.findings import GROUND_WAY, Finding, Message, make_finding, message
@@ -50,8 +47,6 @@ from logs.verdict.tolerances import (
 from logs.verdict.wording import place_text
 from world.frames import to_map
 from world.geometry import wrap
-
-Floats = NDArray[np.float64]
 
 # Step between the launch courses that are tried, deg.
 _COURSE_STEP_DEG = 10

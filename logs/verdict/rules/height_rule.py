@@ -17,9 +17,8 @@ from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import fly_lower
 from logs.verdict.tolerances import HEIGHT_TOLERANCE_M
+from world.arrays import Floats
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
 
 
 def height_findings(

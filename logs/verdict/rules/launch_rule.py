@@ -8,7 +8,6 @@ take-off that is not flown is judged by the take-off and climb-out rules, from t
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.ground_ways import TakeOff
 from flight.simulation.track import Track
@@ -26,8 +25,7 @@ from logs.verdict.tolerances import (
     RUNWAY_MARGIN_M,
 )
 from logs.verdict.wording import gentle_launch_text
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 
 def launch_findings(

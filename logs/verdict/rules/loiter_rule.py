@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.itinerary import loiter_of
 from logs.verdict.findings import UNKNOWN_WAY, Finding, Message, badness, make_finding, message, reason_of
@@ -26,9 +25,8 @@ from logs.verdict.tolerances import (
     WAYPOINT_PASS_MARGIN_M,
 )
 from logs.verdict.wording import place_text
+from world.arrays import Floats
 from world.geometry import tangent_length
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

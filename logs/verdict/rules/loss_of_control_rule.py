@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.simulation.track import ROLL
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
@@ -13,8 +12,7 @@ from logs.verdict.places import FLIGHT
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import MAX_CONTROLLED_BANK_RAD, MIN_CONTROLLED_AIRSPEED_MPS, MIN_CONTROLLED_STALL_RATIO
 from logs.verdict.wording import place_text
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 
 def departure_findings(

@@ -4,7 +4,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from logs.verdict.findings import NOT_FLOWN, UNKNOWN_AIRCRAFT, Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit
@@ -28,9 +27,8 @@ from logs.verdict.tolerances import (
     SATURATED_TIME_S,
     SLOPE_CHANGE_LAG_M,
 )
+from world.arrays import Floats
 from world.wind import W20
-
-Floats = NDArray[np.float64]
 
 
 def speed_findings(

@@ -22,9 +22,8 @@ from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import fly_faster
 from logs.verdict.tolerances import GUST_SPEED_FRACTION, STALL_AVERAGING_TIME_S, STALL_TOLERANCE_MPS
+from world.arrays import Floats
 from world.wind import W20
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,8 @@ from logs.verdict.tolerances import (
 )
 
 # Checks of the photos' overlap.
-FRONT, SIDE = "front overlap", "side overlap"
+FRONT = "front overlap"
+SIDE = "side overlap"
 
 
 def survey_findings(

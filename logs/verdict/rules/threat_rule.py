@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from logs.verdict.findings import Fact, Finding, make_finding
 from logs.verdict.measures.acceptance import position_error
@@ -16,9 +15,9 @@ from logs.verdict.places import FLIGHT, Place
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import pass_threat
 from logs.verdict.wording import place_text_within
+from world.arrays import Floats
 from world.threats import Threats, threat_label
 
-Floats = NDArray[np.float64]
 Side = Literal["missile", "radar"]
 
 _METHOD = "time inside, exact on each segment"

@@ -11,7 +11,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.ground_ways import Approach
 from flight.simulation.track import Track
@@ -33,9 +32,8 @@ from logs.verdict.tolerances import (
     TOUCHDOWN_ERROR_M,
 )
 from logs.verdict.wording import place_text
+from world.arrays import Floats
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
 
 # Length of the strip about the touch-down over which the ground's slope is measured, m.
 _SLOPE_RUN_M = 10.0

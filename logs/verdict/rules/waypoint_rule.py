@@ -8,7 +8,6 @@ in the rule: other rules judge the harm that a wrong altitude can do.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import Reach, reach
@@ -17,8 +16,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack, along_across, ap
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import EQUAL_DISTANCE_TOLERANCE_M, ROUNDING_M
 from logs.verdict.wording import place_text, place_text_within
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 
 def waypoint_findings(

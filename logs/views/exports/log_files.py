@@ -12,10 +12,10 @@ from flight.mission.items import OVER_HOME, MissionItem
 from flight.simulation.track import PITCH, ROLL, THROTTLE, YAW
 from logs.recording.reader import FlightLog
 from logs.recording.state_channel import FIELDS
+from world.arrays import Floats
 from world.extras import need_extra
 from world.frames import to_geo
 
-Floats = NDArray[np.float64]
 Columns = NDArray[Any]
 
 
@@ -99,11 +99,16 @@ _TYPES = {"<u8": "uint64_t", "<f8": "double", "<f4": "float", "u1": "uint8_t", "
 # Letters of log levels, of syslog: error, warning, info, debug.
 _LEVELS = {"debug": b"7", "info": b"6", "warning": b"4", "error": b"3", "fatal": b"2"}
 # vehicle_status: armed, in a mission, a fixed wing.
-_ARMED, _MISSION, _FIXED_WING = 2, 3, 2
+_ARMED = 2
+_MISSION = 3
+_FIXED_WING = 2
 # Seconds between messages of a topic; the fast ones have every row.
-_FAST, _SLOW, _SECOND = 0.0, 0.1, 1.0
+_FAST = 0.0
+_SLOW = 0.1
+_SECOND = 1.0
 # The standard atmosphere: air density over that at sea level is (1 - _LAPSE h) to this power.
-_LAPSE, _POWER = 2.25577e-5, 4.2559
+_LAPSE = 2.25577e-5
+_POWER = 4.2559
 
 
 class _Topic(NamedTuple):
@@ -198,40 +203,87 @@ def _topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
         topic("vehicle_attitude", _FAST, [("q", "<f4", 4)], q=attitude_quaternion(track.attitude[rows])),
         topic("vehicle_angular_velocity", _FAST, [("xyz", "<f4", 3)], xyz=track.rates[rows]),
         topic(
-            "vehicle_local_position", _SLOW,
-            [*((name, "<f4") for name in ("x", "y", "z", "vx", "vy", "vz", "heading", "ref_alt", "dist_bottom")),
-             ("ref_lat", "<f8"), ("ref_lon", "<f8"), ("ref_timestamp", "<u8"),
-             *((name, "?") for name in ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid", "xy_global", "z_global",
-                                        "dist_bottom_valid"))],
-            x=north, y=east, z=ground - up, vx=v_north, vy=v_east, vz=-v_up, heading=track.attitude[rows, YAW],
-            ref_alt=np.full(len(rows), ground), dist_bottom=height, ref_lat=np.full(len(rows), origin.lat_deg),
-            ref_lon=np.full(len(rows), origin.lon_deg), ref_timestamp=np.zeros(len(rows)), xy_valid=one, z_valid=one,
-            v_xy_valid=one, v_z_valid=one, xy_global=one, z_global=one, dist_bottom_valid=np.isfinite(height),
+            "vehicle_local_position",
+            _SLOW,
+            [
+                *((name, "<f4") for name in ("x", "y", "z", "vx", "vy", "vz", "heading", "ref_alt", "dist_bottom")),
+                ("ref_lat", "<f8"),
+                ("ref_lon", "<f8"),
+                ("ref_timestamp", "<u8"),
+                *(
+                    (name, "?")
+                    for name in (
+                        "xy_valid",
+                        "z_valid",
+                        "v_xy_valid",
+                        "v_z_valid",
+                        "xy_global",
+                        "z_global",
+                        "dist_bottom_valid",
+                    )
+                ),
+            ],
+            x=north,
+            y=east,
+            z=ground - up,
+            vx=v_north,
+            vy=v_east,
+            vz=-v_up,
+            heading=track.attitude[rows, YAW],
+            ref_alt=np.full(len(rows), ground),
+            dist_bottom=height,
+            ref_lat=np.full(len(rows), origin.lat_deg),
+            ref_lon=np.full(len(rows), origin.lon_deg),
+            ref_timestamp=np.zeros(len(rows)),
+            xy_valid=one,
+            z_valid=one,
+            v_xy_valid=one,
+            v_z_valid=one,
+            xy_global=one,
+            z_global=one,
+            dist_bottom_valid=np.isfinite(height),
         ),
         topic(
-            "vehicle_global_position", _SLOW,
+            "vehicle_global_position",
+            _SLOW,
             [("lat", "<f8"), ("lon", "<f8"), ("alt", "<f4"), ("terrain_alt", "<f4"), ("terrain_alt_valid", "?")],
-            lat=lat, lon=lon, alt=up, terrain_alt=up - height, terrain_alt_valid=np.isfinite(height),
+            lat=lat,
+            lon=lon,
+            alt=up,
+            terrain_alt=up - height,
+            terrain_alt_valid=np.isfinite(height),
         ),
         topic(
-            "airspeed_validated", _SLOW,
+            "airspeed_validated",
+            _SLOW,
             [(f"{name}_airspeed_m_s", "<f4") for name in ("indicated", "calibrated", "true")],
-            indicated_airspeed_m_s=calibrated, calibrated_airspeed_m_s=calibrated, true_airspeed_m_s=true,
+            indicated_airspeed_m_s=calibrated,
+            calibrated_airspeed_m_s=calibrated,
+            true_airspeed_m_s=true,
         ),
         topic(
-            "wind", _SLOW, [("windspeed_north", "<f4"), ("windspeed_east", "<f4")],
-            windspeed_north=wind[:, 1], windspeed_east=wind[:, 0],
+            "wind",
+            _SLOW,
+            [("windspeed_north", "<f4"), ("windspeed_east", "<f4")],
+            windspeed_north=wind[:, 1],
+            windspeed_east=wind[:, 0],
         ),
         topic(
-            "vehicle_thrust_setpoint", _SLOW, [("xyz", "<f4", 3)],
+            "vehicle_thrust_setpoint",
+            _SLOW,
+            [("xyz", "<f4", 3)],
             xyz=track.commands[rows][:, [THROTTLE]] * np.array([1.0, 0.0, 0.0]),
         ),
         topic("battery_status", _SLOW, [(name, "<f4") for name in battery], **battery),
         topic(
-            "vehicle_status", _SECOND, [(name, "u1") for name in ("arming_state", "nav_state", "vehicle_type")],
-            arming_state=_ARMED * one, nav_state=_MISSION * one, vehicle_type=_FIXED_WING * one,
+            "vehicle_status",
+            _SECOND,
+            [(name, "u1") for name in ("arming_state", "nav_state", "vehicle_type")],
+            arming_state=_ARMED * one,
+            nav_state=_MISSION * one,
+            vehicle_type=_FIXED_WING * one,
         ),
-    ]  # fmt: skip
+    ]
     return [*found, _items(log, rows)]
 
 
@@ -271,9 +323,14 @@ def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
             flown += [(time, items[k]) for k in range(before + 1, seq) if k in items] + [(time, items[seq])]
     radii = [item.params[1] for _, item in flown]
     kinds = {
-        "sequence_current": "<u2", "nav_cmd": "<u2", "acceptance_radius": "<f4", "latitude": "<f8", "longitude": "<f8",
-        "altitude": "<f4", "altitude_is_relative": "u1",
-    }  # fmt: skip
+        "sequence_current": "<u2",
+        "nav_cmd": "<u2",
+        "acceptance_radius": "<f4",
+        "latitude": "<f8",
+        "longitude": "<f8",
+        "altitude": "<f4",
+        "altitude_is_relative": "u1",
+    }
     values = {
         "timestamp": np.array([round(time * 1e6) for time, _ in flown], dtype=np.uint64),
         # PX4 counts from 0.

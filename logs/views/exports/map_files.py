@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 import gpxpy.gpx
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
@@ -24,9 +24,8 @@ from logs.verdict.returns.glide_footprint import BAND_ROLES, Part
 from logs.verdict.returns.glides_text import reached_text
 from logs.verdict.returns.returns_text import outcome_text, way_text
 from world.airspace.zones_on_map import zone_parts
+from world.arrays import Floats
 from world.frames import to_geo
-
-Floats = NDArray[np.float64]
 
 KML = "http://www.opengis.net/kml/2.2"
 # Seconds between points of a track in a map file.

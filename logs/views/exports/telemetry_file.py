@@ -35,7 +35,8 @@ from logs.recording.state_channel import EPOCH_NS
 _STAMP = struct.Struct(">Q")
 _HEARTBEATS = 1.0  # s
 _SEVERITY = {"debug": INFO, "info": INFO, "warning": WARNING, "error": CRITICAL, "fatal": CRITICAL}
-_VEHICLE, _STATION = (1, mavlink.MAV_COMP_ID_AUTOPILOT1), (255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
+_VEHICLE = (1, mavlink.MAV_COMP_ID_AUTOPILOT1)
+_STATION = (255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
 
 
 def telemetry_bytes(log: FlightLog) -> bytes:

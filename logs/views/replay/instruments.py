@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.simulation.track import control_limits
 from logs.recording.reader import FlightLog
 from logs.views.charts import shorten
 from logs.views.replay.timeline import TimelineEntry, log_with_legs, timeline_of_legs, waypoint_name
-
-Floats = NDArray[np.float64]
+from world.arrays import Floats
 
 MIN_WIDTH = 60
 # All of a frame, and the line below it, fit a terminal of 24 lines.
@@ -35,7 +33,8 @@ class _Size(NamedTuple):
 
 
 # In the narrow one, too, the numbers beside the horizon are whole.
-_WIDE, _NARROW = _Size(80, 25, 31), _Size(MIN_WIDTH, 11, 21)
+_WIDE = _Size(80, 25, 31)
+_NARROW = _Size(MIN_WIDTH, 11, 21)
 
 
 @dataclass(frozen=True, slots=True)

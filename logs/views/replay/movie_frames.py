@@ -24,8 +24,8 @@ from logs.views.charts import shorten
 from logs.views.draw_map import draw_map
 from logs.views.drawing import clean_style
 from logs.views.map import flight_map
+from world.arrays import Floats
 
-Floats = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
 
 RATE = 12  # frames a second
@@ -98,9 +98,15 @@ class _MovingParts:
         (self._trail,) = axes.plot([], [], color=theme.colour("flown"), linewidth=1.6, **look)
         (self._aircraft,) = axes.plot([], [], linestyle="", markersize=17.0, color=theme.colour("aircraft"), **look)
         self._text = figure.text(
-            0.02, 0.018, "", family="monospace", fontsize=9.5, va="bottom", animated=True,
+            0.02,
+            0.018,
+            "",
+            family="monospace",
+            fontsize=9.5,
+            va="bottom",
+            animated=True,
             bbox={"facecolor": theme.colour("paper"), "edgecolor": theme.colour("rim"), "pad": 4.0},
-        )  # fmt: skip
+        )
         position = track.position
         terrain = setup.scenario.terrain
         ground = np.full(len(position), math.nan)

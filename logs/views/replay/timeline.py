@@ -10,7 +10,6 @@ import textwrap
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.route import Route
 from flight.simulation.track import Track
@@ -19,8 +18,6 @@ from logs.verdict.measures.path_sweeps import Passage, passages, segment_clearan
 from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
 from world.frames import to_geo
 from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
-
-Floats = NDArray[np.float64]
 
 WIDTH = 100
 # The throttle counts as at a limit within this of 0 or 1, and gets an entry after this many seconds.

@@ -36,11 +36,10 @@ from logs.views.report.page import (
 )
 from logs.views.report.text import NOTHING, badge_of, number
 from logs.views.scene import SceneView, script_json
+from world.arrays import Floats
 from world.files import write_whole
 from world.geometry import path_length
 from world.html_table import html_table
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

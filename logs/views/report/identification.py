@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
 from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import PARAMETERS
@@ -23,8 +22,8 @@ from logs.views.report.page import (
     style_text,
 )
 from logs.views.scene import script_json
+from world.arrays import Floats
 
-Floats = NDArray[np.float64]
 _TWO_SIDED = 1.96
 
 

@@ -98,13 +98,28 @@ def picture_address(png: bytes) -> str:
 
 # The scripts in the order in which they stand; the comparison has charts and no view.
 CHART_SCRIPTS = (
-    "page_data", "theme", "ground", "chart_library", "chart_layout", "chart_layers", "chart_panels", "chart_map",
+    "page_data",
+    "theme",
+    "ground",
+    "chart_library",
+    "chart_layout",
+    "chart_layers",
+    "chart_panels",
+    "chart_map",
     "charts",
-)  # fmt: skip
+)
 VIEW_SCRIPTS = (
-    "moments", "clock", "player", "view_gl", "view_shapes", "view_aircraft", "view_camera", "view_labels", "view_hands",
+    "moments",
+    "clock",
+    "player",
+    "view_gl",
+    "view_shapes",
+    "view_aircraft",
+    "view_camera",
+    "view_labels",
+    "view_hands",
     "view",
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True, slots=True)

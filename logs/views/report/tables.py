@@ -15,13 +15,13 @@ from flight.simulation.track import Track, control_limits, held_at_limit
 from logs.verdict.measures.flown_phases import by_the_ground
 from logs.verdict.measures.path_sweeps import passages
 from logs.views.report.text import NOTHING, number, quantity
+from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs, leg_slopes, path_length, signed_turns
 from world.scenario import geographic
 
 if TYPE_CHECKING:
     from logs.recording.reader import LogEvent
 
-Floats = NDArray[np.float64]
 Facts = list[tuple[str, str]]
 
 # A page with more events than this would be read by nobody.

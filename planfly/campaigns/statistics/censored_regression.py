@@ -30,7 +30,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from world.arrays import Floats
+
 Bools = NDArray[np.bool_]
 
 
@@ -84,8 +85,7 @@ class _Probit:
     def log_cdf(self, x: Floats) -> Floats:
         from scipy.special import log_ndtr
 
-        out: Floats = log_ndtr(x)
-        return out
+        return log_ndtr(x)
 
     def log_survival(self, x: Floats) -> Floats:
         return self.log_cdf(-x)
@@ -93,12 +93,10 @@ class _Probit:
     def survival(self, x: Floats) -> Floats:
         from scipy.special import ndtr
 
-        out: Floats = ndtr(-x)
-        return out
+        return ndtr(-x)
 
     def density(self, x: Floats) -> Floats:
-        out: Floats = np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi)
-        return out
+        return np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi)
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
         from scipy.special import ndtr
@@ -110,8 +108,7 @@ class _Probit:
             ndtr(-more), _MIN_PROBABILITY
         )
         between = ndtr(more) - ndtr(x) - more * self.density(more) + x * self.density(x)
-        out: Floats = ends + np.maximum(between, 0.0)
-        return out
+        return ends + np.maximum(between, 0.0)
 
     def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
         from scipy.special import log_ndtr
@@ -123,8 +120,7 @@ class _Probit:
         return sign * ratio, -ratio * (z + ratio)
 
     def log_density(self, x: Floats) -> Floats:
-        out: Floats = -0.5 * x * x - 0.5 * np.log(2.0 * np.pi)
-        return out
+        return -0.5 * x * x - 0.5 * np.log(2.0 * np.pi)
 
     def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
         return -x, np.full_like(x, -1.0)
@@ -138,24 +134,20 @@ class _ComplementaryLogLog:
         return out
 
     def log_survival(self, x: Floats) -> Floats:
-        out: Floats = -np.exp(np.minimum(x, _MAX_EXPONENT))
-        return out
+        return -np.exp(np.minimum(x, _MAX_EXPONENT))
 
     def survival(self, x: Floats) -> Floats:
-        out: Floats = np.exp(self.log_survival(x))
-        return out
+        return np.exp(self.log_survival(x))
 
     def density(self, x: Floats) -> Floats:
-        out: Floats = np.exp(x - np.exp(np.minimum(x, _MAX_EXPONENT)))
-        return out
+        return np.exp(x - np.exp(np.minimum(x, _MAX_EXPONENT)))
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
         rate, more = (np.exp(np.clip(at, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT)) for at in (x, x + width))
         # As for the probit: rate * ratio * exp(-rate) for failures, integrals over the rate for passes.
         fails = rate * _rate_ratio(rate) * np.exp(-rate)
         between = np.maximum(_square_above(rate) - _square_above(more), 0.0)
-        out: Floats = fails + between + more * more * np.exp(-more)
-        return out
+        return fails + between + more * more * np.exp(-more)
 
     def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
         rate = np.exp(np.clip(x, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT))
@@ -164,8 +156,7 @@ class _ComplementaryLogLog:
         return np.where(failed, first, -rate), np.where(failed, np.minimum(second, 0.0), -rate)
 
     def log_density(self, x: Floats) -> Floats:
-        out: Floats = x - np.exp(np.minimum(x, _MAX_EXPONENT))
-        return out
+        return x - np.exp(np.minimum(x, _MAX_EXPONENT))
 
     def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
         rate = np.exp(np.minimum(x, 0.5 * _MAX_EXPONENT))
@@ -174,8 +165,7 @@ class _ComplementaryLogLog:
 
 def _square_above(rate: Floats) -> Floats:
     """Return the integral of (1 - r)^2 exp(-r) from a rate to infinity."""
-    out: Floats = (rate * rate + 1.0) * np.exp(-rate)
-    return out
+    return (rate * rate + 1.0) * np.exp(-rate)
 
 
 def _rate_ratio(rate: Floats) -> Floats:
@@ -230,8 +220,7 @@ def importance_sample(
     summed = np.cumsum(np.exp(logs - logs.max())[order])
     steps = (np.arange(count) + 0.5) / count
     kept = order[np.searchsorted(summed / summed[-1], steps).clip(0, order.size - 1)]
-    out: Floats = np.random.default_rng(_SEED).permutation(points[kept])
-    return out
+    return np.random.default_rng(_SEED).permutation(points[kept])
 
 
 @lru_cache

@@ -6,7 +6,8 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from world.arrays import Floats
 
 # ----------------------------------------------------------------------
 # Intervals and one-sided bounds of the probability of success for a fixed number of flights.
@@ -290,8 +291,6 @@ class Estimator:
             return "reached"
         return "missed" if upper < target else "undecided"
 
-
-Floats = NDArray[np.float64]
 
 # ----------------------------------------------------------------------
 # Fraction of a result's variance that each drawn quantity explains, from the campaign's own flights.

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planfly.campaigns.statistics.censored_regression import LINKS, BinaryLink, Outcomes, RegressionFit, fit_regression
+from world.arrays import Floats
 
-Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 
@@ -79,8 +79,7 @@ class FailureLaws:
 
         standard = np.full(self.scale.size, float(gumbel_l.ppf(share)))
         standard[: self.normals] = float(ndtri(share))
-        out: Floats = self.location + standard * self.scale
-        return out
+        return self.location + standard * self.scale
 
     def quantile_at(self, share: float, speeds: Floats, flyable: NDArray[np.bool_], parts: Floats) -> Floats:
         """Return quantiles (k,) of the posterior of the wind at which this share of flights fails, m/s.
@@ -95,8 +94,7 @@ class FailureLaws:
         values = self.quantile(share)
         order = np.argsort(values, kind="stable")
         summed = np.cumsum(weights[order] / weights.sum())
-        out: Floats = values[order][np.minimum(np.searchsorted(summed, parts), values.size - 1)]
-        return out
+        return values[order][np.minimum(np.searchsorted(summed, parts), values.size - 1)]
 
 
 def _counts_by_wind(speeds: Floats, flyable: NDArray[np.bool_]) -> dict[float, tuple[int, int]]:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planfly.campaigns.statistics.censored_regression import LINKS
 from planfly.campaigns.statistics.failure_modes import (
@@ -24,9 +23,7 @@ from planfly.campaigns.statistics.failure_modes import (
     fit_modes,
     regressors,
 )
-
-Floats = NDArray[np.float64]
-
+from world.arrays import Floats
 
 # ----------------------------------------------------------------------
 # The boundary: the wind in which a share 1 - P of flights fails, for each sample of the failure modes' coefficients.
@@ -113,8 +110,7 @@ class _Shares:
         flies = np.ones_like(self._at_origin[0])
         for mode, sample, x in zip(self._modes, self._samples, self._at_origin, strict=True):
             flies *= mode.link.survival(x + sample[:, 1] * (speeds - ORIGIN))
-        out: Floats = np.log(np.maximum(1.0 - flies.mean(axis=0), _MIN_PROBABILITY))
-        return out
+        return np.log(np.maximum(1.0 - flies.mean(axis=0), _MIN_PROBABILITY))
 
 
 @dataclass
@@ -366,8 +362,7 @@ def _gains_between(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
     failing = np.clip(weights @ fails, 1e-300, 1.0 - 1e-16)
     # Mean deviation of the boundary, weighted by failure; for success it has the opposite sign.
     failed = (weights * off) @ fails
-    out: Floats = failed**2 / failing + failed**2 / (1.0 - failing)
-    return out
+    return failed**2 / failing + failed**2 / (1.0 - failing)
 
 
 class _Belief:

@@ -17,9 +17,18 @@ from tests.instrumented_flights import Truth, drawn_sensors, fly_identification,
 from tests.shared import made_once
 
 TRUTH = Truth(
-    mass=1.2, lift_slope=0.9, lift_offset=0.046, zero_lift_drag=1.35, thrust=0.85, pitch_damping=0.7,
-    aileron_power=0.75, weathercock=0.8, roll_inertia=1.1, pitch_inertia=0.95, yaw_inertia=1.05,
-)  # fmt: skip
+    mass=1.2,
+    lift_slope=0.9,
+    lift_offset=0.046,
+    zero_lift_drag=1.35,
+    thrust=0.85,
+    pitch_damping=0.7,
+    aileron_power=0.75,
+    weathercock=0.8,
+    roll_inertia=1.1,
+    pitch_inertia=0.95,
+    yaw_inertia=1.05,
+)
 
 SENSORS = drawn_sensors(3, battery=True)
 

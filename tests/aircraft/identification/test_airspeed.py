@@ -36,12 +36,19 @@ def flown(
     air = steady + drifting - gusts
     zero = np.zeros(count)
     record = FlightRecord(
-        time=time, acceleration=np.zeros((count, 3)), rates=np.zeros((count, 3)),
+        time=time,
+        acceleration=np.zeros((count, 3)),
+        rates=np.zeros((count, 3)),
         attitude=np.column_stack([zero, zero, np.unwrap(np.arctan2(air[:, 1], air[:, 0]))]),
-        velocity=np.column_stack([steady + drifting + wind, zero]), wind=np.zeros((count, 2)),
-        airspeed=reads * np.hypot(*air.T), density=zero + 1.2, height=zero, controls=np.zeros((count, 4)),
-        current=zero, voltage=zero,
-    )  # fmt: skip
+        velocity=np.column_stack([steady + drifting + wind, zero]),
+        wind=np.zeros((count, 2)),
+        airspeed=reads * np.hypot(*air.T),
+        density=zero + 1.2,
+        height=zero,
+        controls=np.zeros((count, 4)),
+        current=zero,
+        voltage=zero,
+    )
     return align([record], [Clocks(0.0, 0.0, 0.0)], 0.0), Flow(zero, zero, zero)
 
 

@@ -38,9 +38,21 @@ def test_what_the_log_shows_is_found_closely() -> None:
     The rudder does what the ailerons do, times KFF_RDDRMIX: whose yaw it is, the log hardly tells.
     """
     estimate = flown_truth().estimate
-    most = {"lift-slope": 0.15, "thrust": 0.06, "motor-speed": 0.05, "pitch-stiffness": 0.2, "elevator-power": 0.1,
-            "roll-damping": 0.1, "aileron-power": 0.1, "weathercock": 0.15, "yaw-damping": 0.2, "rudder-power": 0.6,
-            "yaw-from-roll": 0.3, "roll-from-yaw": 0.15, "dihedral-effect": 0.2}  # fmt: skip
+    most = {
+        "lift-slope": 0.15,
+        "thrust": 0.06,
+        "motor-speed": 0.05,
+        "pitch-stiffness": 0.2,
+        "elevator-power": 0.1,
+        "roll-damping": 0.1,
+        "aileron-power": 0.1,
+        "weathercock": 0.15,
+        "yaw-damping": 0.2,
+        "rudder-power": 0.6,
+        "yaw-from-roll": 0.3,
+        "roll-from-yaw": 0.15,
+        "dihedral-effect": 0.2,
+    }
     off = {name: abs(float(estimate.values[INDEX[name]] - TRUE[INDEX[name]])) for name in most}
     assert {name: error for name, error in off.items() if error > most[name]} == {}
     assert all(equation.explained > 0.9 for equation in estimate.equations[1:])
@@ -69,8 +81,10 @@ def test_without_the_current_a_battery_that_is_not_the_stated_one_leaves_climb_a
     """Motor and voltage are seen together alone: what matters is the thrust that they make."""
     flown = flown_truth()
     unknown = np.full(len(flown.records[0].time), np.nan)
-    records = [replace(record, current=unknown[: len(record.time)], voltage=unknown[: len(record.time)])
-               for record in flown.records]  # fmt: skip
+    records = [
+        replace(record, current=unknown[: len(record.time)], voltage=unknown[: len(record.time)])
+        for record in flown.records
+    ]
     signals = aligned_signals(records, flown.estimate.clocks, flown.base)
     found = []
     for volts in (0.94, 1.0, 1.06):
@@ -85,13 +99,24 @@ def test_without_the_current_a_battery_that_is_not_the_stated_one_leaves_climb_a
 
 # Each with the standard deviation that it is changed by: one that goes is an interval that is too narrow.
 REFITTED = {
-    "lift of the elevator (50 %)", "lift of the pitch rate (50 %)", "side force of sideslip (30 %)",
-    "side force of the rudder (50 %)", "side force of the ailerons (100 %)", "roll of the rudder (100 %)",
-    "product of inertia (50 %)", "clock of the accelerometers (15 ms)", "clock of the servos (15 ms)",
-    "airspeed (as the wind triangle has it)", "level of the autopilot (0.2 deg)", "mean vertical air (0.04 m/s)",
-    "downward accelerometer (0.03 m/s2)", "noise of the accelerometers", "scale of the current (2 %)",
-    "lift curve, axis 1", "lift curve, axis 2",
-}  # fmt: skip
+    "lift of the elevator (50 %)",
+    "lift of the pitch rate (50 %)",
+    "side force of sideslip (30 %)",
+    "side force of the rudder (50 %)",
+    "side force of the ailerons (100 %)",
+    "roll of the rudder (100 %)",
+    "product of inertia (50 %)",
+    "clock of the accelerometers (15 ms)",
+    "clock of the servos (15 ms)",
+    "airspeed (as the wind triangle has it)",
+    "level of the autopilot (0.2 deg)",
+    "mean vertical air (0.04 m/s)",
+    "downward accelerometer (0.03 m/s2)",
+    "noise of the accelerometers",
+    "scale of the current (2 %)",
+    "lift curve, axis 1",
+    "lift curve, axis 2",
+}
 
 
 def test_each_thing_held_fixed_is_refitted_and_counts() -> None:

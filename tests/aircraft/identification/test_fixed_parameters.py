@@ -76,11 +76,14 @@ def titled(title: str) -> FixedParameter:
 @pytest.mark.parametrize(
     ("title", "field", "factor"),
     [
-        ("lift of the elevator", "lift_elevator", 1.5), ("lift of the pitch rate", "lift_rate", 1.5),
-        ("side force of sideslip", "side_beta", 1.3), ("side force of the rudder", "side_rudder", 1.5),
-        ("side force of the ailerons", "side_aileron", 2.0), ("roll of the rudder", "roll_rudder", 2.0),
+        ("lift of the elevator", "lift_elevator", 1.5),
+        ("lift of the pitch rate", "lift_rate", 1.5),
+        ("side force of sideslip", "side_beta", 1.3),
+        ("side force of the rudder", "side_rudder", 1.5),
+        ("side force of the ailerons", "side_aileron", 2.0),
+        ("roll of the rudder", "roll_rudder", 2.0),
     ],
-)  # fmt: skip
+)
 def test_a_coefficient_is_in_doubt_by_the_share_that_is_said(title: str, field: str, factor: float) -> None:
     base = base_model(load_aircraft("aerosonde"))
     made = changed(title, base)
@@ -106,9 +109,7 @@ def test_sensors_are_in_doubt_by_what_is_said() -> None:
     assert moved["level of the autopilot"].acceleration[5, 0] == pytest.approx(9.80665 * np.radians(0.2))
     # A ramp of 1 a second, 15 ms late.
     ramp = np.arange(2000) / 50.0
-    rising = replace(
-        still, acceleration=np.column_stack([ramp] * 3), surfaces=np.column_stack([ramp] * 3)
-    )  # fmt: skip
+    rising = replace(still, acceleration=np.column_stack([ramp] * 3), surfaces=np.column_stack([ramp] * 3))
     for title, name in (("clock of the accelerometers", "acceleration"), ("clock of the servos", "surfaces")):
         late = getattr(titled(title).change(rising, base)[0], name)
         assert late[100:, 1] == pytest.approx(ramp[100:] - 0.015)

@@ -49,10 +49,15 @@ def test_a_wing_that_rolls_has_side_force_without_sideslip() -> None:
     side = (-0.1374 * p + 0.0839 * r) * base.span / (2.0 * speed)
     one = np.ones(4)
     turning: Any = SimpleNamespace(
-        acceleration=np.outer(one, [0.0, side * pressure / base.mass, -9.81]), rates=np.outer(one, [p, 0.0, r]),
-        surfaces=np.zeros((4, 3)), airspeed=speed * one, density=density * one, throttle=0.5 * one,
-        voltage=np.nan * one, smooth=lambda values, band: values,
-    )  # fmt: skip
+        acceleration=np.outer(one, [0.0, side * pressure / base.mass, -9.81]),
+        rates=np.outer(one, [p, 0.0, r]),
+        surfaces=np.zeros((4, 3)),
+        airspeed=speed * one,
+        density=density * one,
+        throttle=0.5 * one,
+        voltage=np.nan * one,
+        smooth=lambda values, band: values,
+    )
     assert vane(turning, base, prior_means()).beta == pytest.approx(np.zeros(4), abs=1e-4)
 
 
@@ -68,13 +73,17 @@ def test_the_vane_tells_the_flow_that_made_the_forces() -> None:
     drag = pressure * 0.06
     side = pressure * (-0.98 * beta + 0.075 * aileron + 0.19 * rudder)
     force = (
-        lift * math.sin(alpha) - drag * math.cos(alpha) + float(thrust[0]), side,
+        lift * math.sin(alpha) - drag * math.cos(alpha) + float(thrust[0]),
+        side,
         -lift * math.cos(alpha) - drag * math.sin(alpha),
-    )  # fmt: skip
+    )
     made = steady(
-        acceleration=np.array(force) / base.mass, rates=(0.0, q, 0.0), surfaces=(elevator, aileron, rudder),
-        airspeed=speed, density=density,
-    )  # fmt: skip
+        acceleration=np.array(force) / base.mass,
+        rates=(0.0, q, 0.0),
+        surfaces=(elevator, aileron, rudder),
+        airspeed=speed,
+        density=density,
+    )
     found = vane(made, base, prior_means())
     assert found.alpha == pytest.approx(alpha, abs=2e-4)
     assert found.beta == pytest.approx(beta, abs=1e-4)

@@ -51,9 +51,12 @@ def test_the_propellers_torque_rolls_it_to_the_left() -> None:
     """What the motion does not show, the ailerons hold: as much to the right as the propeller's torque."""
     base = base_model(load_aircraft("aerosonde"))
     running: Any = SimpleNamespace(
-        rates=np.zeros((1, 3)), rate_changes=np.zeros((1, 3)), airspeed=np.full(1, 25.0), throttle=np.full(1, 0.8),
+        rates=np.zeros((1, 3)),
+        rate_changes=np.zeros((1, 3)),
+        airspeed=np.full(1, 25.0),
+        throttle=np.full(1, 0.8),
         density=np.full(1, 1.2),
-    )  # fmt: skip
+    )
     torque = float(base.motor.reaction(running.airspeed, running.throttle, running.density)[0])
     assert 0.5 < torque < 3.0
     assert _required_moments(running, base, base.motor)["roll"] == pytest.approx([torque])

@@ -6,11 +6,27 @@ from aircraft.identification.parameters import INDEX, PARAMETERS, prior_means, p
 
 # Of aircraft scaled from another of their class, as docs/your-aircraft.md states them: 1 standard deviation.
 STATED = {
-    "lift-slope": 0.12, "lift-offset": 0.15, "zero-lift-drag": 0.4, "induced-drag": 0.3, "thrust": 0.2,
-    "motor-speed": 0.07, "propeller-torque": 0.1, "pitch-offset": 0.06, "pitch-stiffness": 0.5, "pitch-damping": 0.4,
-    "elevator-power": 0.4, "dihedral-effect": 0.5, "roll-damping": 0.4, "roll-from-yaw": 0.4, "aileron-power": 0.4,
-    "weathercock": 0.4, "yaw-from-roll": 0.6, "yaw-damping": 0.4, "adverse-yaw": 0.6, "rudder-power": 0.4,
-}  # fmt: skip
+    "lift-slope": 0.12,
+    "lift-offset": 0.15,
+    "zero-lift-drag": 0.4,
+    "induced-drag": 0.3,
+    "thrust": 0.2,
+    "motor-speed": 0.07,
+    "propeller-torque": 0.1,
+    "pitch-offset": 0.06,
+    "pitch-stiffness": 0.5,
+    "pitch-damping": 0.4,
+    "elevator-power": 0.4,
+    "dihedral-effect": 0.5,
+    "roll-damping": 0.4,
+    "roll-from-yaw": 0.4,
+    "aileron-power": 0.4,
+    "weathercock": 0.4,
+    "yaw-from-roll": 0.6,
+    "yaw-damping": 0.4,
+    "adverse-yaw": 0.6,
+    "rudder-power": 0.4,
+}
 
 
 def test_priors_are_as_stated() -> None:

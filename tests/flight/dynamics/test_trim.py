@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from flight.dynamics.trim import (
     QUANTITIES,
@@ -34,10 +33,8 @@ from flight.dynamics.trim import (
 )
 from tests.kernels.processors import NUMPY_ON_BASELINE_CPU
 from tests.soak import SOAK
+from world.arrays import Floats
 from world.errors import FlightError
-
-Floats = NDArray[np.float64]
-
 
 INTEGRATORS = tuple(
     f"simulation/integrator/{kind}"

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from flight.guidance.path import (
     NODE,
@@ -26,11 +25,9 @@ from flight.simulation.setup import FlightSetup
 from tests.sampled_paths import sample_path
 from tests.setups import MakeSetup
 from tests.soak import scaled
+from world.arrays import Floats
 from world.geometry import leg_runs, turning_angles
 from world.kernels import Record, field_names
-
-Floats = NDArray[np.float64]
-
 
 # All fields of a piece but where its leg changes, which may be nowhere.
 FINITE = set(field_names(PIECE)) - {"leg_change"}

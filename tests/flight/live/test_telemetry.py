@@ -98,9 +98,22 @@ def test_what_stations_cannot_show_is_replaced() -> None:
 # Telemetry: each message carries the snapshot's numbers in its own units, and none overflows.
 
 FLYING = Snapshot(
-    time=9.0, lat_deg=46.5, lon_deg=-8.25, amsl=612.5, height=112.5, v_north=3.0, v_east=4.0, v_down=-0.5, yaw=-0.5,
-    airspeed=6.0, throttle=0.625, wind_north=1.0, current=12.0, energy=50.0, leg=1.0,
-)  # fmt: skip
+    time=9.0,
+    lat_deg=46.5,
+    lon_deg=-8.25,
+    amsl=612.5,
+    height=112.5,
+    v_north=3.0,
+    v_east=4.0,
+    v_down=-0.5,
+    yaw=-0.5,
+    airspeed=6.0,
+    throttle=0.625,
+    wind_north=1.0,
+    current=12.0,
+    energy=50.0,
+    leg=1.0,
+)
 STATUS = Status(FLYING, Home(46.5, -8.25, 500.0), battery=200.0, mode=AUTO, flying=True)
 
 

@@ -42,9 +42,14 @@ def circled(flown: Route, item: int) -> tuple[float, float]:
 
 @settings(max_examples=scaled(60, 12), deadline=None)
 @given(
-    st.floats(-4000, 4000), st.floats(-4000, 4000), st.floats(-math.pi, math.pi), st.floats(400, 5000),
-    st.floats(15, 350), st.booleans(), st.sampled_from([0.0, 0.5, 1.0, 2.0, 3.7]),
-)  # fmt: skip
+    st.floats(-4000, 4000),
+    st.floats(-4000, 4000),
+    st.floats(-math.pi, math.pi),
+    st.floats(400, 5000),
+    st.floats(15, 350),
+    st.booleans(),
+    st.sampled_from([0.0, 0.5, 1.0, 2.0, 3.7]),
+)
 def test_the_path_is_the_circle(
     east: float, north: float, course: float, away: float, radius: float, left: bool, turns: float
 ) -> None:
@@ -142,10 +147,14 @@ def test_circles_too_wide_or_too_long_are_refused() -> None:
 @pytest.fixture(scope="module")
 def flight() -> tuple[FlightSetup, Any]:
     setup = setup_of(
-        wp(-1500, -2000), wp(-1500, 0, command=18, p="2 0 150 0"), wp(0, 1500, 140, command=19, p="20 0 -160 0"),
-        "2 178 0 22 -1 0 0 0 0", wp(1500, 0, 260, command=31, p="1 0 0 0"), wp(1500, -1500, 260),
+        wp(-1500, -2000),
+        wp(-1500, 0, command=18, p="2 0 150 0"),
+        wp(0, 1500, 140, command=19, p="20 0 -160 0"),
+        "2 178 0 22 -1 0 0 0 0",
+        wp(1500, 0, 260, command=31, p="1 0 0 0"),
+        wp(1500, -1500, 260),
         wp(0, -1500, 260, command=17, p="0 0 140 0"),
-    )  # fmt: skip
+    )
     return setup, fly_to_end(Flight(setup, load_aircraft("aerosonde")))
 
 
@@ -281,16 +290,18 @@ def test_a_circle_tighter_than_the_aircraft_turns_is_gone_around_less_often() ->
 
 def test_a_radius_is_what_the_autopilot_reads_of_it_and_grows_with_height() -> None:
     rules = LoiterRules(
-        radius=60.0, radius_name="WP_LOITER_RAD", radius_of=lambda one: 0.0 if one.seconds else 200.0,
+        radius=60.0,
+        radius_name="WP_LOITER_RAD",
+        radius_of=lambda one: 0.0 if one.seconds else 200.0,
         growth=lambda up: 1.0 + up / 1000.0,
-    )  # fmt: skip
+    )
     unread = "its radius of 150 m is not read: flown with WP_LOITER_RAD, 60 m"
     # 100 m above home's 300 m: 1.4 times as wide.
     for loiter, radius, note in (
         (wp(0, 0, 100, 19, p="60 0 -150 0"), -84.0, f"{unread} to the left"),
         (wp(0, 0, 100, 19, p="60 0 150 0"), 84.0, unread),
         (wp(0, 0, 100, 18, p="2 0 207 0"), 280.0, "loiter radius 207 m: flown with 280 m at this height"),
-    ):  # fmt: skip
+    ):
         made = laid_for(rules, wp(0, -1500), loiter, wp(1500, 1500))
         turns, arc = circled(made, 2)
         assert math.copysign(arc, turns) == pytest.approx(radius)

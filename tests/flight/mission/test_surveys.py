@@ -375,8 +375,10 @@ def test_a_longer_lead_onto_the_first_line() -> None:
     again = make_route(made, ORIGIN, None, 15.0, False)
     [laid] = find_surveys(again, camera_spacing(made, again))
     assert [(line.first, line.last, line.begins, line.ends) for line in laid.lines] == [
-        (2, 3, 0, 4), (6, 7, 5, 8), (10, 11, 9, 12)
-    ]  # fmt: skip
+        (2, 3, 0, 4),
+        (6, 7, 5, 8),
+        (10, 11, 9, 12),
+    ]
     assert turn_around_of(again, laid) == pytest.approx(100.0, abs=0.1)
     # A shorter one is none.
     same = with_layout(read, route, found, SurveyLayout(100.0, lead_in=60.0), ORIGIN)

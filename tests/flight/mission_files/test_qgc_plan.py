@@ -14,9 +14,13 @@ from world.errors import MissionError
 
 def simple(number: int, lat: float) -> dict[str, Any]:
     return {
-        "type": "SimpleItem", "autoContinue": True, "command": 16, "doJumpId": number, "frame": 3,
+        "type": "SimpleItem",
+        "autoContinue": True,
+        "command": 16,
+        "doJumpId": number,
+        "frame": 3,
         "params": [0, 0, 0, None, lat, -84.2, 100],
-    }  # fmt: skip
+    }
 
 
 def plan_with(*items: dict[str, Any]) -> str:
@@ -38,11 +42,21 @@ def test_a_survey_is_its_items(name: str) -> None:
 # QGroundControl's custom camera of 6.17 mm by 4.55 mm, 4,000 by 3,000 pixels, behind 4.5 mm.  From 50 m it writes
 # footprints of 15.425 m along and 20.5667 m across, which are the distances left by overlaps of 70 %.
 CALC = {
-    "AdjustedFootprintFrontal": 15.425, "AdjustedFootprintSide": 20.566666666666663, "CameraName": "Custom Camera",
-    "DistanceToSurface": 50, "FixedOrientation": False, "FocalLength": 4.5, "FrontalOverlap": 70, "ImageHeight": 3000,
-    "ImageWidth": 4000, "Landscape": True, "MinTriggerInterval": 0, "SensorHeight": 4.55, "SensorWidth": 6.17,
+    "AdjustedFootprintFrontal": 15.425,
+    "AdjustedFootprintSide": 20.566666666666663,
+    "CameraName": "Custom Camera",
+    "DistanceToSurface": 50,
+    "FixedOrientation": False,
+    "FocalLength": 4.5,
+    "FrontalOverlap": 70,
+    "ImageHeight": 3000,
+    "ImageWidth": 4000,
+    "Landscape": True,
+    "MinTriggerInterval": 0,
+    "SensorHeight": 4.55,
+    "SensorWidth": 6.17,
     "SideOverlap": 70,
-}  # fmt: skip
+}
 
 
 def trigger(number: int, metres: float) -> dict[str, Any]:
@@ -119,10 +133,15 @@ def test_a_plan_for_another_kind_of_vehicle_is_a_line(kind: int, name: str) -> N
 @pytest.mark.parametrize(("clockwise", "spiral"), [(True, True), (False, True), (True, False)])
 def test_a_landing_pattern_is_three_items(clockwise: bool, spiral: bool) -> None:
     pattern = {
-        "type": "ComplexItem", "complexItemType": "fwLandingPattern", "altitudesAreRelative": True,
-        "landCoordinate": [36.5, -84.2, 0], "landingApproachCoordinate": [36.52, -84.2, 60],
-        "loiterRadius": 120, "loiterClockwise": clockwise, "useLoiterToAlt": spiral,
-    }  # fmt: skip
+        "type": "ComplexItem",
+        "complexItemType": "fwLandingPattern",
+        "altitudesAreRelative": True,
+        "landCoordinate": [36.5, -84.2, 0],
+        "landingApproachCoordinate": [36.52, -84.2, 60],
+        "loiterRadius": 120,
+        "loiterClockwise": clockwise,
+        "useLoiterToAlt": spiral,
+    }
     mission = parse_mission(plan_with(simple(1, 36.6), pattern), "a.plan")
     assert [item.command for item in mission.items] == [16, 189, 31 if spiral else 16, 21]
     assert [item.seq for item in mission.items] == [1, 2, 3, 4]
@@ -138,20 +157,23 @@ def test_a_landing_pattern_is_three_items(clockwise: bool, spiral: bool) -> None
         ({"complexItemType": "fwLandingPattern", "landCoordinate": [46.0, None, 0]}, "landCoordinate: \\[46.0, null"),
         (
             {
-                "complexItemType": "fwLandingPattern", "landCoordinate": [91, 2, 3],
+                "complexItemType": "fwLandingPattern",
+                "landCoordinate": [91, 2, 3],
                 "landingApproachCoordinate": [1, 2, 3],
             },
             "latitude 91",
         ),
         (
             {
-                "complexItemType": "fwLandingPattern", "landCoordinate": [1, 2, 3],
-                "landingApproachCoordinate": [1, 2, 3], "loiterRadius": "wide",
+                "complexItemType": "fwLandingPattern",
+                "landCoordinate": [1, 2, 3],
+                "landingApproachCoordinate": [1, 2, 3],
+                "loiterRadius": "wide",
             },
             "loiterRadius",
         ),
     ],
-)  # fmt: skip
+)
 def test_complex_items_that_cannot_be_read_are_refused(change: dict[str, Any], text: str) -> None:
     with pytest.raises(MissionError, match=text) as caught:
         parse_mission(plan_with(simple(1, 36.6), {"type": "ComplexItem"} | change), "a.plan")

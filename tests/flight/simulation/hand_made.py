@@ -3,31 +3,49 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.guidance.gains import Gains
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.path import NODE, PIECE, FlyByPath
 from flight.simulation.tick import Workspace
+from world.arrays import Heights
 from world.frames import PolyMap, fit_polymap
 from world.kernels import field_names
-from world.terrain import Heights
-
-Floats = NDArray[np.float64]
 
 # m of the path, m above the sea of its height and of the ground, m a rad of latitude and of longitude.
 LENGTH, HEIGHT, GROUND, RADIUS = 4000.0, 500.0, 100.0, 6_400_000.0
 # No aircraft's: their sizes do not matter here.
-GAINS = Gains(**dict.fromkeys(
-    (
-        "cross_track_frequency", "cross_track_damping", "cross_track_integral", "intercept", "turn_lead",
-        "turn_smoothing", "height_frequency", "height_damping", "height_integral", "slope_lead", "speed_gain",
-        "speed_integral", "throttle_per_slope", "slow_margin", "roll_gain", "roll_rate_gain", "aileron_per_roll_rate",
-        "aileron_per_roll_acceleration", "alpha_per_g", "elevator_per_alpha", "elevator_per_pitch_rate",
-        "pitch_rate_gain", "yaw_rate_gain",
+GAINS = Gains(
+    **dict.fromkeys(
+        (
+            "cross_track_frequency",
+            "cross_track_damping",
+            "cross_track_integral",
+            "intercept",
+            "turn_lead",
+            "turn_smoothing",
+            "height_frequency",
+            "height_damping",
+            "height_integral",
+            "slope_lead",
+            "speed_gain",
+            "speed_integral",
+            "throttle_per_slope",
+            "slow_margin",
+            "roll_gain",
+            "roll_rate_gain",
+            "aileron_per_roll_rate",
+            "aileron_per_roll_acceleration",
+            "alpha_per_g",
+            "elevator_per_alpha",
+            "elevator_per_pitch_rate",
+            "pitch_rate_gain",
+            "yaw_rate_gain",
+        ),
+        0.5,
     ),
-    0.5,
-), reference_airspeed=25.0)  # fmt: skip
+    reference_airspeed=25.0,
+)
 
 
 def straight_path() -> FlyByPath:

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Variation
@@ -26,7 +25,6 @@ from tests.soak import SOAK, some
 from world.errors import FlightError
 from world.kernels import field_names
 
-Floats = NDArray[np.float64]
 # As long as its turns and slopes take to settle.
 WAY = standard() if SOAK else standard(800.0)
 
@@ -231,8 +229,13 @@ def test_the_same_setup_gives_the_same_bytes(make_setup: MakeSetup, aerosonde: A
     (tmp_path / "setup").write_bytes(pickle.dumps(setup(5)))
     run = subprocess.run(
         [sys.executable, "-c", _FLY_AGAIN, str(tmp_path / "setup")],
-        cwd=ROOT, env=os.environ | {"PYTHONHASHSEED": "77"}, capture_output=True, text=True, check=True, timeout=120,
-    )  # fmt: skip
+        cwd=ROOT,
+        env=os.environ | {"PYTHONHASHSEED": "77"},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    )
     assert run.stdout.split() == [first]
 
 

@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 from numba import njit
-from numpy.typing import NDArray
 from scipy.signal import welch
 
 from aircraft.catalog import Aircraft
@@ -14,9 +13,9 @@ from flight.simulation.simulate import Flight
 from flight.simulation.track import as_track
 from flight.simulation.turbulence import GUST_FILTERS, dryden_scales, start_gusts, step_gusts
 from tests.setups import MakeSetup
+from world.arrays import Floats
 from world.kernels import Record
 
-Floats = NDArray[np.float64]
 SPEED, DT = 25.0, 1.0 / 60.0
 LIGHT, MODERATE = 7.716, 15.43  # 15 and 30 knots at 20 ft
 

@@ -48,8 +48,12 @@ def test_slow_for_a_minute_is_the_same_flight_and_longer_another() -> None:
 
 
 def test_stretches_are_those_in_auto() -> None:
-    modes = [ModeChange(0.0, "FBWA", False), ModeChange(20.0, "AUTO", True), ModeChange(50.0, "FBWA", False),
-             ModeChange(60.0, "AUTO", True)]  # fmt: skip
+    modes = [
+        ModeChange(0.0, "FBWA", False),
+        ModeChange(20.0, "AUTO", True),
+        ModeChange(50.0, "FBWA", False),
+        ModeChange(60.0, "AUTO", True),
+    ]
     (part,) = flight_parts([(10.0, 100.0)], modes, [LoggedMission(1.0, MISSION, "CMD")], 200.0)
     assert [(one.start, one.end, one.ended, one.next_mode) for one in part.stretches] == [
         (20.0, 50.0, "mode", "FBWA"),

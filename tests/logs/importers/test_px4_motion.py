@@ -160,8 +160,9 @@ def with_second_battery(**fields: float) -> dict[str, tuple[np.ndarray, dict[str
         one = np.ones(len(when))
         table = {"voltage_v": volts * one, "current_a": amps * one, "connected": one, "source": 0.0 * one}
         topics["battery_status" + name] = (
-            when, table | ({key: value * one for key, value in fields.items()} if name else {})
-        )  # fmt: skip
+            when,
+            table | ({key: value * one for key, value in fields.items()} if name else {}),
+        )
     return topics
 
 

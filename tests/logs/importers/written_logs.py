@@ -9,13 +9,10 @@ from typing import Any
 
 import gpxpy.gpx
 import numpy as np
-from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flight.mission.items import Mission
 from logs.importers.raw_log import RawLog, example_raw_log
-
-Floats = NDArray[np.float64]
 
 BEGAN = datetime(2024, 3, 2, 10, 0, 0, tzinfo=UTC)
 _SIZES = {"Q": 8, "i": 4, "L": 4, "f": 4, "B": 1, "H": 2, "I": 4, "h": 2, "c": 2, "N": 16, "Z": 64, "n": 4, "d": 8}

@@ -138,8 +138,10 @@ def test_the_start_is_in_view() -> None:
     """Wherever on the map that is: the camera keeps to the aircraft, some ten of its drawn spans away."""
     panel = json.loads(layout_text())["configById"]["3D!planfly"]
     assert (panel["followTf"], panel["followMode"], panel["cameraState"]["target"]) == (
-        AIRCRAFT, "follow-position", [0, 0, 0],
-    )  # fmt: skip
+        AIRCRAFT,
+        "follow-position",
+        [0, 0, 0],
+    )
     assert 8.0 < panel["cameraState"]["distance"] / SPAN < 20.0
     assert panel["scene"]["transforms"]["axisScale"] < SPAN
     assert panel["topics"]["/scene/aircraft"]["visible"]

@@ -47,9 +47,10 @@ def test_what_is_kept_of_surveys_comes_back() -> None:
     with_surveys = replace(SETUP.mission, survey_plans=plans)
     table = through_json(MissionTable.of(with_surveys))
     assert table["survey_plans"][0] == {
-        "photo_m": 25.5, "turn_around_m": 30.0,
+        "photo_m": 25.5,
+        "turn_around_m": 30.0,
         "camera": {"across_m_per_m": 1.5, "along_m_per_m": 1.0, "front": 0.7, "side": None, "interval_s": 2.0},
-    }  # fmt: skip
+    }
     same(MissionTable.model_validate(table).mission(), with_surveys)
     # A log of before there were any, and of a mission without a survey, says nothing of them.
     assert "survey_plans" not in json.loads(pack_setup(SETUP)["setup.json"])["mission"]

@@ -11,7 +11,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
 from flight.simulation.setup import FlightSetup
@@ -19,10 +18,9 @@ from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
 from tests.setups import spec_around
 from tests.synthetic import bank_radius
+from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
 from world.scenario import from_spec
-
-Floats = NDArray[np.float64]
 
 SEED = 12
 MARGIN = 5.0
@@ -225,8 +223,21 @@ def limit(draft: Draft) -> None:
 
 
 FEATURES: tuple[Callable[[Draft], None], ...] = (
-    leg, arc, corner, loiter, jump, band, layer, climb, hill, limit, edge, hole, own_fence, own_inclusion,
-)  # fmt: skip
+    leg,
+    arc,
+    corner,
+    loiter,
+    jump,
+    band,
+    layer,
+    climb,
+    hill,
+    limit,
+    edge,
+    hole,
+    own_fence,
+    own_inclusion,
+)
 
 
 def turn_of(draft: Draft) -> Floats:

@@ -58,9 +58,12 @@ def test_a_real_autopilot_that_flew_is_data_too(setup: FlightSetup, track: Track
     verdict = judge(replace(setup, autopilot=ArduPlaneSitl(ArduPilotParameters.defaults(), program)), track)
     assert "\nFlown by: ArduPlane V4.6.0 (sha256 abababab...), 1 parameters set for" in verdict.summary
     assert json.loads(verdict_json(verdict))["flown_by"] == {
-        "version": "ArduPlane V4.6.0", "sha256": "ab" * 32, "parameters": {"WP_RADIUS": 60.0},
-        "changed": {"WP_RADIUS": 60.0}, "unused": ["FOO"],
-    }  # fmt: skip
+        "version": "ArduPlane V4.6.0",
+        "sha256": "ab" * 32,
+        "parameters": {"WP_RADIUS": 60.0},
+        "changed": {"WP_RADIUS": 60.0},
+        "unused": ["FOO"],
+    }
     assert json.loads(verdict_json(judge(setup, track)))["flown_by"] is None
 
 

@@ -36,9 +36,16 @@ def test_places_of_the_same_data_are_one_key() -> None:
     assert found[Place("waypoint", 3, 4)] == "turn"
     assert found[Place("leg", 3)] == "slope"
     different = {
-        Place("waypoint", 3), Place("waypoint", 3, item=4), Place("leg", 3), Place("missile", 3, name="a"),
-        Place("radar", 3, name="a"), Place("radar", 3, name="b"), FLIGHT, MISSION, PLAN,
-    }  # fmt: skip
+        Place("waypoint", 3),
+        Place("waypoint", 3, item=4),
+        Place("leg", 3),
+        Place("missile", 3, name="a"),
+        Place("radar", 3, name="a"),
+        Place("radar", 3, name="b"),
+        FLIGHT,
+        MISSION,
+        PLAN,
+    }
     assert len(different) == 9
 
 

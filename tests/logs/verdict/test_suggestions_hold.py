@@ -3,9 +3,7 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
@@ -16,10 +14,9 @@ from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import bare, of
 from tests.missions import KINDS, MadeMission, infeasible
 from tests.soak import scaled
+from world.arrays import Floats
 
 JUDGED, FLOWN = range(scaled(100, len(KINDS))), range(scaled(100, len(KINDS) // 2))
-
-Floats = NDArray[np.float64]
 
 
 def taken(setup: FlightSetup, suggestion: Suggestion) -> FlightSetup:

@@ -111,7 +111,7 @@ def test_two_winds_are_both_drawn_and_told_apart() -> None:
     assert notes == [
         ("a.mcap:\nwind 5.0 m/s\nfrom 270°", theme.colour("flown")),
         ("b.mcap:\nwind 8.0 m/s\nfrom 000°", theme.colour("other")),
-    ]  # fmt: skip
+    ]
     figure.canvas.draw()
     upper, lower = (text.get_window_extent() for text in figure.texts)
     assert upper.y0 > lower.y1 > lower.y0 > 0.0

@@ -80,9 +80,17 @@ def test_nothing_to_go_on_with(asked: list[object], tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "bad",
-    [{"prove": 0.49}, {"prove": 1.0}, {"confidence": 1.0}, {"directions": 3}, {"directions": 73}, {"most": 0.9},
-     {"most": 41.0}, {"flights": 0}],
-)  # fmt: skip
+    [
+        {"prove": 0.49},
+        {"prove": 1.0},
+        {"confidence": 1.0},
+        {"directions": 3},
+        {"directions": 73},
+        {"most": 0.9},
+        {"most": 41.0},
+        {"flights": 0},
+    ],
+)
 def test_numbers_that_are_none_are_refused(bad: dict[str, Any], asked: list[object]) -> None:
     with pytest.raises(ValueError, match=next(iter(bad))):
         planfly.winds("paper-07", **bad)

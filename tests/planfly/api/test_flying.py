@@ -81,9 +81,12 @@ def test_a_flight_without_a_log_leaves_no_file(mission: Path) -> None:
 def test_files_are_named_as_text_or_path(kind: type, mission: Path) -> None:
     (mission.parent / "field.toml").write_text(FIELD)
     flown = planfly.fly(
-        kind(mission), scenario=kind(mission.parent / "field.toml"), log=kind(mission.parent / "a.mcap"),
-        fence=kind(mission.parent / "keep-out.fence"), log_hz=10,
-    )  # fmt: skip
+        kind(mission),
+        scenario=kind(mission.parent / "field.toml"),
+        log=kind(mission.parent / "a.mcap"),
+        fence=kind(mission.parent / "keep-out.fence"),
+        log_hz=10,
+    )
     assert flown.log == mission.parent / "a.mcap"
     assert flown.setup.scenario.name == "field"
     assert [finding.rule for finding in flown.verdict.failed if finding.rule == "fence"]

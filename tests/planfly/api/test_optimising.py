@@ -171,11 +171,16 @@ def test_a_box_that_is_none_is_refused(arguments: tuple[list[float], list[float]
         planfly.optimise(*arguments)
 
 
-@pytest.mark.parametrize(("options", "words"), [
-    ({"population": 2}, "even number from 4"), ({"population": 5}, "even number from 4"),
-    ({"model": "ga"}, "allowed umda, emna, multistart, differential"),
-    ({"initial": [[0.5]]}, r"\(100, 1\) are expected"), ({"initial": [[np.nan]] * 100}, "finite"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"population": 2}, "even number from 4"),
+        ({"population": 5}, "even number from 4"),
+        ({"model": "ga"}, "allowed umda, emna, multistart, differential"),
+        ({"initial": [[0.5]]}, r"\(100, 1\) are expected"),
+        ({"initial": [[np.nan]] * 100}, "finite"),
+    ],
+)
 def test_options_that_are_none_are_refused(options: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         planfly.optimise([0.0], [1.0], **options)

@@ -61,8 +61,11 @@ def test_a_searchs_line_is_read_as_the_same_options(words: str) -> None:
     goal = WindsGoal(asked.prove, asked.confidence, asked.directions, asked.most, asked.flights or 5000)
     again = parse(shlex.split(winds_line(asked.target, goal, repeated_options(asked)))[1:])
     assert (again.prove, again.confidence, again.directions, again.most) == (
-        asked.prove, asked.confidence, asked.directions, asked.most,
-    )  # fmt: skip
+        asked.prove,
+        asked.confidence,
+        asked.directions,
+        asked.most,
+    )
     assert (again.flights or 5000) == goal.flights
     assert repeated_options(again) == repeated_options(asked)
 

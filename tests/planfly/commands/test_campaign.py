@@ -61,9 +61,12 @@ def test_a_flight_is_flown_again_byte_for_byte(flown: tuple[list[str], Path]) ->
     ],
 )
 def test_one_line_and_nothing_lost(
-    flown: tuple[list[str], Path], more: list[str], words: str, capsys: pytest.CaptureFixture[str],
+    flown: tuple[list[str], Path],
+    more: list[str],
+    words: str,
+    capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+) -> None:
     line, out = flown
     monkeypatch.chdir(out.parent)
     Path("heavy.toml").write_text(TABLE.format("mass", "norm", 1.9) + TABLE.format("drag", "norm", 2.85))

@@ -193,8 +193,11 @@ def test_legs_have_their_items_and_limits_their_owner_through_a_jump(tmp_path: P
     assert main(argv) == 4
     findings = json.loads(out.read_text(encoding="utf-8"))["findings"]
     # Flown are the items 1, 2, 3, then 2 and 3 again, and 5.
-    legs = {item["place"]["index"]: (item["where"], item["place"]["to_item"]) for item in findings
-            if item["rule"] == "clearance"}  # fmt: skip
+    legs = {
+        item["place"]["index"]: (item["where"], item["place"]["to_item"])
+        for item in findings
+        if item["rule"] == "clearance"
+    }
     assert legs == {k: (f"leg {k}, to item {item}", item) for k, item in enumerate((2, 3, 2, 3, 5))}
     assert {item["limit_source"] for item in findings if item["rule"] == "clearance"} == {"default"}
     (violated,) = [item for item in findings if item["rule"] == "fence" and item["ok"] is False]

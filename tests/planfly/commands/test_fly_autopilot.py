@@ -142,11 +142,14 @@ def test_a_signal_ends_the_program_and_leaves_none_of_its_files(
     temporary.mkdir()
     command = [sys.executable, "-m", "planfly", "fly", str(mission), "--autopilot", str(write_fake(tmp_path, "silent"))]
     running = subprocess.Popen(
-        [*command, "--log", str(tmp_path / "f.mcap")], cwd=ROOT, env=os.environ | {"TMPDIR": str(temporary)},
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        [*command, "--log", str(tmp_path / "f.mcap")],
+        cwd=ROOT,
+        env=os.environ | {"TMPDIR": str(temporary)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         # Whoever runs the tests in the background may have told all processes to ignore it.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )  # fmt: skip
+    )
     for _ in range(15_000):
         if list(temporary.glob("planfly-autopilot-*/logs/*.BIN")):
             break

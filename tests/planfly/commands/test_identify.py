@@ -157,7 +157,7 @@ def test_logs_without_current_among_others_are_named() -> None:
         flat = one[:, 0]
         return FlightRecord(
             flat, three, three, three, three, two, flat, flat, flat, four, flat + amperes, flat, source=source
-        )  # fmt: skip
+        )
 
     known, unknown = record("a.BIN", 3.0), record("b.BIN", np.nan)
     assert without_current([known, unknown, unknown]) == ("b.BIN",)

@@ -287,8 +287,10 @@ def test_tables_pictures_and_a_log_of_the_models_flight(tmp_path: Path, capsys: 
     blown = "Model aerosonde in 3.0 m/s of wind, no gusts, against the flight, median (95 %): cross-track"
     assert blown in out
     files = sorted(path.name for path in (tmp_path / "a-refly").iterdir())
-    assert files == [*(f"refly-{name}.png" for name in ("bank", "cross-track", "energy", "ground-speed", "height")),
-                     "simulated.mcap"]  # fmt: skip
+    assert files == [
+        *(f"refly-{name}.png" for name in ("bank", "cross-track", "energy", "ground-speed", "height")),
+        "simulated.mcap",
+    ]
     simulated = read_log(tmp_path / "a-refly" / "simulated.mcap")
     assert (simulated.complete, simulated.setup.source) == (True, None)
     assert main(["refly", str(flight), "--out", str(tmp_path / "a-refly")]) == 2

@@ -65,8 +65,9 @@ def test_a_scenario_over_ones_own_ground(here: Path, capsys: pytest.CaptureFixtu
 @pytest.mark.parametrize("law", ["ardupilot", "px4-1.16", "ideal"])
 def test_every_example_may_be_switched_on(law: str, here: Path) -> None:
     file = planfly.new_scenario("site", (46.5, 8.0), (46.55, 8.09), autopilot_law=law)
-    text, switched = EXAMPLE.subn("", file.read_text(encoding="utf-8").replace('\n# kind = "dem"', "").replace(
-        '\n# path = "dem.tif"', "\n#"))  # fmt: skip
+    text, switched = EXAMPLE.subn(
+        "", file.read_text(encoding="utf-8").replace('\n# kind = "dem"', "").replace('\n# path = "dem.tif"', "\n#")
+    )
     assert switched > 20
     if law == "ideal":
         text = text.replace("\nparams = ", "\n# params = ")
@@ -122,11 +123,13 @@ def test_where_there_is_no_way_it_says_why_and_leaves_the_file(here: Path, capsy
         (["--from", "46,8"], "the following arguments are required: --to"),
         (["--from", "46,8", "--to", "46,8.1", "--height", "0"], "argument --height: '0': m above ground"),
         (["--from", "46,8", "--to", "46,8.1", "--aircraft", "x9"], "x9"),
-        (["--from", "36.3,-84.2", "--to", "36.9,-84.2", "--terrain", "jacksboro"],
-         "planfly: --to 36.9,-84.2: outside jacksboro or within 100 m of its edge: it covers latitude 36.16"),
+        (
+            ["--from", "36.3,-84.2", "--to", "36.9,-84.2", "--terrain", "jacksboro"],
+            "planfly: --to 36.9,-84.2: outside jacksboro or within 100 m of its edge: it covers latitude 36.16",
+        ),
         (["--from", "46,8", "--to", "46,8.1", "--terrain", "none.tif"], "none.tif"),
     ],
-)  # fmt: skip
+)
 def test_bad_input_is_one_line_and_nothing_is_made(
     more: list[str], said: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

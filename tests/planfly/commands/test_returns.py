@@ -155,10 +155,16 @@ def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFi
 )
 def test_bad_input_is_one_line(hill: Path, words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
     items = [
-        {"type": "SimpleItem", "command": 16, "frame": 0, "autoContinue": True, "doJumpId": k,
-         "params": [0, 0, 0, None, 46.0, 8.0 + 0.02 * k, 600]}
+        {
+            "type": "SimpleItem",
+            "command": 16,
+            "frame": 0,
+            "autoContinue": True,
+            "doJumpId": k,
+            "params": [0, 0, 0, None, 46.0, 8.0 + 0.02 * k, 600],
+        }
         for k in (1, 2)
-    ]  # fmt: skip
+    ]
     plan = {"fileType": "Plan", "version": 1, "groundStation": "x", "mission": {"version": 2, "items": items}}
     (hill / "homeless.plan").write_text(json.dumps(plan), encoding="utf-8")
     assert main(["returns", *words, "--scenario", "hill.toml"]) == 2

@@ -42,8 +42,12 @@ def planfly(*argv: str, cwd: Path, **environment: str) -> subprocess.CompletedPr
     """Run the command in a process of its own."""
     return subprocess.run(
         [sys.executable, "-m", "planfly", *argv],
-        cwd=cwd, capture_output=True, text=True, check=False, env={**os.environ, **environment},
-    )  # fmt: skip
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, **environment},
+    )
 
 
 @pytest.fixture(scope="module")
@@ -114,9 +118,12 @@ def test_two_runs_are_byte_identical(demo: Path, tmp_path: Path) -> None:
     """In another process, with another hash seed and another number of threads."""
     result = subprocess.run(
         [sys.executable, "-c", WITHOUT_PICTURES, "--out", "again"],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
         env={**os.environ, "PYTHONHASHSEED": "77", "OPENBLAS_NUM_THREADS": "1"},
-    )  # fmt: skip
+    )
     assert result.returncode == 0, result.stderr
     for name in SAME:
         assert (tmp_path / "again" / name).read_bytes() == (demo / name).read_bytes(), name

@@ -68,8 +68,12 @@ def mavsdk(folder: Path, port: int, rows: list[list[float]], task: str, limit: f
     (folder / "items.json").write_text(json.dumps(rows), encoding="utf-8")
     result = subprocess.run(
         [sys.executable, SCRIPT, str(port), "items.json", task],
-        cwd=folder, capture_output=True, text=True, check=False, timeout=limit,
-    )  # fmt: skip
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=limit,
+    )
     # MAVSDK's errors name every item that was sent, by its address.
     assert result.returncode == 0, re.sub(r"<mavsdk[^>]*>,? ?", "", result.stderr)[-3000:]
     return json.loads(result.stdout.strip().splitlines()[-1])
@@ -162,8 +166,13 @@ class MavProxy:
         script = Path(sys.executable).with_name("mavproxy.py")
         self.process = subprocess.Popen(
             [sys.executable, script, f"--master=udpin:127.0.0.1:{port}", "--no-state", f"--default-modules={modules}"],
-            cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, bufsize=1,
-        )  # fmt: skip
+            cwd=folder,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            bufsize=1,
+        )
         self.text = ""
         self._pieces: queue.Queue[str] = queue.Queue()
         self._reader = threading.Thread(target=self._read, daemon=True)

@@ -338,11 +338,18 @@ def test_an_area_beyond_the_tiles_is_refused(here: Path, capsys: pytest.CaptureF
     said = capsys.readouterr().err
     assert "jacksboro: does not cover latitude 36.1730..36.5270, longitude -84.33" in said
     assert main(["terrain", "--box", "36.25,-84.3,36.3,-84.2", "--source", "jacksboro"]) == 0
-    assert float(read_terrain(
-        open_raster("dem.tif"), GeoOrigin(36.28, -84.25), [[-100.0, 100.0], [-100.0, 100.0]], 0.0
-    ).height(0.0, 0.0)) == pytest.approx(float(read_terrain(
-        open_raster("jacksboro"), GeoOrigin(36.28, -84.25), [[-100.0, 100.0], [-100.0, 100.0]], 0.0
-    ).height(0.0, 0.0)), abs=0.01)  # fmt: skip
+    assert float(
+        read_terrain(open_raster("dem.tif"), GeoOrigin(36.28, -84.25), [[-100.0, 100.0], [-100.0, 100.0]], 0.0).height(
+            0.0, 0.0
+        )
+    ) == pytest.approx(
+        float(
+            read_terrain(
+                open_raster("jacksboro"), GeoOrigin(36.28, -84.25), [[-100.0, 100.0], [-100.0, 100.0]], 0.0
+            ).height(0.0, 0.0)
+        ),
+        abs=0.01,
+    )
 
 
 MISSION = """QGC WPL 110

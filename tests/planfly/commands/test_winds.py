@@ -86,9 +86,13 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(
     ],
 )
 def test_one_line_and_nothing_lost(
-    line: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-    more: list[str], words: str,
-) -> None:  # fmt: skip
+    line: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    more: list[str],
+    words: str,
+) -> None:
     def left(base: CampaignBase, _goal: WindsGoal, _workers: object, store: WindsStore, *_: object) -> None:
         store.add(AskedFlight(0, 0, 5.0, 0), made_flight(base, 0))
         raise Interrupted(signal.SIGINT)

@@ -20,12 +20,30 @@ from world.errors import FlightError
 
 # Beard and McLain, Small Unmanned Aircraft, second edition, appendix E.2.
 BOOK = {
-    "drag_zero": 0.043, "drag_elevator": 0.0135, "lift_zero": 0.23, "lift_alpha": 5.61, "lift_rate": 7.95,
-    "lift_elevator": 0.13, "side_beta": -0.98, "side_aileron": 0.075, "side_rudder": 0.19, "roll_beta": -0.13,
-    "roll_roll": -0.51, "roll_yaw": 0.25, "roll_aileron": 0.17, "roll_rudder": 0.0024, "pitch_zero": 0.0135,
-    "pitch_alpha": -2.74, "pitch_rate": -38.21, "pitch_elevator": -0.99, "yaw_beta": 0.073, "yaw_roll": 0.069,
-    "yaw_yaw": -0.095, "yaw_aileron": -0.011, "yaw_rudder": -0.069,
-}  # fmt: skip
+    "drag_zero": 0.043,
+    "drag_elevator": 0.0135,
+    "lift_zero": 0.23,
+    "lift_alpha": 5.61,
+    "lift_rate": 7.95,
+    "lift_elevator": 0.13,
+    "side_beta": -0.98,
+    "side_aileron": 0.075,
+    "side_rudder": 0.19,
+    "roll_beta": -0.13,
+    "roll_roll": -0.51,
+    "roll_yaw": 0.25,
+    "roll_aileron": 0.17,
+    "roll_rudder": 0.0024,
+    "pitch_zero": 0.0135,
+    "pitch_alpha": -2.74,
+    "pitch_rate": -38.21,
+    "pitch_elevator": -0.99,
+    "yaw_beta": 0.073,
+    "yaw_roll": 0.069,
+    "yaw_yaw": -0.095,
+    "yaw_aileron": -0.011,
+    "yaw_rudder": -0.069,
+}
 
 
 def test_the_aerosondes_are_the_books() -> None:
@@ -75,17 +93,38 @@ def test_an_engine_that_burns_fuel_is_refused_in_one_line() -> None:
 # Beard and McLain, first edition, appendix E.1, with a span efficiency of 0.9, and Gryte et al. 2018 (x8_param.mat).
 WINGS = {
     "zagi": {
-        "drag_zero": 0.0254, "drag_induced": 1.0 / (math.pi * 0.9 * 1.4224**2 / 0.2589), "lift_least_drag": 0.0,
-        "lift_zero": 0.09167, "lift_alpha": 3.5016, "lift_rate": 2.8932, "lift_elevator": 0.2724,
-        "pitch_zero": -0.02338, "pitch_alpha": -0.5675, "pitch_rate": -1.399, "pitch_elevator": -0.3254,
-        "roll_roll": -0.3209, "roll_aileron": 0.1682, "side_beta": -0.07359, "side_roll": 0.0,
+        "drag_zero": 0.0254,
+        "drag_induced": 1.0 / (math.pi * 0.9 * 1.4224**2 / 0.2589),
+        "lift_least_drag": 0.0,
+        "lift_zero": 0.09167,
+        "lift_alpha": 3.5016,
+        "lift_rate": 2.8932,
+        "lift_elevator": 0.2724,
+        "pitch_zero": -0.02338,
+        "pitch_alpha": -0.5675,
+        "pitch_rate": -1.399,
+        "pitch_elevator": -0.3254,
+        "roll_roll": -0.3209,
+        "roll_aileron": 0.1682,
+        "side_beta": -0.07359,
+        "side_roll": 0.0,
     },
     "x8": {
-        "lift_zero": 0.0867, "lift_alpha": 4.0203, "lift_rate": 3.87, "lift_elevator": 0.2781,
-        "pitch_zero": 0.0227, "pitch_alpha": -0.4629, "pitch_rate": -1.3012, "pitch_elevator": -0.2292,
-        "side_beta": -0.2239, "side_roll": -0.1374, "side_yaw": 0.0839, "roll_roll": -0.4042, "roll_aileron": 0.1202,
+        "lift_zero": 0.0867,
+        "lift_alpha": 4.0203,
+        "lift_rate": 3.87,
+        "lift_elevator": 0.2781,
+        "pitch_zero": 0.0227,
+        "pitch_alpha": -0.4629,
+        "pitch_rate": -1.3012,
+        "pitch_elevator": -0.2292,
+        "side_beta": -0.2239,
+        "side_roll": -0.1374,
+        "side_yaw": 0.0839,
+        "roll_roll": -0.4042,
+        "roll_aileron": 0.1202,
     },
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", WINGS)

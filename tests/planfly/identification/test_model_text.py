@@ -18,12 +18,22 @@ from world.errors import FlightError
 
 BASE = load_aircraft("aerosonde")
 FACTORS = {
-    "lift-slope": "lift_alpha", "zero-lift-drag": "drag_zero", "induced-drag": "drag_induced",
-    "pitch-stiffness": "pitch_alpha", "pitch-damping": "pitch_rate", "elevator-power": "pitch_elevator",
-    "dihedral-effect": "roll_beta", "roll-damping": "roll_roll", "roll-from-yaw": "roll_yaw",
-    "aileron-power": "roll_aileron", "weathercock": "yaw_beta", "yaw-from-roll": "yaw_roll", "yaw-damping": "yaw_yaw",
-    "adverse-yaw": "yaw_aileron", "rudder-power": "yaw_rudder",
-}  # fmt: skip
+    "lift-slope": "lift_alpha",
+    "zero-lift-drag": "drag_zero",
+    "induced-drag": "drag_induced",
+    "pitch-stiffness": "pitch_alpha",
+    "pitch-damping": "pitch_rate",
+    "elevator-power": "pitch_elevator",
+    "dihedral-effect": "roll_beta",
+    "roll-damping": "roll_roll",
+    "roll-from-yaw": "roll_yaw",
+    "aileron-power": "roll_aileron",
+    "weathercock": "yaw_beta",
+    "yaw-from-roll": "yaw_roll",
+    "yaw-damping": "yaw_yaw",
+    "adverse-yaw": "yaw_aileron",
+    "rudder-power": "yaw_rudder",
+}
 
 
 def written(place: Path, values: np.ndarray, mass: float = 11.0, area: float = BASE.wing_area) -> Aircraft:
@@ -82,9 +92,16 @@ def test_motor_and_propeller_are_those_of_a_model_edited_by_hand(tmp_path: Path)
 def test_a_wing_is_the_wing_edited_by_hand(tmp_path: Path, name: str) -> None:
     base = load_aircraft(name)
     truth = {
-        "zero-lift-drag": 1.2, "induced-drag": 0.8, "thrust": 1.1, "motor-speed": 1.05, "propeller-torque": 1.15,
-        "lift-slope": 1.1, "pitch-stiffness": 0.9, "elevator-power": 1.2, MASS: 1.1,
-    }  # fmt: skip
+        "zero-lift-drag": 1.2,
+        "induced-drag": 0.8,
+        "thrust": 1.1,
+        "motor-speed": 1.05,
+        "propeller-torque": 1.15,
+        "lift-slope": 1.1,
+        "pitch-stiffness": 0.9,
+        "elevator-power": 1.2,
+        MASS: 1.1,
+    }
     edited = changed_wing(base, tmp_path / "edited", truth)
     values = prior_means()
     for key, value in truth.items():

@@ -42,7 +42,7 @@ def changed(parameters: Mapping[str, float] = {}, **fields: Any) -> MotionLog:
         (lambda: changed({"SERVO2_FUNCTION": 0.0}), "no SERVOn_FUNCTION is the elevator's"),
         (lambda: changed(modes=((0.0, 10), (120.0, 19))), "flight on its lifting motors is cut"),
     ],
-)  # fmt: skip
+)
 def test_refusals_are_one_line_each(log: Any, said: str) -> None:
     with pytest.raises(LogError) as refused:
         flight_records(log(), PRIOR)

@@ -20,9 +20,10 @@ def test_a_flight_begun_in_its_own_state_goes_on_as_it_would_have() -> None:
         attitude=(state.roll, state.pitch, state.yaw),
         velocity=(state.velocity_north, state.velocity_east, state.velocity_down),
         rates=(state.roll_rate, state.pitch_rate, state.yaw_rate),
-        wind=(0.0, 0.0, 0.0), amsl=float(state.amsl),
+        wind=(0.0, 0.0, 0.0),
+        amsl=float(state.amsl),
         commands=[state.elevator, state.aileron, state.rudder, state.throttle],
-    )  # fmt: skip
+    )
     second.write(commands)
     for fdm in (first, second):
         fdm.step(60)

@@ -68,7 +68,7 @@ def test_kernels_are_told_once_as_soon_as_they_are_ready(monkeypatch: pytest.Mon
 
 
 @compiled
-def _never_called(number: float) -> float:  # pragma: no cover - compiled
+def _never_called(number: float) -> float:
     return number
 
 
@@ -84,9 +84,12 @@ def test_a_kernel_is_ready_once_it_has_been_called() -> None:
 
 def test_a_unit_that_fails_is_told_and_the_end_of_input_ends_the_process() -> None:
     with subprocess.Popen(
-        [sys.executable, "-m", "planfly.kernel_units"], cwd=ROOT, text=True, stdin=subprocess.PIPE,
+        [sys.executable, "-m", "planfly.kernel_units"],
+        cwd=ROOT,
+        text=True,
+        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-    ) as helper:  # fmt: skip
+    ) as helper:
         assert helper.stdin is not None
         assert helper.stdout is not None
         helper.stdin.write("no-such-unit\n")

@@ -102,9 +102,12 @@ def make_inputs(folder: Path, flight: Path, broken: Path, *, imported: bool) -> 
     if not imported:
         return folder
     subprocess.run(
-        [sys.executable, "-m", "planfly", "import", "tight.BIN", "imported.mcap"], cwd=folder, check=False,
-        capture_output=True, env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
+        [sys.executable, "-m", "planfly", "import", "tight.BIN", "imported.mcap"],
+        cwd=folder,
+        check=False,
+        capture_output=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
     assert (folder / "imported.mcap").is_file()
     return folder
 
@@ -139,10 +142,15 @@ def give(
     kept = {name: value for name, value in os.environ.items() if name not in removed}
     with said.open("w", encoding="utf-8") as errors:
         process = subprocess.Popen(
-            [*program, *given.argv], cwd=folder, stdin=subprocess.DEVNULL, stdout=errors, stderr=subprocess.STDOUT,
+            [*program, *given.argv],
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=errors,
+            stderr=subprocess.STDOUT,
             env=kept | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"} | environment,
-            start_new_session=True, preexec_fn=change,
-        )  # fmt: skip
+            start_new_session=True,
+            preexec_fn=change,
+        )
     try:
         if given.name in READY and serves:
             until = time.monotonic() + limit

@@ -137,10 +137,13 @@ def test_a_campaign_survives_a_clock_that_is_set_back_and_forth(tmp_path: Path) 
     (tmp_path / "site" / "sitecustomize.py").write_text(SET.format(back=str(back), forth=str(forth)), encoding="utf-8")
     argv = ["campaign", "short.waypoints", "--scenario", "field.toml", "--flights", str(FLIGHTS), "--workers", "2"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "planfly", *argv, "--out", "out", "--overwrite"], cwd=tmp_path, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        [sys.executable, "-m", "planfly", *argv, "--out", "out", "--overwrite"],
+        cwd=tmp_path,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         env=os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path / "site"), *filter(None, sys.path)])},
-    )  # fmt: skip
+    )
     until = time.monotonic() + 300.0
     for flag in (back, forth, back):
         begun = logged(tmp_path / "out")

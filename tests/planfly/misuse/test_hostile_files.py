@@ -66,9 +66,12 @@ def judge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Judge]:
     """Run planfly in a folder: exit code, seconds of work, what it printed on standard error."""
     said = tmp_path_factory.mktemp("said")
     process = subprocess.Popen(
-        [sys.executable, "-c", CHILD], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        [sys.executable, "-c", CHILD],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
+    )
     assert process.stdin is not None
     assert process.stdout is not None
     asked, answers = process.stdin, process.stdout

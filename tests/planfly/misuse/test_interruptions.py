@@ -141,11 +141,16 @@ def _interrupted(case: Case, inputs: Path, folder: Path, temporary: Path) -> tup
     said = folder / "said"
     with said.open("w") as out:
         process = subprocess.Popen(
-            [sys.executable, "-m", "planfly", *case.argv], cwd=work, env=environment, stdin=subprocess.DEVNULL,
-            stdout=out, stderr=subprocess.STDOUT, start_new_session=True,
+            [sys.executable, "-m", "planfly", *case.argv],
+            cwd=work,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
             # Some shells start what they run in the background deaf.
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-        )  # fmt: skip
+        )
     try:
         until = time.monotonic() + 900.0
         while process.poll() is None and not begun_work(case, said, work):

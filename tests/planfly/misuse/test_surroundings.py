@@ -40,9 +40,15 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def program(*argv: str, change: Callable[[], None] | None = None, **environment: str) -> Done:
     """Run a command in a process of its own; change: what is done to the process first."""
     return subprocess.run(
-        [sys.executable, "-m", "planfly", *argv], capture_output=True, text=True, check=False, timeout=300,
-        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment, preexec_fn=change, errors="surrogateescape",
-    )  # fmt: skip
+        [sys.executable, "-m", "planfly", *argv],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
+        preexec_fn=change,
+        errors="surrogateescape",
+    )
 
 
 def test_closed_streams(folder: Path) -> None:
@@ -61,9 +67,13 @@ def test_closed_streams(folder: Path) -> None:
 def test_a_full_disk_under_standard_output(folder: Path) -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
-            [sys.executable, "-m", "planfly", "scenarios"], stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+            [sys.executable, "-m", "planfly", "scenarios"],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
             env=os.environ | {"PYTHONPATH": str(ROOT)},
-        )  # fmt: skip
+        )
     assert (done.returncode, done.stderr) == (1, "planfly: standard output: No space left on device\n")
 
 
@@ -104,9 +114,12 @@ def test_no_home_and_no_cache(changes: dict[str, str]) -> None:
     cached = ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
     environment = {name: value for name, value in os.environ.items() if name not in cached}
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False,
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=False,
         env=environment | {"PYTHONPATH": str(ROOT)} | changes,
-    )  # fmt: skip
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, "[[0.0]]\n", "")
 
 
@@ -177,11 +190,16 @@ def test_a_link_that_leads_to_itself(argv: tuple[str, str], folder: Path, capsys
 @pytest.mark.parametrize(
     "argv",
     [
-        ("check", "pipe.waypoints"), ("check", "pipe.mcap"), ("check", "pipe.gpx"), ("plan", "pipe.toml"),
-        ("check", "m.waypoints", "--params", "pipe.parm"), ("check", "m.waypoints", "--fence", "pipe.waypoints"),
-        ("check", "m.waypoints", "--terrain", "pipe.tif"), ("check", "m.waypoints", "--aircraft", "./pipe"),
+        ("check", "pipe.waypoints"),
+        ("check", "pipe.mcap"),
+        ("check", "pipe.gpx"),
+        ("plan", "pipe.toml"),
+        ("check", "m.waypoints", "--params", "pipe.parm"),
+        ("check", "m.waypoints", "--fence", "pipe.waypoints"),
+        ("check", "m.waypoints", "--terrain", "pipe.tif"),
+        ("check", "m.waypoints", "--aircraft", "./pipe"),
     ],
-)  # fmt: skip
+)
 def test_a_pipe_that_nobody_writes_into_is_not_waited_for(
     argv: tuple[str, ...], folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -112,8 +112,10 @@ def test_tables_hold_the_plans_and_only_times_csv_their_time(tmp_path: Path) -> 
     write_tables(tmp_path, table(PLANS), PLANS)
     rows = read_csv(tmp_path / "runs.csv")
     assert [(row["algorithm"], row["seed"], row["safe"]) for row in rows] == [
-        ("a", "1", "True"), ("a", "2", "False"), ("b", "1", "False")
-    ]  # fmt: skip
+        ("a", "1", "True"),
+        ("a", "2", "False"),
+        ("b", "1", "False"),
+    ]
     assert [float(row["length_ratio"]) for row in rows] == [1.2, 1.1, 1.0]
     assert [float(row["detection_exposure"]) for row in rows] == [2.0, 4.0, 2.0]
     data = json.loads((tmp_path / "runs.json").read_text(encoding="utf-8"))

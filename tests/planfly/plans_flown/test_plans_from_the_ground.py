@@ -9,7 +9,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import Command, Mission, MissionItem
@@ -21,10 +20,9 @@ from planfly.workflow.pipeline import fly_and_judge
 from tests.autopilots import need_arduplane
 from tests.ground_missions import draw_field
 from tests.soak import SOAK, note, scaled
+from world.arrays import Floats
 from world.frames import to_map
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 
 def metres(a: Floats, b: Floats) -> Floats:

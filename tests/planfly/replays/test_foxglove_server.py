@@ -112,10 +112,18 @@ def test_a_viewer_is_given_the_log(log_path: Path, track: Track) -> None:
         while len(viewer.channels) < 15 and time.monotonic() < deadline:
             viewer.take(1.0)
         assert set(viewer.channels) == {
-            "/state", "/tf", "/fix", "/log", "/scene/terrain", "/scene/threats", "/scene/zones", "/scene/plan",
-            "/scene/track", "/scene/aircraft",
+            "/state",
+            "/tf",
+            "/fix",
+            "/log",
+            "/scene/terrain",
+            "/scene/threats",
+            "/scene/zones",
+            "/scene/plan",
+            "/scene/track",
+            "/scene/aircraft",
             *(f"/points/{part}" for part in ("terrain", "threats", "plan", "track", "aircraft")),
-        }  # fmt: skip
+        }
         state = viewer.channels["/state"]
         assert (state["encoding"], state["schemaName"], state["schemaEncoding"]) == (
             "protobuf",

@@ -46,8 +46,11 @@ def test_a_log_is_played_into_a_station(tmp_path: Path, served_log: Path) -> Non
         port = station.socket.getsockname()[1]
         play = subprocess.Popen(
             [sys.executable, "-m", "planfly", "replay", str(served_log), "--to", f"127.0.0.1:{port}", "--speed", "8"],
-            cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         station.socket.settimeout(60.0)
         _, station.to = station.socket.recvfrom(4096)
         station.socket.settimeout(0.01)

@@ -85,9 +85,14 @@ def test_a_folder_takes_the_frames(log_path: Path, tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_filmed(
-    target: str, more: tuple[str, ...], message: str, log_path: Path, tmp_path: Path,
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+    target: str,
+    more: tuple[str, ...],
+    message: str,
+    log_path: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.chdir(tmp_path)
@@ -99,9 +104,13 @@ def test_what_cannot_be_filmed(
 
 @pytest.mark.parametrize("extra", [False, True])
 def test_an_mp4_is_what_ffmpeg_makes_of_the_frames(
-    extra: bool, wanted: list[np.ndarray], log_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    extra: bool,
+    wanted: list[np.ndarray],
+    log_path: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+) -> None:
     """A program in place of ffmpeg, on the path or of the extra, keeps its arguments and its input."""
     fake = tmp_path / "ffmpeg"
     fake.write_text(

@@ -115,9 +115,13 @@ def test_a_user_who_can_write_no_cache_gets_results_and_the_way_out(given: dict[
     path = f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
     environment = {"PATH": os.environ["PATH"], "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"} | given
     done = subprocess.run(
-        [sys.executable, "-c", OWNS_NOTHING + CODE], cwd="/", env=environment, capture_output=True, text=True,
+        [sys.executable, "-c", OWNS_NOTHING + CODE],
+        cwd="/",
+        env=environment,
+        capture_output=True,
+        text=True,
         check=False,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     (line,) = (one for one in done.stderr.splitlines() if "cannot be written" in one)
     assert line.startswith("compiling the numeric kernels for this command alone: ")

@@ -62,9 +62,12 @@ class Studio:
     def _start_process(self) -> None:
         command = [sys.executable, "-m", "planfly", "studio", "m.waypoints", "--scenario", "jacksboro", "--no-browser"]
         self.process = subprocess.Popen(
-            [*command, "--port", str(self.port), "--keep", "kept"], cwd=self.folder, stdout=subprocess.PIPE, text=True,
+            [*command, "--port", str(self.port), "--keep", "kept"],
+            cwd=self.folder,
+            stdout=subprocess.PIPE,
+            text=True,
             env=os.environ | {"PYTHONPATH": str(ROOT)},
-        )  # fmt: skip
+        )
         assert self.process.stdout is not None
         line = ""
         while "#t=" not in line:

@@ -167,8 +167,11 @@ def test_a_mission_slower_than_the_aircraft_flies_is_made_faster(
     rows.insert(2, "1\t0\t2\t178\t0\t2\t-1\t0\t0\t0\t0\t1")
     rows.append("20\t0\t2\t178\t0\t16\t-1\t0\t0\t0\t0\t1")
     path = tmp_path / "slow.waypoints"
-    path.write_text("\n".join("\t".join([str(k), *row.split("\t")[1:]]) if k >= 0 else row
-                              for k, row in enumerate(rows, -1)) + "\n", encoding="ascii")  # fmt: skip
+    path.write_text(
+        "\n".join("\t".join([str(k), *row.split("\t")[1:]]) if k >= 0 else row for k, row in enumerate(rows, -1))
+        + "\n",
+        encoding="ascii",
+    )
 
     def speeds(mission: Mission) -> list[float]:
         return [item.params[1] for item in mission.items if item.command == Command.DO_CHANGE_SPEED]

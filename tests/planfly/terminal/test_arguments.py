@@ -83,9 +83,14 @@ def proposed(line: str, folder: Path) -> list[str]:
     """What planfly proposes for the end of a line, by the protocol of argcomplete's scripts."""
     told = folder / "told"
     environment = os.environ | {
-        "_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n", "COMP_LINE": line, "COMP_POINT": str(len(line)),
-        "COMP_TYPE": "9", "_ARGCOMPLETE_STDOUT_FILENAME": str(told), "_ARGCOMPLETE_SHELL": "bash",
-    }  # fmt: skip
+        "_ARGCOMPLETE": "1",
+        "_ARGCOMPLETE_IFS": "\n",
+        "COMP_LINE": line,
+        "COMP_POINT": str(len(line)),
+        "COMP_TYPE": "9",
+        "_ARGCOMPLETE_STDOUT_FILENAME": str(told),
+        "_ARGCOMPLETE_SHELL": "bash",
+    }
     told.write_text("", encoding="utf-8")
     subprocess.run([sys.executable, "-m", "planfly"], env=environment, cwd=folder, check=True)
     return [word.strip() for word in told.read_text(encoding="utf-8").split("\n")]

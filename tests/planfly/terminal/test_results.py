@@ -41,9 +41,20 @@ def test_an_unfinished_log_ends_with_3_and_its_end_time(
 
 def slope(leg: int, flown: float, limit: float) -> Finding:
     return Finding(
-        "slope", Place("leg", leg), 4.0, flown, limit, "aircraft", 0.1, limit - flown, "deg", "fit", flown <= limit,
-        f"leg {leg} is as it is", suggestions=((Change("length", Place("leg", leg), 300.0, 400.0, "m"),),),
-    )  # fmt: skip
+        "slope",
+        Place("leg", leg),
+        4.0,
+        flown,
+        limit,
+        "aircraft",
+        0.1,
+        limit - flown,
+        "deg",
+        "fit",
+        flown <= limit,
+        f"leg {leg} is as it is",
+        suggestions=((Change("length", Place("leg", leg), 300.0, 400.0, "m"),),),
+    )
 
 
 def printed(capsys: pytest.CaptureFixture[str], verdict: Verdict, *notes: str) -> list[str]:

@@ -60,9 +60,12 @@ def test_a_process_ends_whatever_it_does(body: str, number: signal.Signals, tmp_
     text, least = BODIES[body]
     mine = tmp_path / "mine"
     process = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM.format(body=text), str(mine)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        start_new_session=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )  # fmt: skip
+        [sys.executable, "-c", PROGRAM.format(body=text), str(mine)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     assert process.stdout is not None
     assert process.stdout.readline() == b"begun\n"
     time.sleep(0.2)
@@ -84,10 +87,12 @@ def test_a_kernel_is_not_interrupted_where_numba_makes_its_results(tmp_path: Pat
     mine = tmp_path / "mine"
     body = "while True: spin(40_000_000)"
     process = subprocess.Popen(
-        [sys.executable, "-c", SPINNING + PROGRAM.format(body=body), str(mine)], stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True,
+        [sys.executable, "-c", SPINNING + PROGRAM.format(body=body), str(mine)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )  # fmt: skip
+    )
     assert process.stdout is not None
     assert process.stdout.readline() == "begun\n"
     time.sleep(0.1)
@@ -143,9 +148,11 @@ def test_it_ends_in_time_where_no_pipe_can_be_told_not_to_block(tmp_path: Path) 
     text, least = BODIES["in C"]
     program = "import os\ndel os.set_blocking\n" + PROGRAM.format(body=text)
     process = subprocess.Popen(
-        [sys.executable, "-c", program, str(tmp_path / "mine")], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        [sys.executable, "-c", program, str(tmp_path / "mine")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         start_new_session=True,
-    )  # fmt: skip
+    )
     assert process.stdout is not None
     assert process.stdout.readline() == b"begun\n"
     time.sleep(0.2)

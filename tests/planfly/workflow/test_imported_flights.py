@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from pyproj import Geod
 
 from logs.importers.imported_flight import make_flight
@@ -22,11 +21,9 @@ from planfly.flight_options import LogOptions
 from planfly.workflow.imported_flights import ImportedFlight, fly_again, import_flight
 from tests.logs.importers.judged_flights import judged
 from tests.logs.importers.pymavlink_rows import FLIGHTS, mission_lines, read_rows
+from world.arrays import Floats
 from world.errors import LogError
 from world.scenario import load_scenario
-
-Floats = NDArray[np.float64]
-
 
 TRUTH: dict[str, Any] = json.loads((FLIGHTS / "truth.json").read_text())
 SCENARIOS = {"tight": "tight", "steep": "steep", "ridge-10mps": str(FLIGHTS / "ridge-10mps.toml")}

@@ -198,8 +198,11 @@ def test_the_aircraft_can_and_arduplane_cannot(flown: tuple[JudgedFlight, Path])
     deciding = judged.verdict.deciding
     assert deciding is not None
     assert (deciding.name, deciding.current, deciding.rule, deciding.place.index) == (
-        "TECS_HDEM_TCONST", 3.0, "clearance", 1,
-    )  # fmt: skip
+        "TECS_HDEM_TCONST",
+        3.0,
+        "clearance",
+        1,
+    )
     assert deciding.passing == pytest.approx((4.7 - 1.2) / climb, abs=0.4)
     # And what the start of the climb takes.
     assert deciding.off == pytest.approx(-3.0 * climb, abs=2.5)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.envelope import turn_radius
 from aircraft.path_limits import Limits
@@ -21,9 +20,6 @@ from planner.evaluation.certify_kernels import (
 from planner.evaluation.problem import ANGLE_MARGIN, BUFFER_GROWTH, ProblemArrays, make_problem
 from tests.planner.tracking_limits import with_tracking_error
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
-
 
 Make = Callable[[Scenario], Limits]
 FLAT = {"kind": "flat", "amsl_m": 20}

@@ -7,18 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, downwind
 from planner.evaluation.corners import LEG, measure_legs
 from planner.evaluation.problem import SlopeBounds, make_problem, required_clearance
 from planner.evaluation.terrain_clearance import HEIGHT_LAG, lag_at, measure_lags, terrain_excess
 from tests.planner.tracking_limits import with_tracking_error
+from world.arrays import Floats
 from world.kernels import read_only
 from world.scenario import Scenario
 from world.terrain import TILE, steepest_slopes
-
-Floats = NDArray[np.float64]
 
 
 def test_steepest_slopes_bound_the_ground_of_each_tile() -> None:

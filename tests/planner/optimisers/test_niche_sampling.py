@@ -1,13 +1,9 @@
 """Groups of rows: the best that lie apart are kept, new rows stand around them, and none that is not allowed."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.optimisers.niche_sampling import CLEARING, MIN_SELECTED, NicheSampling
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from world.arrays import Flags, Floats, Ints
 
 LOWER, UPPER = np.array([[0.0, -10.0], [5.0, -20.0]]), np.array([[5.0, 10.0], [10.0, 20.0]])
 

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.certify import certify
@@ -12,9 +11,8 @@ from planner.evaluation.problem import Problem, make_problem
 from planner.plan import Plan
 from planner.search.fewer_waypoints import drop_waypoints
 from tests.setups import small_scenario
+from world.arrays import Floats
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 # Past the hill at (2000, 200) and the missile of 700 m at (4200, -200): the straight line meets both.
 AROUND = [[0.0, 0.0, 150.0], [2000.0, 1400.0, 180.0], [6000.0, 0.0, 150.0]]

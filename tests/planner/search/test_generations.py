@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.encoding import ENCODINGS
@@ -20,10 +19,9 @@ from planner.search.plan_path import plan_path
 from planner.search.search_state import Search, best_first
 from planner.seeding.waypoint_chains import WaypointChains, waypoint_chains
 from tests.soak import some
+from world.arrays import Floats
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario, load_scenario, with_planner
-
-Floats = NDArray[np.float64]
 
 
 def search_of(scenario: Scenario, limits: Limits, algorithm: str) -> Search:

@@ -73,9 +73,14 @@ def test_a_large_problem_is_planned(
     plan = plan_path(scenario, make_limits(scenario), seed=1, algorithm=algorithm)
     note(
         f"planner: large problem, {algorithm}",
-        threats=THREATS, pixels=SIDE**2, waypoints=WAYPOINTS, population=POPULATION, feasible=int(plan.feasible),
-        cpu_s=round(time.process_time() - began), peak_mb=round(peak() / 1e6),
-    )  # fmt: skip
+        threats=THREATS,
+        pixels=SIDE**2,
+        waypoints=WAYPOINTS,
+        population=POPULATION,
+        feasible=int(plan.feasible),
+        cpu_s=round(time.process_time() - began),
+        peak_mb=round(peak() / 1e6),
+    )
     if SOAK:
         with capsys.disabled():
             print(

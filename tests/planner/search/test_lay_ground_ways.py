@@ -8,18 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planfly.workflow.airframe import load_airframe
 from planner.plan import Certificate, Plan
 from planner.search.lay_ground_ways import FinalLaw, with_ground_ways
 from tests.setups import spec_around
+from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario, from_spec
 from world.terrain import Terrain, gridded
 
-Floats = NDArray[np.float64]
 Ground = Callable[[Floats, Floats], Floats]
 
 BASE, HALF, GRID = 100.0, 6000.0, 20.0

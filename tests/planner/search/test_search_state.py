@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planfly.workflow.airframe import load_airframe
@@ -43,12 +42,10 @@ from planner.seeding import (
 )
 from tests.fresh_plans import fresh_scenario
 from tests.soak import SOAK
+from world.arrays import Floats
 from world.errors import ScenarioError
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario, load_scenario, with_planner
-
-Floats = NDArray[np.float64]
-
 
 SCORES = score_table(
     np.array([[1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 2]]),

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import planner.search.plan_path as plan_path_module
 import planner.search.seeds as seeds_module
@@ -23,12 +22,11 @@ from planner.search.seeds import MIN_DETOUR, search_other_sides, search_turning_
 from planner.seeding.grids import GridRoute
 from tests.instances import random_scenario
 from tests.soak import some
+from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario, from_spec, load_scenario
 from world.scenario_file import parse_scenario
-
-Floats = NDArray[np.float64]
 
 FLAT = {"kind": "flat", "amsl_m": 0}
 GRIDS = ((24, 2),)

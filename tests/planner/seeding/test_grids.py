@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.encoding import RotatedFrame, rotated_frame
@@ -30,10 +29,9 @@ from planner.seeding.grids import (
     set_cell_costs,
     trace_back,
 )
+from world.arrays import Floats
 from world.kernels import read_only
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 
 @pytest.fixture

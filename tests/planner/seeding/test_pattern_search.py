@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.encoding import ENCODINGS, Encoding, rotated_vectors
@@ -15,9 +14,8 @@ from planner.plan import Objective
 from planner.search.search_state import score_table, violated
 from planner.seeding import pattern_search
 from planner.seeding.pattern_search import merits, search_patterns
+from world.arrays import Floats
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 
 @pytest.mark.parametrize("most", [60, 400])

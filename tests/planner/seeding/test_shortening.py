@@ -5,7 +5,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from benchmarks.planning.smooth_search import Programme
@@ -23,10 +22,9 @@ from planner.seeding.shortening import (
     resample,
     shorten_path,
 )
+from world.arrays import Floats
 from world.geometry import path_length
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 
 def test_waypoints_stay_on_the_map_and_between_floor_and_ceiling() -> None:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.encoding import rotated_frame
@@ -27,9 +26,6 @@ from planner.seeding.side_routes import (
     sides_passed,
 )
 from world.scenario import Scenario
-
-Floats = NDArray[np.float64]
-
 
 # Six stages of 1 km over level ground; places 1 km apart.
 GRID = Grid(6, np.arange(-2.0, 3.0) * 1000.0, np.array([150.0, 450.0]))

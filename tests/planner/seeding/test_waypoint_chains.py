@@ -6,16 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.leg_constraints import precompute_limits
 from planner.evaluation.problem import Problem, ProblemArrays, make_problem
 from planner.seeding.waypoint_chains import free_points, waypoint_chains
 from planner.seeding.waypoint_fitting import leg_cost
+from world.arrays import Floats
 from world.scenario import Scenario
 
-Floats = NDArray[np.float64]
 FLAT = {"kind": "flat", "amsl_m": 0}
 INNER, EACH = 4, 4
 UP = np.array([0.0, 0.0, 1.0])

@@ -4,15 +4,14 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.encoding import ENCODINGS, rotated_vectors
 from planner.evaluation.problem import make_problem
 from planner.seeding.waypoint_fitting import tighten
+from world.arrays import Floats
 from world.scenario import Scenario
 
-Floats = NDArray[np.float64]
 FLAT = {"kind": "flat", "amsl_m": 0}
 
 

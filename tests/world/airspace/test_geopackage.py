@@ -97,7 +97,7 @@ def test_what_is_no_geopackage(content: bytes | None, said: str, tmp_path: Path)
         blob(SQUARE)[:20],
         blob(SQUARE).replace(b"\x03\x00\x00\x00", b"\x63\0\0\0", 1),
     ],
-)  # fmt: skip
+)
 def test_a_geometry_that_is_none_is_named_by_its_row(geometry: bytes | None, tmp_path: Path) -> None:
     rows = [(1, blob(SQUARE), "lake", None, None, None), (2, geometry, "mast", None, None, None)]
     with pytest.raises(ScenarioError, match=r"^z.gpkg: my zones row 2: geometry: a polygon"):

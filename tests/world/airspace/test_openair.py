@@ -188,10 +188,18 @@ def test_an_airway_is_its_width_wide() -> None:
 @pytest.mark.parametrize(
     ("stated", "free"),
     [
-        ("AC G", True), ("AC E", True), ("AC E\nAY RMZ", False), ("AC UNC\nAY NONE", True), ("AC UNC\nAY P", False),
-        ("AC D", False), ("AC CTR", False), ("AC G\nAY FIS", True), ("AC GP", False), ("AC W", True),
+        ("AC G", True),
+        ("AC E", True),
+        ("AC E\nAY RMZ", False),
+        ("AC UNC\nAY NONE", True),
+        ("AC UNC\nAY P", False),
+        ("AC D", False),
+        ("AC CTR", False),
+        ("AC G\nAY FIS", True),
+        ("AC GP", False),
+        ("AC W", True),
     ],
-)  # fmt: skip
+)
 def test_airspace_that_is_open_to_all_keeps_nobody_out(stated: str, free: bool) -> None:
     ((_, entries),) = openair_zones(f"{stated}\nAN LAKE\n{SQUARE}", "z.openair")
     assert isinstance(entries, str) == free

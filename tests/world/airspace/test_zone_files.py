@@ -519,12 +519,14 @@ def square_at(name: str, lat: float, lon: float, **more: Any) -> dict[str, Any]:
 def test_zones_far_from_the_area_are_left_out(tmp_path: Path) -> None:
     """The small area reaches some km from 46 N, 8 E: 0.2 degrees of latitude are 22.2 km, 0.15 are 16.7 km."""
     country = [
-        square_at("near", 46.15, 8.0), square_at("far", 46.4, 8.0), square_at("farther", 46.0, 9.0),
+        square_at("near", 46.15, 8.0),
+        square_at("far", 46.4, 8.0),
+        square_at("farther", 46.0, 9.0),
         feature("Point", [9.0, 46.0], radius_m=60_000) | {"properties": {"name": "wide", "radius_m": 60_000}},
         square_at("antipode", -46.0, -171.0),
         # An inclusion of the whole country counts wherever it is.
         feature("Polygon", [[[5.0, 44.0], [11.0, 44.0], [11.0, 48.0], [5.0, 48.0]]], kind="inclusion", name="town"),
-    ]  # fmt: skip
+    ]
     (tmp_path / "all.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": country}))
     file = tmp_path / "small.toml"
     file.write_text(f'zones_file = "all.geojson"\n{SMALL}', encoding="utf-8")

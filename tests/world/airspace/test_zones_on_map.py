@@ -150,9 +150,14 @@ def test_which_zone_a_place_violates() -> None:
     mast = Zone("mast", "exclusion", Cylinder(0.0, 0.0, 200.0), ZoneLevel(100.0, "amsl"), ZoneLevel(300.0, "amsl"))
     field = Zone("field", "inclusion", Cylinder(0.0, 0.0, 500.0), None, ZoneLevel(400.0, "amsl"))
     cases = {
-        (0.0, 0.0, 200.0): mast, (0.0, 199.9, 101.0): mast, (0.0, 200.1, 101.0): None, (0.0, 0.0, 99.0): None,
-        (0.0, 0.0, 301.0): None, (0.0, 0.0, 401.0): field, (0.0, 501.0, 200.0): field,
-    }  # fmt: skip
+        (0.0, 0.0, 200.0): mast,
+        (0.0, 199.9, 101.0): mast,
+        (0.0, 200.1, 101.0): None,
+        (0.0, 0.0, 99.0): None,
+        (0.0, 0.0, 301.0): None,
+        (0.0, 0.0, 401.0): field,
+        (0.0, 501.0, 200.0): field,
+    }
     for place, wanted in cases.items():
         assert zone_broken_at([mast, field], np.array(place), None) is wanted
     # Over unknown ground a place counts as within a band above ground: an exclusion's, and an inclusion's.

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from pyproj import Transformer
 from rasterio.transform import Affine
 
+from world.arrays import Floats
 from world.errors import TerrainError
 from world.frames import GeoOrigin
 from world.raster import open_raster, read_terrain
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
 
 
 def from_origin(west: float, north: float, width: float, height: float) -> Affine:

@@ -11,7 +11,6 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import find_again
 from flight.mission.ground_ways import Approach
@@ -23,11 +22,10 @@ from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
 from tests.setups import spec_around
 from world.airfield import LandingStrip, Launch
+from world.arrays import Floats
 from world.frames import to_geo
 from world.scenario import Scenario, from_spec, load_scenario
 from world.wind import Wind
-
-Floats = NDArray[np.float64]
 
 FOLDER = Path(__file__).with_name("kept_landings")
 FLIGHTS: dict[str, dict[str, Any]] = json.loads((FOLDER / "flights.json").read_text(encoding="utf-8"))
@@ -114,10 +112,14 @@ def circuit(
     world: further tables of the scenario.
     """
     spec = spec_around(
-        [[0.0, 0.0, 60.0], [1500.0, 600.0, 54.0]], buffer=3000.0, ceiling=1000.0,
-        origin={"lat_deg": 46.0, "lon_deg": 8.0}, flight={"aircraft": aircraft},
-        wind={"speed_mps": wind[0], "from_deg": wind[1]}, **world,
-    )  # fmt: skip
+        [[0.0, 0.0, 60.0], [1500.0, 600.0, 54.0]],
+        buffer=3000.0,
+        ceiling=1000.0,
+        origin={"lat_deg": 46.0, "lon_deg": 8.0},
+        flight={"aircraft": aircraft},
+        wind={"speed_mps": wind[0], "from_deg": wind[1]},
+        **world,
+    )
     scenario = replace(from_spec(spec, "circuit"), launch=launch, landing=strip)
 
     def place(east: float, north: float) -> tuple[float, float]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -18,6 +17,7 @@ from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
+from world.arrays import Floats
 from world.frames import to_geo
 from world.scenario import Scenario, load_scenario
 from world.wind import Wind
@@ -31,8 +31,6 @@ NEAR = 200.0
 _LEAD = 500.0
 # ArduPlane and its law are so late (s) on a slope: TECS_HDEM_TCONST.
 _LATE = 3.0
-
-Floats = NDArray[np.float64]
 
 
 def _rows(name: str) -> list[dict[str, str]]:

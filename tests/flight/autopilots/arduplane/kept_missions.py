@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -18,11 +17,11 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
+from world.arrays import Floats
 from world.frames import GeoOrigin, to_map
 from world.scenario import from_spec
 
 FOLDER = Path(__file__).with_name("kept_circles")
-Floats = NDArray[np.float64]
 
 CORNERS = ("corners-30", "corners-35")
 CIRCLES = ("turns-500", "turns-1300", "turns-2000", "time", "time-left", "to-height", "circles-wind")

@@ -9,17 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem
 from flight.simulation.setup import FlightSetup
 from tests.flight.autopilots.arduplane.flown_grounds import HOME, RAIL, Flown, fly, make_ground_setup
 from world.airfield import LandingStrip
+from world.arrays import Floats
 from world.frames import to_geo
 from world.scenario import Scenario, load_scenario
 from world.wind import Wind
-
-Floats = NDArray[np.float64]
 
 FOLDER = Path(__file__).with_name("kept_sequences")
 FLIGHTS: dict[str, dict[str, Any]] = json.loads((FOLDER / "flights.json").read_text(encoding="utf-8"))

@@ -24,9 +24,14 @@ def record(dtype: np.dtype[np.record], **values: Any) -> Record:
 def flying(east: float = 0.0, north: float = 0.0, up: float = 500.0, course: float = 0.0, climb: float = 0.0) -> Record:
     """At a place, at 25 m/s over the ground on a course (rad)."""
     return record(
-        MOTION, east=east, north=north, up=up, velocity_east=25.0 * math.sin(course),
-        velocity_north=25.0 * math.cos(course), velocity_up=climb,
-    )  # fmt: skip
+        MOTION,
+        east=east,
+        north=north,
+        up=up,
+        velocity_east=25.0 * math.sin(course),
+        velocity_north=25.0 * math.cos(course),
+        velocity_up=climb,
+    )
 
 
 def waypoints(*points: tuple[float, float, float], **fields: Any) -> np.ndarray:

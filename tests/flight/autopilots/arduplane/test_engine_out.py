@@ -118,11 +118,16 @@ def test_above_its_slope_it_dives_onto_it() -> None:
     begin = start(up=900.0, velocity_north=26.0)
     far, near = (
         fly_returns(
-            begin, [ReturnCircle(0.0, away, 400.0, 120.0)], parameters(), aerosonde(Wind()), flat(), keep=True,
+            begin,
+            [ReturnCircle(0.0, away, 400.0, 120.0)],
+            parameters(),
+            aerosonde(Wind()),
+            flat(),
+            keep=True,
             engine_out=True,
         ).ways[0]
         for away in (9000.0, 4000.0)
-    )  # fmt: skip
+    )
     assert near[60, 2] == pytest.approx(900.0 - 500.0 * near[60, 1] / 4000.0, abs=25.0)
     assert near[60, 1] - near[59, 1] > 22.0
     assert far[200, 1] - far[199, 1] < 19.5

@@ -10,8 +10,9 @@ from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT, RET
 from flight.mission.ground_ways import Approach
 from flight.mission.placing import landing_sequence
 from logs.verdict.returns.judge_returns import return_world
-from tests.flight.autopilots.arduplane.flown_grounds import Floats, Flown
+from tests.flight.autopilots.arduplane.flown_grounds import Flown
 from tests.flight.autopilots.arduplane.kept_sequences import flown_sequence, kept_sequence, kept_setup
+from world.arrays import Floats
 from world.kernels import Records
 
 returns = pytest.mark.parametrize("flight", ["autoland-1", "autoland-2"])

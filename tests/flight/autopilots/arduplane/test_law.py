@@ -48,8 +48,16 @@ def test_counts_are_whole_and_all_else_are_numbers() -> None:
     assert {name for name, kind in kinds.items() if kind == np.int64} == {"leg", "held", "left_for", "ground_leg"}
     truths = {name for name, kind in kinds.items() if kind == np.bool_}
     assert truths == {
-        "begun", "flown", "on_circle", "loitering", "at_height", "over", "returning", "climbed", "under",
-    }  # fmt: skip
+        "begun",
+        "flown",
+        "on_circle",
+        "loitering",
+        "at_height",
+        "over",
+        "returning",
+        "climbed",
+        "under",
+    }
     assert all(kind == np.float64 for kind in kinds.values() if kind not in (np.int64, np.bool_))
 
 
@@ -435,8 +443,9 @@ def test_the_same_setup_gives_the_same_flight(
 ) -> None:
     setup = replace(
         make_setup([[0, 0, 500.0], [0, 800, 520.0], [800, 1000, 500.0]], wind=(6.0, 200.0), turbulence="moderate"),
-        autopilot=ArduPlane(usual), nav="gnss",
-    )  # fmt: skip
+        autopilot=ArduPlane(usual),
+        nav="gnss",
+    )
     first, second = (fly_to_end(Flight(setup, aerosonde)) for _ in range(2))
     assert first.ended == "completed"
     assert np.array_equal(first.track.position, second.track.position)

@@ -78,9 +78,11 @@ def swift(flight: str) -> tuple[str, SwiftReturns]:
         FLIGHT_OPTIONS=float(row["flight_options"]),
     )
     begin = start(
-        east=float(row["east_m"]), north=float(row["north_m"]), up=float(row["amsl_m"]),
+        east=float(row["east_m"]),
+        north=float(row["north_m"]),
+        up=float(row["amsl_m"]),
         **{f"velocity_{way}": float(row[f"velocity_{way}_mps"]) for way in ("east", "north", "up")},
-    )  # fmt: skip
+    )
     rules = ArduPlane(made).return_rules
     points = [
         ReturnPlace(east, north, HOME[2] + up, HOME[2], k) for k, (east, north, up) in enumerate(rally(flight), 1)

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane_sitl import physics
@@ -23,9 +22,8 @@ from tests.flight.autopilots.arduplane_sitl.conftest import MakeFake
 from tests.mission_lines import setup_of, wp
 from tests.setups import setup_maker
 from tests.soak import SOAK, some
+from world.arrays import Floats
 from world.errors import FlightError
-
-Floats = NDArray[np.float64]
 
 AEROSONDE = load_aircraft("aerosonde")
 MAKE = setup_maker(AEROSONDE)

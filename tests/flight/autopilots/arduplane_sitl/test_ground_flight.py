@@ -85,9 +85,12 @@ def test_the_rail_of_a_launch_is_as_steep_and_as_quick_as_the_launch() -> None:
     assert take_off is not None
     place, velocity = take_off.release()
     begin = Release(
-        (46.0, 8.0, float(place[2])), (0.0, RAIL.incline, math.radians(90.0)),
-        (0.0, float(velocity[0]), -float(velocity[2])), (0.0, 0.0, 0.0), 0.0,
-    )  # fmt: skip
+        (46.0, 8.0, float(place[2])),
+        (0.0, RAIL.incline, math.radians(90.0)),
+        (0.0, float(velocity[0]), -float(velocity[2])),
+        (0.0, 0.0, 0.0),
+        0.0,
+    )
     rail = launch_rail(begin, take_off)
     assert rail.push_time == pytest.approx(0.6)
     origin = (math.radians(46.0), math.radians(8.0), 0.0)

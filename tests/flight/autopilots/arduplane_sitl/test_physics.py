@@ -284,8 +284,11 @@ def test_the_controls_come_from_their_outputs(tmp_path: Path) -> None:
     pulses[0], pulses[1], pulses[4], pulses[31] = 1900, 2000, 1250, 1900
     assert servos.commands(pulses) == pytest.approx((math.radians(-15), math.radians(20), math.radians(-30), 0.25))
     assert {name: value for name, value in servos.parameters().items() if name.startswith("SERVO2_")} == {
-        "SERVO2_FUNCTION": 19.0, "SERVO2_MIN": 1000.0, "SERVO2_MAX": 2000.0, "SERVO2_TRIM": 1400.0
-    }  # fmt: skip
+        "SERVO2_FUNCTION": 19.0,
+        "SERVO2_MIN": 1000.0,
+        "SERVO2_MAX": 2000.0,
+        "SERVO2_TRIM": 1400.0,
+    }
     assert servos.parameters()["SERVO5_TRIM"] == 1000.0
     assert servos.parameters()["SERVO32_FUNCTION"] == 21.0
 

@@ -62,8 +62,11 @@ def test_places_are_above_the_sea_and_one_more_is_straight_on() -> None:
     setup = setup_of(place(1, 0.0), order(2, C.DO_CHANGE_SPEED, 0, 22, -1), place(3, 900.0, 90.0))
     items = uploaded_mission(setup).items
     assert [(item.seq, item.command, item.alt) for item in items] == [
-        (1, 16, 100.0), (2, 178, 0.0), (3, 16, 110.0), (4, 16, 110.0)
-    ]  # fmt: skip
+        (1, 16, 100.0),
+        (2, 178, 0.0),
+        (3, 16, 110.0),
+        (4, 16, 110.0),
+    ]
     assert flown(setup)[-1] == (4, 16, 1900, 110)
     assert {item.frame for item in items if item.command == 16} == {Frame.GLOBAL}
     assert items[1].params == (0.0, 22.0, -1.0, 0.0)
@@ -76,9 +79,11 @@ def test_an_acceptance_radius_goes_with_its_waypoint() -> None:
 
 def test_what_cannot_be_in_the_air_is_a_waypoint_where_the_route_has_it() -> None:
     setup = setup_of(
-        place(1, 500.0, 60.0, C.NAV_TAKEOFF), order(2, C.DO_SET_SERVO, 9, 1500), place(3, 1500.0),
+        place(1, 500.0, 60.0, C.NAV_TAKEOFF),
+        order(2, C.DO_SET_SERVO, 9, 1500),
+        place(3, 1500.0),
         place(4, 2500.0, 0.0, C.NAV_LAND),
-    )  # fmt: skip
+    )
     # The landing ends above its place at the last height, 80 m over home.
     assert flown(setup) == [(1, 16, 500, 80), (2, 16, 1500, 100), (3, 16, 2500, 100), (4, 16, 3500, 100)]
 
@@ -96,9 +101,14 @@ def test_a_return_to_launch_goes_as_it_is_with_home_and_the_rally_points_and_not
 
 def test_a_jump_leads_to_the_item_that_it_named() -> None:
     setup = setup_of(
-        order(1, C.DO_SET_SERVO, 9, 1500), place(2, 0.0), order(3, C.DO_SET_SERVO, 9, 1500), place(4, 900.0),
-        place(5, 1900.0), order(6, C.DO_JUMP, 3, 2), place(7, 2900.0),
-    )  # fmt: skip
+        order(1, C.DO_SET_SERVO, 9, 1500),
+        place(2, 0.0),
+        order(3, C.DO_SET_SERVO, 9, 1500),
+        place(4, 900.0),
+        place(5, 1900.0),
+        order(6, C.DO_JUMP, 3, 2),
+        place(7, 2900.0),
+    )
     kept = [(item.seq, item.command, item.params[:2]) for item in uploaded_mission(setup).items]
     # Item 3 is left out, and 4 comes after it.
     assert kept[3] == (4, 177, (2.0, 2.0))
@@ -108,9 +118,10 @@ def test_a_jump_leads_to_the_item_that_it_named() -> None:
 def test_a_loiter_keeps_its_centre_and_its_turns_and_one_without_end_stays_and_is_the_last() -> None:
     turns, endless = (2.0, 0.0, -150.0, 0.0), (0.0, 0.0, 150.0, 0.0)
     setup = setup_of(
-        place(1, 0.0), place(2, 1500.0, 80.0, C.NAV_LOITER_TURNS, params=turns),
+        place(1, 0.0),
+        place(2, 1500.0, 80.0, C.NAV_LOITER_TURNS, params=turns),
         place(3, 4000.0, 80.0, C.NAV_LOITER_UNLIM, params=endless),
-    )  # fmt: skip
+    )
     first, second = uploaded_mission(setup).items[1:3]
     assert (first.command, first.params, round(first.alt)) == (18, turns, 100)
     # ArduPlane flies the item's radius without end, but WP_LOITER_RAD for a time: no other item stands for this one.
@@ -230,8 +241,11 @@ def preflight(autopilot: Autopilot, clock: Clock) -> Preflight:
 def test_it_is_given_the_mission_home_and_auto_in_order(autopilot: Autopilot, clock: Clock) -> None:
     clock.go_through(preflight(autopilot, clock).prepare(MISSION))
     assert [(item.seq, item.x, item.z) for item in autopilot.received] == [
-        (0, 365000000, 300.0), (1, 365100000, 500.0), (2, 365200000, 500.0), (3, 365300000, 500.0)
-    ]  # fmt: skip
+        (0, 365000000, 300.0),
+        (1, 365100000, 500.0),
+        (2, 365200000, 500.0),
+        (3, 365300000, 500.0),
+    ]
     assert autopilot.commands()[-3:] == [179, 400, 176]
     home, arm, mode = autopilot.sent[-3:]
     assert (home.x, home.y, home.z, home.frame) == (365000000, -842000000, 300.0, 0)

@@ -73,8 +73,11 @@ def test_a_persons_file_is_read_by_present_names_and_units(tmp_path: Path) -> No
     file = tmp_path / "mine.parm"
     file.write_text("LIM_ROLL_CD 3500\nTRIM_ARSPD_CM 2400\nRLL_RATE_P,0.2\nSERVO3_MAX 1900\n", encoding="utf-8")
     assert person_parameters(setup_at(params=file)) == {
-        "ROLL_LIMIT_DEG": 35.0, "AIRSPEED_CRUISE": 24.0, "RLL_RATE_P": 0.2, "SERVO3_MAX": 1900.0
-    }  # fmt: skip
+        "ROLL_LIMIT_DEG": 35.0,
+        "AIRSPEED_CRUISE": 24.0,
+        "RLL_RATE_P": 0.2,
+        "SERVO3_MAX": 1900.0,
+    }
     assert person_parameters(setup_at()) == {}
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.px4.autopilot import Px4
@@ -15,10 +14,10 @@ from flight.autopilots.px4.parameters import Px4Parameters
 from flight.simulation.simulate import Flight
 from flight.simulation.track import as_track, join_rows
 from tests.setups import setup_maker
+from world.arrays import Floats
 from world.scenario_tables import Px4Version
 
 FOLDER = Path(__file__).with_name("kept_tracks")
-Floats = NDArray[np.float64]
 
 # Mission, release and parameters of each kept flight.
 FLIGHTS: dict[str, tuple[str, Px4Version, dict[str, float]]] = {

@@ -23,14 +23,23 @@ def record(dtype: np.dtype[np.record], **values: Any) -> Record:
 
 
 def flying(
-    east: float = 0.0, north: float = 0.0, up: float = 500.0, course: float = 0.0, climb: float = 0.0,
+    east: float = 0.0,
+    north: float = 0.0,
+    up: float = 500.0,
+    course: float = 0.0,
+    climb: float = 0.0,
     speed: float = 25.0,
-) -> Record:  # fmt: skip
+) -> Record:
     """At a place, at a speed over the ground (m/s) on a course (rad)."""
     return record(
-        MOTION, east=east, north=north, up=up, velocity_east=speed * math.sin(course),
-        velocity_north=speed * math.cos(course), velocity_up=climb,
-    )  # fmt: skip
+        MOTION,
+        east=east,
+        north=north,
+        up=up,
+        velocity_east=speed * math.sin(course),
+        velocity_north=speed * math.cos(course),
+        velocity_up=climb,
+    )
 
 
 def waypoints(*points: tuple[float, float, float], **fields: Any) -> np.ndarray:

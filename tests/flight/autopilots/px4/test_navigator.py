@@ -27,12 +27,15 @@ def after(
     return own
 
 
-@pytest.mark.parametrize(("version", "values", "radius"), [
-    ("1.16", {}, 56.0),
-    ("1.16", {"NAV_ACC_RAD": 70.0}, 70.0),
-    ("1.17", {}, 10.0),
-    ("1.17", {"NAV_ACC_RAD": 70.0}, 70.0),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("version", "values", "radius"),
+    [
+        ("1.16", {}, 56.0),
+        ("1.16", {"NAV_ACC_RAD": 70.0}, 70.0),
+        ("1.17", {}, 10.0),
+        ("1.17", {"NAV_ACC_RAD": 70.0}, 70.0),
+    ],
+)
 def test_a_waypoint_is_reached_within_its_radius(version: Px4Version, values: dict[str, float], radius: float) -> None:
     assert reach_radius(25.0, parameters(version, **values)) == pytest.approx(radius)
     assert after(flying(0.0, 1000.0 - radius - 0.1), version=version, **values).leg == 0

@@ -63,9 +63,7 @@ def test_a_circle_begun_before_the_last_waypoint_does_not_end_the_flight(
 
 @pytest.mark.parametrize("radius", [100, 200])
 def test_a_loiter_to_a_height_is_flown_to_level_and_left_at_that_height(aerosonde: Aircraft, radius: int) -> None:
-    setup, result = flown(
-        aerosonde, wp(0, -1500, 300), wp(0, 0, 450, 31, p=f"0 {radius} 0 0"), wp(2500, 0, 450)
-    )  # fmt: skip
+    setup, result = flown(aerosonde, wp(0, -1500, 300), wp(0, 0, 450, 31, p=f"0 {radius} 0 0"), wp(2500, 0, 450))
     assert result.ended == "completed"
     rows = until(result.track, 2500.0, 0.0)
     position, time = result.track.position[rows], result.track.time[rows]
@@ -87,9 +85,7 @@ def test_a_loiter_to_a_height_is_flown_to_level_and_left_at_that_height(aerosond
 
 @pytest.mark.parametrize(("radius", "flyable"), [(100, False), (150, True)])
 def test_a_loiter_for_a_time_ends(aerosonde: Aircraft, radius: int, flyable: bool) -> None:
-    setup, result = flown(
-        aerosonde, wp(0, -1500, 300), wp(0, 0, 300, 19, p=f"60 0 {radius} 0"), wp(1500, 1500, 300)
-    )  # fmt: skip
+    setup, result = flown(aerosonde, wp(0, -1500, 300), wp(0, 0, 300, 19, p=f"60 0 {radius} 0"), wp(1500, 1500, 300))
     assert result.ended == "completed"
     track = result.track
     # 1,340 to 1,390 m to the rim, 60 s, 2,121 m on from the middle; and from wherever that finds it, around to there.

@@ -50,10 +50,19 @@ def test_a_stations_file_goes_before_the_aircraft_and_that_before_px4(aerosonde:
     assert made.by_origin("default")["NPFG_PERIOD"] == 10.0
     # What the aircraft's folder states for ArduPlane: 25 m/s, 77 and 55 % of throttle, 5.6 and 3.3 m/s.
     assert made.by_origin("aircraft") == {
-        "FW_AIRSPD_TRIM": 25.0, "FW_AIRSPD_MIN": 18.0, "FW_AIRSPD_MAX": 31.0, "FW_P_LIM_MAX": 25.0,
-        "FW_P_LIM_MIN": -20.0, "FW_PSP_OFF": 3.3, "FW_THR_TRIM": 0.77, "FW_THR_MIN": 0.55, "FW_THR_MAX": 1.0,
-        "FW_T_CLMB_MAX": 5.6, "FW_T_SINK_MIN": 3.3, "FW_T_SINK_MAX": 5.6,
-    }  # fmt: skip
+        "FW_AIRSPD_TRIM": 25.0,
+        "FW_AIRSPD_MIN": 18.0,
+        "FW_AIRSPD_MAX": 31.0,
+        "FW_P_LIM_MAX": 25.0,
+        "FW_P_LIM_MIN": -20.0,
+        "FW_PSP_OFF": 3.3,
+        "FW_THR_TRIM": 0.77,
+        "FW_THR_MIN": 0.55,
+        "FW_THR_MAX": 1.0,
+        "FW_T_CLMB_MAX": 5.6,
+        "FW_T_SINK_MIN": 3.3,
+        "FW_T_SINK_MAX": 5.6,
+    }
 
 
 def test_one_that_is_not_flown_counts_where_it_is_not_px4s_own() -> None:
@@ -137,8 +146,12 @@ def test_what_lies_beyond_the_documented_range_is_flown_and_said() -> None:
     made = Px4Parameters.of_text(text, "a.params")
     assert made.by_origin("file")["FW_T_SINK_R_SP"] == 40.0
     assert [said.split(" (")[0] for said in made.beyond] == [
-        "FW_R_LIM 30", "FW_T_CLMB_R_SP 0.1", "FW_T_SINK_R_SP 40", "FW_T_SEB_R_FF 3", "FW_P_LIM_MAX 70",
-    ]  # fmt: skip
+        "FW_R_LIM 30",
+        "FW_T_CLMB_R_SP 0.1",
+        "FW_T_SINK_R_SP 40",
+        "FW_T_SEB_R_FF 3",
+        "FW_P_LIM_MAX 70",
+    ]
     assert made.beyond[0] == "FW_R_LIM 30 (35..75)"
     assert Px4Parameters.of_text("FW_R_LIM 35\nNAV_ACC_RAD 200", "a.params").beyond == ()
 

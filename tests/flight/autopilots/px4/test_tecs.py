@@ -99,11 +99,21 @@ def test_neither_height_nor_speed_weighs_more_than_one(weight: float, of_height:
     own = memory(height_reference=505.0, height_asked=505.0, airspeed_demand=23.75)
     for _ in range(40):
         update_tecs(
-            state(airspeed=25.0), flying(), parameters(
-                FW_AIRSPD_MIN=18.0, FW_AIRSPD_TRIM=25.0, FW_AIRSPD_MAX=31.0, FW_T_SPDWEIGHT=weight,
-                FW_T_PTCH_DAMP=0.0, FW_T_I_GAIN_PIT=0.0,
-            ), own, 23.75, 1.0, DT,
-        )  # fmt: skip
+            state(airspeed=25.0),
+            flying(),
+            parameters(
+                FW_AIRSPD_MIN=18.0,
+                FW_AIRSPD_TRIM=25.0,
+                FW_AIRSPD_MAX=31.0,
+                FW_T_SPDWEIGHT=weight,
+                FW_T_PTCH_DAMP=0.0,
+                FW_T_I_GAIN_PIT=0.0,
+            ),
+            own,
+            23.75,
+            1.0,
+            DT,
+        )
     assert own.pitch_demand == pytest.approx((of_height * G * 1.0 + of_speed * 25.0 * 0.25) / (25.0 * G), rel=1e-3)
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.px4.autopilot import Px4
@@ -24,9 +23,8 @@ from tests.flight.autopilots.px4_sitl.conftest import MakeFake
 from tests.flight.autopilots.px4_sitl.fake_px4 import CIRCLE
 from tests.setups import setup_maker, waypoint_mission
 from tests.soak import SOAK, some
+from world.arrays import Floats
 from world.errors import CrashError, FlightError
-
-Floats = NDArray[np.float64]
 
 AEROSONDE = load_aircraft("aerosonde")
 BEND = math.radians(20.0)

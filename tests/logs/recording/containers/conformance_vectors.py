@@ -52,9 +52,11 @@ _FEATURES = ("ax", "ch", "chx", "mdx", "mx", "pad", "rch", "rsh", "st", "sum")
 def variants(content: Content) -> Iterator[tuple[str, ...]]:
     """The combinations of features, each in order, that a content can have."""
     cannot = {
-        "ax": not content.attachment, "mdx": not content.metadata, "rsh": content.schema is None,
+        "ax": not content.attachment,
+        "mdx": not content.metadata,
+        "rsh": content.schema is None,
         **dict.fromkeys(("rch", "ch", "chx", "mx"), content.channel is None),
-    }  # fmt: skip
+    }
     able = [name for name in _FEATURES if not cannot.get(name, False)]
     for count in range(len(able) + 1):
         for chosen in itertools.combinations(able, count):

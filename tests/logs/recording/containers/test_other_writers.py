@@ -36,19 +36,28 @@ PYTHON: dict[str, dict[str, Any]] = {
     "no-summary-offsets": {"use_summary_offsets": False},
     "no-repeats": {"repeat_channels": False, "repeat_schemas": False},
     "no-summary": {
-        "index_types": IndexType.NONE, "use_statistics": False, "use_summary_offsets": False,
-        "repeat_channels": False, "repeat_schemas": False,
+        "index_types": IndexType.NONE,
+        "use_statistics": False,
+        "use_summary_offsets": False,
+        "repeat_channels": False,
+        "repeat_schemas": False,
     },
-}  # fmt: skip
+}
 # Options of @mcap/core's writer for Node.
 NODE: dict[str, dict[str, bool]] = {
     "usual": {},
     "no-chunks": {"useChunks": False},
     "nothing-but-data": {
-        "useStatistics": False, "useSummaryOffsets": False, "repeatSchemas": False, "repeatChannels": False,
-        "useAttachmentIndex": False, "useMetadataIndex": False, "useMessageIndex": False, "useChunkIndex": False,
+        "useStatistics": False,
+        "useSummaryOffsets": False,
+        "repeatSchemas": False,
+        "repeatChannels": False,
+        "useAttachmentIndex": False,
+        "useMetadataIndex": False,
+        "useMessageIndex": False,
+        "useChunkIndex": False,
     },
-}  # fmt: skip
+}
 
 
 def copy(source: Path, target: Path, **options: Any) -> Path:

@@ -30,9 +30,19 @@ BOX = ((0.0, 0.0), (400.0, 0.0), (400.0, 200.0), (0.0, 200.0))
 
 
 def move(
-    east: float, north: float, up: float, *, course: float = 90.0, length: float = 0.0, lasts: float = 10.0,
-    curvature: float = 0.0, climb: float = 0.0, bend: float = 0.0, time: float = 0.0, leg: int = 0,
-) -> tuple[float, ...]:  # fmt: skip
+    east: float,
+    north: float,
+    up: float,
+    *,
+    course: float = 90.0,
+    length: float = 0.0,
+    lasts: float = 10.0,
+    curvature: float = 0.0,
+    climb: float = 0.0,
+    bend: float = 0.0,
+    time: float = 0.0,
+    leg: int = 0,
+) -> tuple[float, ...]:
     u, v = (math.sin(math.radians(course)), math.cos(math.radians(course))) if length else (0.0, 0.0)
     return (east, north, up, u, v, length, curvature, climb, bend, time, lasts, leg)
 
@@ -258,10 +268,14 @@ def test_no_place_is_beyond_the_bounds(kind: str) -> None:
         records = zone_records([zone])
         length = float(rng.uniform(5.0, 300.0))
         row = move(
-            *rng.uniform(-700.0, 700.0, 2).tolist(), float(rng.uniform(0.0, 400.0)),
-            course=float(rng.uniform(0.0, 360.0)), length=length, climb=float(rng.uniform(-60.0, 60.0)),
-            bend=float(rng.uniform(-30.0, 30.0)), curvature=float(rng.choice([0.0, rng.uniform(-0.008, 0.008)])),
-        )  # fmt: skip
+            *rng.uniform(-700.0, 700.0, 2).tolist(),
+            float(rng.uniform(0.0, 400.0)),
+            course=float(rng.uniform(0.0, 360.0)),
+            length=length,
+            climb=float(rng.uniform(-60.0, 60.0)),
+            bend=float(rng.uniform(-30.0, 30.0)),
+            curvature=float(rng.choice([0.0, rng.uniform(-0.008, 0.008)])),
+        )
         moves: Records = np.array([row], MOVE)
         one, part = moves[0], whole(moves[0], records)
         rise = max(abs(one.climb), abs(one.climb + 2.0 * one.bend))

@@ -4,14 +4,11 @@ import math
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.point_mass import POINT_MASS, PointMass
 from logs.verdict.returns.glide_map import GlideMap, glide_map
 from world.kernels import Record
 from world.terrain import Terrain, gridded
-
-Floats = NDArray[np.float64]
 
 AIRSPEED, SINK, BANK = 18.0, 1.8, math.radians(30.0)
 # Without spheres.

@@ -34,10 +34,21 @@ HALF = math.pi * FAST / (9.80665 * math.tan(BANK))
 
 
 def left_of(
-    terrain: Terrain, *, up: float = 800.0, course: float = 0.0, wind: float = 0.0, blows_to: float = 0.0,
-    east: float = 0.0, north: float = 0.0, speed: float = CRUISE, sphere: tuple[float, ...] = (),
-    fast_sink: float = SINK, induced: float = 0.0, growth: float = 0.0, bank: float = BANK,
-) -> tuple[float, tuple[float, float, float]]:  # fmt: skip
+    terrain: Terrain,
+    *,
+    up: float = 800.0,
+    course: float = 0.0,
+    wind: float = 0.0,
+    blows_to: float = 0.0,
+    east: float = 0.0,
+    north: float = 0.0,
+    speed: float = CRUISE,
+    sphere: tuple[float, ...] = (),
+    fast_sink: float = SINK,
+    induced: float = 0.0,
+    growth: float = 0.0,
+    bank: float = BANK,
+) -> tuple[float, tuple[float, float, float]]:
     """What is left of a start's height to reach a place 3 km north of the middle, and which place that is."""
     spheres, radii = (np.array([sphere[:3]]), np.array([sphere[3]])) if sphere else (NO_SPHERES, NO_RADII)
     made = glide_map(terrain, np.zeros((1, 2)), MARGIN, spheres, radii, 5900.0) if sphere else map_of(terrain)
@@ -114,10 +125,11 @@ def test_a_turn_is_as_wide_as_the_airspeed_of_its_load_makes_it() -> None:
     left = [
         left_of(
             ground(lambda east, _north, at=at: np.where(np.abs(east) > at, 1200.0, 0.0), pitch=10.0),
-            course=180.0, bank=math.radians(40.0),
+            course=180.0,
+            bank=math.radians(40.0),
         )[0]
         for at in (210.0, 230.0)
-    ]  # fmt: skip
+    ]
     assert left[0] == -math.inf
     assert left[1] > 0.0
 

@@ -104,8 +104,11 @@ def test_an_inclusion_that_is_left() -> None:
 def test_heights_above_and_below_a_band_do_not_count() -> None:
     # The first leg is level at 300 m.
     for floor, ceiling, ok, margin in (
-        (None, 295.0, True, 5.0), (None, 305.0, False, -5.0), (305.0, None, True, 5.0), (295.0, None, False, -5.0),
-    ):  # fmt: skip
+        (None, 295.0, True, 5.0),
+        (None, 305.0, False, -5.0),
+        (305.0, None, True, 5.0),
+        (295.0, None, False, -5.0),
+    ):
         low, high = (None if level is None else ZoneLevel(level, "ground") for level in (floor, ceiling))
         (item,) = findings(within_zones(Zone("layer", "exclusion", Cylinder(0.0, 1000.0, 200.0), low, high)))
         assert (item.ok, item.margin) == (ok, pytest.approx(margin, abs=0.011))

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
@@ -22,11 +21,11 @@ from tests.mission_lines import ORIGIN, setup_of, wp
 from tests.soak import scaled
 from world.airfield import Launch
 from world.airspace.zones import Cylinder, Zone, ZoneLevel
+from world.arrays import Floats
 from world.frames import to_geo
 from world.scenario import load_scenario
 from world.terrain import Terrain, gridded
 
-Floats = NDArray[np.float64]
 Ground = Callable[[Floats, Floats], Floats]
 
 HOME = "36.5 -84.2 100"

@@ -170,10 +170,17 @@ def found(small_log: FlightLog) -> ULog:
 def test_the_topics_are_px4s(found: ULog) -> None:
     names = {data.name for data in found.data_list}
     assert names == {
-        "vehicle_attitude", "vehicle_angular_velocity", "vehicle_local_position", "vehicle_global_position",
-        "airspeed_validated", "wind", "vehicle_thrust_setpoint", "battery_status", "vehicle_status",
+        "vehicle_attitude",
+        "vehicle_angular_velocity",
+        "vehicle_local_position",
+        "vehicle_global_position",
+        "airspeed_validated",
+        "wind",
+        "vehicle_thrust_setpoint",
+        "battery_status",
+        "vehicle_status",
         "navigator_mission_item",
-    }  # fmt: skip
+    }
     assert not found.file_corruption
     assert not found.dropouts
 

@@ -97,8 +97,12 @@ def test_pictures_and_page_are_whole(log_file: Path, other: FlightLog, tmp_path:
     found = compare_logs(read_log(log_file), other, names=("a.mcap", "b.mcap"))
     files = write_comparison(tmp_path / "out", found, svg=True)
     assert [file.name for file in files] == [
-        "compare-map.png", "compare-profile.png", "compare-map.svg", "compare-profile.svg", "compare.html",
-    ]  # fmt: skip
+        "compare-map.png",
+        "compare-profile.png",
+        "compare-map.svg",
+        "compare-profile.svg",
+        "compare.html",
+    ]
     first = [file.read_bytes() for file in files]
     assert all(data.startswith(b"\x89PNG") for data in first[:2])
     assert all(ElementTree.fromstring(data).tag.endswith("svg") for data in first[2:4])

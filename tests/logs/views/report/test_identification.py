@@ -45,9 +45,18 @@ def test_the_page_says_what_was_found_and_what_was_not(monkeypatch: pytest.Monke
     monkeypatch.setattr("logs.views.report.identification.draw_pictures", lambda _: blank)
     page = identification_page(facts())
     for said in (
-        "mine, from 10.0 minutes of flight", "climb at full throttle", "7.7", "not seen in these logs",
-        "battery current (BAT)", "0.041", "R² 0.990", "airspeed (1 %)", "thrust +0.010", "ab" * 32, "C&lt;1&gt;.BIN",
-    ):  # fmt: skip
+        "mine, from 10.0 minutes of flight",
+        "climb at full throttle",
+        "7.7",
+        "not seen in these logs",
+        "battery current (BAT)",
+        "0.041",
+        "R² 0.990",
+        "airspeed (1 %)",
+        "thrust +0.010",
+        "ab" * 32,
+        "C&lt;1&gt;.BIN",
+    ):
         assert said in page, said
     assert "sink at idle: known to ±23 % only; fly glides" in page
     assert "<1>" not in page

@@ -3,11 +3,10 @@
 from collections.abc import Callable, Hashable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, next_flights
+from world.arrays import Floats
 
-Floats = NDArray[np.float64]
 # The ways in which a flight of this wind, m/s, and these numbers (d,) fails.
 Fly = Callable[[float, Floats], frozenset[Hashable]]
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.optimize import minimize
 from scipy.stats import gamma, gumbel_l, lognorm, norm
@@ -21,9 +20,7 @@ from planfly.campaigns.statistics.censored_regression import (
     fit_regression,
     importance_sample,
 )
-
-Floats = NDArray[np.float64]
-
+from world.arrays import Floats
 
 CASES = [(PROBIT, norm), (CLOGLOG, gumbel_l)]
 X = np.linspace(-6.0, 3.0, 37)

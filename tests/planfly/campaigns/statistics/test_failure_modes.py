@@ -18,9 +18,7 @@ from planfly.campaigns.statistics.failure_modes import (
     fit_modes,
     regressors,
 )
-
-Floats = NDArray[np.float64]
-
+from world.arrays import Floats
 
 PARTS = np.array([0.025, 0.5, 0.975])
 

@@ -17,9 +17,12 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_list_and_a_new_one(capsys: Output) -> None:
     found = answered(capsys, 0, "aircraft")["aircraft"]
     assert [(one["name"], one["mass_kg"], one["detail"]) for one in found] == [
-        ("aerosonde", 11.0, None), ("c172x", 1124.9, None), ("ultrastick25e", 1.959, None), ("x8", 3.364, None),
+        ("aerosonde", 11.0, None),
+        ("c172x", 1124.9, None),
+        ("ultrastick25e", 1.959, None),
+        ("x8", 3.364, None),
         ("zagi", 1.56, None),
-    ]  # fmt: skip
+    ]
     (made,) = answered(capsys, 0, "aircraft", "--new", "mine")["aircraft"]
     assert (made["name"], made["mass_kg"], Path(made["folder"])) == ("mine", 11.0, Path("mine").resolve())
 

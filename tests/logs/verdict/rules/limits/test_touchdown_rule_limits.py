@@ -32,9 +32,15 @@ def test_thirty_metres_of_the_strip_are_left(more: float, ok: bool) -> None:
     assert on_strip(length=2.0 * (farther + 30.0 + more)) is ok
 
 
-@pytest.mark.parametrize(("length", "stop", "faults", "open_"), [
-    (60.0, 59.9, 0, 1), (60.0, 60.1, 1, 1), (60.1, 0.2, 1, 0), (60.1, 0.0, 0, 0),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("length", "stop", "faults", "open_"),
+    [
+        (60.0, 59.9, 0, 1),
+        (60.0, 60.1, 1, 1),
+        (60.1, 0.2, 1, 0),
+        (60.1, 0.0, 0, 0),
+    ],
+)
 def test_a_strip_that_the_error_leaves_nothing_of_is_left_open(
     length: float, stop: float, faults: int, open_: int
 ) -> None:
@@ -46,10 +52,19 @@ def test_a_strip_that_the_error_leaves_nothing_of_is_left_open(
     assert (len(_detect_faults(short, at)), len(_undecided_messages(short, at, gusts=False))) == (faults, open_)
 
 
-@pytest.mark.parametrize(("touch", "stop", "gusts", "ok"), [
-    (0.0, 49.9, True, True), (0.0, 50.1, True, None), (0.0, 50.1, False, True), (0.0, 70.1, True, False),
-    (49.9, 0.0, True, True), (50.1, 0.0, True, None), (-50.1, 0.0, True, True), (-70.1, 0.0, True, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("touch", "stop", "gusts", "ok"),
+    [
+        (0.0, 49.9, True, True),
+        (0.0, 50.1, True, None),
+        (0.0, 50.1, False, True),
+        (0.0, 70.1, True, False),
+        (49.9, 0.0, True, True),
+        (50.1, 0.0, True, None),
+        (-50.1, 0.0, True, True),
+        (-70.1, 0.0, True, False),
+    ],
+)
 def test_in_turbulence_fifty_metres_of_the_strip_are_left(
     touch: float, stop: float, gusts: bool, ok: bool | None
 ) -> None:
