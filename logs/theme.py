@@ -176,7 +176,7 @@ AIRCRAFT_PARTS = ("#ebebe0", "#d91a1a", "#1a9933")
 
 
 def colour(name: str, *, dark: bool = False) -> str:
-    """The colour of a role, or of what stands around the data.  Raises KeyError.
+    """Return the colour of a role, or of what stands around the data.  Raises KeyError.
 
     >>> colour("flown"), colour("paper", dark=True)
     ('#000000', '#16181c')
@@ -206,7 +206,7 @@ def rgba(name: str, opacity: float = 1.0, *, dark: bool = False) -> tuple[float,
 
 
 def drawn_colours() -> tuple[str, ...]:
-    """What a picture of few colours keeps as it is: each role's, and paper and ink.
+    """Return what a picture of few colours keeps as it is: each role's, and paper and ink.
 
     >>> colour("missile") in drawn_colours()
     True
@@ -217,7 +217,7 @@ def drawn_colours() -> tuple[str, ...]:
 
 
 def css_variables() -> str:
-    """The colours as CSS variables (``--missile``), light, and dark on a screen whose reader prefers it.
+    """Return the colours as CSS variables (``--missile``), light, and dark on a screen whose reader prefers it.
 
     >>> "--missile: #" in css_variables()
     True
@@ -236,7 +236,7 @@ _HEX = re.compile(r"#[0-9a-f]{6}\b")
 
 
 def with_variables(drawn: str) -> str:
-    """A drawing's text with the variables of `css_variables` in place of its light colours.
+    """Return a drawing's text with the variables of `css_variables` in place of its light colours.
 
     Of roles that have one light colour the first counts, what stands around the data before the data.
 

@@ -265,5 +265,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """The public names, whatever of planfly is loaded."""
+    """Return the public names, whatever of planfly is loaded."""
     return sorted(__all__)

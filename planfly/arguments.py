@@ -22,7 +22,7 @@ class Range(NamedTuple):
     below: bool = False
 
     def allows(self, value: Any) -> bool:
-        """Whether a value is a number in the range; a truth value is none.
+        """Return True if a value is a number in the range; a truth value is none.
 
         >>> Range(0, 20, "a whole number", integer=True).allows(3), Range(0, 1, "a share").allows(float("nan"))
         (True, False)
@@ -122,7 +122,7 @@ CAMERA = "the sensor across the way and along it and the focal length, mm, and m
 
 
 def is_wind(speed: float, from_deg: float) -> bool:
-    """Whether a steady wind can be flown in: m/s, and degrees that it blows from.
+    """Return True if a steady wind can be flown in: m/s, and degrees that it blows from.
 
     >>> is_wind(8.0, 270.0), is_wind(float("nan"), 0.0)
     (True, False)
@@ -131,7 +131,7 @@ def is_wind(speed: float, from_deg: float) -> bool:
 
 
 def is_place(lat: float, lon: float) -> bool:
-    """Whether there is such a latitude and longitude, degrees, where planfly draws maps.
+    """Return True if there is such a latitude and longitude, degrees, where planfly draws maps.
 
     >>> is_place(-33.9, 18.4), is_place(91.0, 0.0)
     (True, False)

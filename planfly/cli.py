@@ -66,7 +66,7 @@ def _outcome(argv: Sequence[str] | None) -> int:
 
 
 def _is_machines(cause: BaseException | None) -> bool:
-    """Whether a file could not be read for want of what the machine gives, whatever the file holds."""
+    """Return True if a file could not be read for want of what the machine gives, whatever the file holds."""
     return isinstance(cause, OSError) and cause.errno in _MACHINES
 
 

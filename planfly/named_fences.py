@@ -24,7 +24,7 @@ class NamedFences:
     zones: tuple[tuple[str, FileZones], ...] = ()
 
     def on_mission(self, mission: Mission) -> Mission:
-        """A mission with the fence items beside its own."""
+        """Return a mission with the fence items beside its own."""
         if not self.items:
             return mission
         warnings = mission.warnings
@@ -33,7 +33,7 @@ class NamedFences:
         return replace(mission, fences=numbered([*mission.fences, *self.items]), warnings=warnings)
 
     def on_scenario(self, scenario: Scenario) -> Scenario:
-        """A scenario with the zones beside its own.  Raises ScenarioError as `with_zones` does."""
+        """Return a scenario with the zones beside its own.  Raises ScenarioError as `with_zones` does."""
         for source, found in self.zones:
             scenario = with_zones(scenario, found.zones, source, found.notes)
         return scenario

@@ -69,7 +69,7 @@ def refuse_hidden_packages() -> None:
 
 
 def _is_command() -> bool:
-    """Whether Python was started for the command line: as ``planfly``, or as ``python -m planfly``."""
+    """Return True if Python was started for the command line: as ``planfly``, or as ``python -m planfly``."""
     # While it looks for the module, Python says -m in its place; an embedded one may say nothing.
     program = next(iter(getattr(sys, "argv", ())), "")
     return Path(program).stem == "planfly" or (program == "-m" and "planfly" in sys.orig_argv)

@@ -131,7 +131,7 @@ def _moved(
 
 
 def _place(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
-    """Row and column of a tile's first pixel on the grid of the first tile.  Raises TerrainError."""
+    """Return row and column of a tile's first pixel on the grid of the first tile.  Raises TerrainError."""
     if tile.crs != first.crs:
         allowed = f"the reference system of {first.name} is expected: tiles lie on one grid"
         raise TerrainError(f"{tile.name}: another reference system: {allowed}", file=tile.name, allowed=allowed)

@@ -291,7 +291,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
 
 
 def is_covered(raster: RasterFile, origin: GeoOrigin, box: Floats) -> bool:
-    """Whether the tile covers a map box [[e0, e1], [n0, n1]], m.
+    """Return True if the tile covers a map box [[e0, e1], [n0, n1]], m.
 
     >>> raster = open_raster("jacksboro")
     >>> is_covered(raster, raster.centre, np.array([[0.0, 14_000.0], [0.0, 1.0]]))
@@ -381,7 +381,7 @@ def _shifted(
 
 
 def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
-    """The largest upright map box inside the tile, [[e0, e1], [n0, n1]] m, to half a percent.
+    """Return the largest upright map box inside the tile, [[e0, e1], [n0, n1]] m, to half a percent.
 
     Raises TerrainError where there is none.
 
@@ -407,7 +407,7 @@ def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
 
 
 def cover_text(raster: RasterFile) -> str:
-    """Which degrees the tile reaches from and to, for messages.
+    """Return which degrees the tile reaches from and to, for messages.
 
     >>> cover_text(open_raster("jacksboro"))
     'latitude 36.160..36.446, longitude -84.413..-84.078'

@@ -59,7 +59,7 @@ class RemoteFile:
     held: dict[tuple[int, int], str] = field(default_factory=dict)
 
     def missing(self, begin: int, end: int) -> list[tuple[int, int]]:
-        """Parts of [begin, end) that are not there yet.
+        """Return parts of [begin, end) that are not there yet.
 
         >>> RemoteFile("", 100, "", Path("a"), {(10, 20): "", (30, 40): ""}).missing(15, 50)
         [(20, 30), (40, 50)]
@@ -123,7 +123,7 @@ class RemoteFile:
 
 
 def find_remote(url: str, folder: Path) -> RemoteFile | None:
-    """A file on a server and what the cache has of it; None where the server has no such file.
+    """Return a file on a server and what the cache has of it; None where the server has no such file.
 
     Raises TerrainError where the server cannot be reached, and OSError where the cache cannot be written.
     """
@@ -162,7 +162,7 @@ def _open(url: str, headers: dict[str, str], method: str = "GET") -> http.client
 
 @cache
 def _opener() -> urllib.request.OpenerDirector:
-    """What speaks http and https, wherever it is led, and nothing else."""
+    """Return what speaks http and https, wherever it is led, and nothing else."""
     opener = urllib.request.OpenerDirector()
     for handler in (
         urllib.request.ProxyHandler,
@@ -220,7 +220,7 @@ def _notes(copy: Path) -> Path:
 
 
 def _read_notes(copy: Path, size: int) -> dict[tuple[int, int], str]:
-    """Parts that a copy holds as they were fetched; none where the note of them is damaged."""
+    """Return parts that a copy holds as they were fetched; none where the note of them is damaged."""
     try:
         noted = json.loads(_notes(copy).read_text(encoding="ascii"))
         parts = {(int(low), int(high)): str(digest) for low, high, digest in noted}

@@ -122,7 +122,7 @@ def _write(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None
 
 
 def tile_name(lat: int, lon: int) -> str:
-    """Name of a GLO-30 tile by its south-west corner, degrees.
+    """Return name of a GLO-30 tile by its south-west corner, degrees.
 
     >>> tile_name(46, 8), tile_name(-34, -71)
     ('Copernicus_DSM_COG_10_N46_00_E008_00_DEM', 'Copernicus_DSM_COG_10_S34_00_W071_00_DEM')
@@ -186,7 +186,7 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, told: Told, *
 
 
 def _fetched_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) -> RasterFile:
-    """A tile's copy with the blocks that an area needs.  Raises TerrainError.
+    """Return a tile's copy with the blocks that an area needs.  Raises TerrainError.
 
     A copy that cannot be read, which a power cut or a proxy may have spoilt, is fetched once more.
     """
@@ -212,7 +212,7 @@ class _UnreadableError(Exception):
 
 
 def _opened_copy(remote: RemoteFile, count: Callable[[int], None], sizes: Sequence[int]) -> RasterFile:
-    """A tile of which the directory is there.  Raises TerrainError, and _UnreadableError.
+    """Return a tile of which the directory is there.  Raises TerrainError, and _UnreadableError.
 
     sizes: bytes of the beginning to try with.  The directory may be longer than that of a cloud-optimised file, or
     stand at the end.
@@ -263,7 +263,7 @@ class _Placed(NamedTuple):
 
 
 def _placed(tile: RasterFile, degree: tuple[int, int], box: Box) -> _Placed:
-    """A tile beside others.  Raises TerrainError for one that does not lie on its degree."""
+    """Return a tile beside others.  Raises TerrainError for one that does not lie on its degree."""
     dx, turn, west, other_turn, dy, north = tile.grid
     if turn or other_turn or not dx > 0.0 > dy:
         raise TerrainError(f"{tile.name}: a grid of longitudes and latitudes is expected", file=tile.name)
@@ -276,7 +276,7 @@ def _placed(tile: RasterFile, degree: tuple[int, int], box: Box) -> _Placed:
 
 
 def _on_one_grid(tiles: list[_Placed], box: Box) -> tuple[Heights, tuple[float, ...]]:
-    """Heights of an area on the grid of the finest tile, NaN where no tile is, and the grid."""
+    """Return heights of an area on the grid of the finest tile, NaN where no tile is, and the grid."""
     finest = min(tiles, key=lambda tile: tile.dx)
     # Pixels between whose centres the area lies, counted from the finest tile's first; a hair is none.
     left = math.floor((box.west - finest.west) / finest.dx - 0.5 + _HAIR)
@@ -318,7 +318,7 @@ def _put(heights: Heights, lat: Floats, lon: Floats, tile: _Placed) -> None:
 
 
 def _between(read: Heights, row: Floats, col: Floats) -> Heights:
-    """Heights between pixels, bilinear, at rows (m,) and columns (n,): (m, n)."""
+    """Return heights between pixels, bilinear, at rows (m,) and columns (n,): (m, n)."""
     r0, c0 = np.floor(row).astype(int), np.floor(col).astype(int)
     r1, c1 = np.minimum(r0 + 1, read.shape[0] - 1), np.minimum(c0 + 1, read.shape[1] - 1)
     v, u = (row - r0)[:, None], (col - c0)[None, :]

@@ -5,8 +5,8 @@ curve's slope is the angle of attack, gusts included, and side force gives the s
 comes from frequencies at which the aircraft heaves with the gusts; drag and thrust come from the forward acceleration,
 the moments from the gyros' rates of change.
 
-Uncertain quantities that are held fixed (`aircraft.identification.fixed_parameters`) are changed by their standard deviation
-one after the other, and the estimate is repeated: these shifts are part of the covariance.
+Uncertain quantities that are held fixed (`aircraft.identification.fixed_parameters`) are changed by their standard
+deviation one after the other, and the estimate is repeated: these shifts are part of the covariance.
 """
 
 from collections.abc import Mapping, Sequence
@@ -117,7 +117,7 @@ class Estimate:
 
 
 def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics: bool = True) -> Estimate:
-    """Estimate all parameters from stretches of flight.
+    """Return estimate all parameters from stretches of flight.
 
     dynamics: True to include the moments; otherwise only lift, drag and thrust, for logs too slow for the rest.
     """
@@ -219,7 +219,7 @@ def _log_unexplained(fit: Fit, lag: float) -> float:
 def fit_all(
     signals: Signals, base: BaseModel, lift: Floats | None = None, level: float = 0.0, *, dynamics: bool = True
 ) -> Estimate:
-    """Estimate all parameters from aligned signals, with all else held fixed, without shifts.
+    """Return estimate all parameters from aligned signals, with all else held fixed, without shifts.
 
     lift: (2,) values of slope and offset of the lift curve to hold fixed too.
     level: error of the autopilot's level, rad.

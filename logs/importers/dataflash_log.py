@@ -386,7 +386,7 @@ _WITH_INSTANCES = frozenset({"GPS", "BARO", "ARSP", "BAT", "XKF1", "XKF2", "NKF1
 
 
 def _raw_time(found: Messages) -> Floats:
-    """Times of messages as they are written, s; before 2015 they were milliseconds."""
+    """Return times of messages as they are written, s; before 2015 they were milliseconds."""
     if found.has("TimeUS"):
         return found.column("TimeUS") * 1e-6
     return found.column("TimeMS") * 1e-3

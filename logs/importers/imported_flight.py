@@ -128,7 +128,7 @@ def _stretches(start: float, end: float, modes: Sequence[ModeChange], last: floa
 
 
 def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:
-    """The mission in force when a stretch began: the last that was logged by then, or the first in it."""
+    """Return the mission in force when a stretch began: the last that was logged by then, or the first in it."""
     before = [k for k, logged in enumerate(missions) if logged.time <= stretch.start + 1.0]
     if before:
         return before[-1]
@@ -198,7 +198,7 @@ class LoggedFlight:
 
 
 def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
-    """The flight of a log that was flown along its mission for the longest, or the one of a number, from 1.
+    """Return the flight of a log that was flown along its mission for the longest, or the one of a number, from 1.
 
     Raises LogError for a vehicle that is no aeroplane, a log without a flight, and a number that it does not have.
 
@@ -318,7 +318,7 @@ def _heights(raw: RawLog, places: Places, start: float) -> Heights:
 
 
 def with_flown_heights(mission: Mission, lat: Floats, lon: Floats, up: Floats) -> Mission:
-    """A mission whose items have the height (m) of the row (n,) nearest to each.
+    """Return a mission whose items have the height (m) of the row (n,) nearest to each.
 
     >>> from flight.mission.items import MissionItem
     >>> task = Mission(None, tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 0.0) for k in (0, 1)))
@@ -357,7 +357,7 @@ class MeanWind:
 
 
 def mean_wind(flight: LoggedFlight) -> MeanWind | None:
-    """The mean over the stretches that followed the mission, or over the flight; None where the log holds none.
+    """Return the mean over the stretches that followed the mission, or over the flight; None where the log holds none.
 
     The estimate's first part is left out: it begins at nothing, and finds the wind in the first turns.
 
@@ -384,7 +384,7 @@ def mean_wind(flight: LoggedFlight) -> MeanWind | None:
 
 
 def track_of_flight(flight: LoggedFlight, origin: GeoOrigin) -> Track:
-    """A track on the map about ``origin``.
+    """Return a track on the map about ``origin``.
 
     Velocities that the log does not hold are the differences of its places.  A log without heights has 0 there, which
     no rule reads.

@@ -96,7 +96,7 @@ def body_rotation(attitude: ArrayLike) -> Floats:
 
 
 def log_message(time_ns: int, text: str, level: str, name: str = "planfly") -> Log:
-    """One event; level: a key of `LEVELS`.  name: who says it."""
+    """Return one event; level: a key of `LEVELS`.  name: who says it."""
     return Log(timestamp=timestamp(time_ns), level=LEVELS[level], message=text, name=name)
 
 
@@ -132,7 +132,7 @@ def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
 
 
 def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
-    """The entity's field of triangles; empty where no ground is known."""
+    """Return the entity's field of triangles; empty where no ground is known."""
     ground, colours, known = _ground(terrain, bounds)
     if not known.any():
         return b""
@@ -153,7 +153,7 @@ def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
 
 
 def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> bytes:
-    """Spheres of missiles and radars, and their names above the ground about them."""
+    """Return spheres of missiles and radars, and their names above the ground about them."""
     entity = _entity(time_ns, "threats")
     for k, name in enumerate(threats.names):
         centre = threats.position[k]
@@ -222,7 +222,7 @@ def _pose(position: ArrayLike) -> Pose:
 
 
 def _line(colour: tuple[float, float, float, float]) -> LinePrimitive:
-    """A line without points yet."""
+    """Return a line without points yet."""
     return LinePrimitive(
         type=LinePrimitive.LINE_STRIP,
         pose=_pose((0.0, 0.0, 0.0)),
@@ -378,7 +378,7 @@ def aircraft_glb() -> bytes:
 
 
 def aircraft_scene(time_ns: int) -> bytes:
-    """The model in the aircraft's own frame, so that its transforms move it: a SceneUpdate."""
+    """Return the model in the aircraft's own frame, so that its transforms move it: a SceneUpdate."""
     model = ModelPrimitive(
         pose=Pose(position=Vector3(), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)),
         scale=Vector3(x=SPAN, y=SPAN, z=SPAN),

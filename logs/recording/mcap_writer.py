@@ -88,7 +88,7 @@ class _ChunkIndex(NamedTuple):
     size: int
 
     def record(self) -> bytes:
-        """Its chunk index record."""
+        """Return its chunk index record."""
         offsets = b"".join(_OFFSET.pack(channel, at) for channel, at in self.offsets)
         times = _CHUNK_INDEX.pack(self.content_start, self.content_end, self.at, self.length, len(offsets))
         sizes = _SIZES.pack(self.compressed, self.size)
@@ -372,7 +372,7 @@ def _stamped(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> tuple[By
 
 
 def stamped_records(log_times: Ints, channel: int, timestamp_field: int, bodies: Bytes) -> MessageRecords:
-    """Messages that are a timestamp followed by bytes of one size, as records.
+    """Return messages that are a timestamp followed by bytes of one size, as records.
 
     log_times: (n,) ns since 1970.  timestamp_field: the timestamp's field number.  bodies: (n, size) what follows it,
     in protobuf's encoding.
@@ -383,7 +383,7 @@ def stamped_records(log_times: Ints, channel: int, timestamp_field: int, bodies:
 
 
 def single_record(channel: int, log_time: int, data: bytes) -> MessageRecords:
-    """One message (its bytes in ``data``) as a record."""
+    """Return one message (its bytes in ``data``) as a record."""
     out = np.empty(FRAME_SIZE + MESSAGE_HEADER + len(data), dtype=np.uint8)
     at = _put_head(out, 0, len(data), channel, log_time)
     out[at:] = np.frombuffer(data, np.uint8)
@@ -428,7 +428,7 @@ def _order(
 
 @compiled
 def _fill(entries: Entries, rows: Bytes, blob: Bytes, front: Bytes) -> Bytes:
-    """Copy the messages one after the other, behind ``front``."""
+    """Return copy the messages one after the other, behind ``front``."""
     total = len(front)
     for k in range(len(entries)):
         total += entries[k].length
@@ -502,7 +502,7 @@ def lay_out(
 
 
 def _entries(others: list[MessageRecords]) -> Entries:
-    """Messages in order of time, where they start in all their blobs together; offsets are still open."""
+    """Return messages in order of time, where they start in all their blobs together; offsets are still open."""
     found: Entries = np.zeros(sum(len(item.log_times) for item in others), dtype=ENTRY)
     first, start = 0, 0
     for item in others:

@@ -258,7 +258,7 @@ class Recorder:
         self._writer.flush()
 
     def _scene_channel(self, topic: str) -> int:
-        """The number of a topic that not every log has."""
+        """Return the number of a topic that not every log has."""
         descriptor = SceneUpdate.DESCRIPTOR
         self._channels[topic] = self._writer.channel(topic, descriptor.full_name, schema_of(descriptor))
         return self._channels[topic]
@@ -324,7 +324,7 @@ def _chunks(layout: Layout) -> Iterator[ChunkContent]:
 
 
 def thin_track(track: Track, every: int) -> Track:
-    """Rows of a whole flight that a `Recorder` with this ``every`` records: one in so many, and the last.
+    """Return rows of a whole flight that a `Recorder` with this ``every`` records: one in so many, and the last.
 
     >>> from logs.recording.example_log import example_log
     >>> thin_track(example_log().track, 100).time

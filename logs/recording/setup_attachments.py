@@ -67,7 +67,7 @@ _MEDIA_TYPES: Final = {
 
 
 def heights_name(part: int) -> str:
-    """Name of a part of the terrain's heights; parts count from 0."""
+    """Return name of a part of the terrain's heights; parts count from 0."""
     return f"terrain-{part:03d}.heights"
 
 

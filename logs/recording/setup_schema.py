@@ -46,17 +46,17 @@ class SetupModel(BaseModel):
 
     @classmethod
     def of(cls, value: object) -> Self:
-        """The table of a dataclass, by its fields."""
+        """Return the table of a dataclass, by its fields."""
         return cls.model_validate(value, from_attributes=True, by_alias=False, by_name=True)
 
     def fault(self, file: str, field: str, message: str) -> LogError:
-        """An error of a field, by its key in the file."""
+        """Return an error of a field, by its key in the file."""
         key = f"{self.name}.{type(self).model_fields[field].alias or field}"
         return LogError(f"{file}: {key}: {message}", file=file, field=key)
 
 
 def _made(kind: type[Made], table: SetupModel, **changed: Any) -> Made:
-    """A dataclass of a table's values, some of them changed."""
+    """Return a dataclass of a table's values, some of them changed."""
     return kind(**(dict(table) | changed))
 
 
@@ -91,7 +91,7 @@ class _SurveyPlan(SetupModel):
     camera: _Camera | None
 
     def plan(self) -> SurveyPlan:
-        """The plan of the table."""
+        """Return the plan of the table."""
         return _made(SurveyPlan, self, camera=None if self.camera is None else _made(Camera, self.camera))
 
 
@@ -108,7 +108,7 @@ class MissionTable(SetupModel):
     survey_plans: tuple[_SurveyPlan, ...] = ()
 
     def mission(self) -> Mission:
-        """The mission of the table."""
+        """Return the mission of the table."""
         lists = {"items": self.items, "fences": self.fences, "rally": self.rally}
         items = {name: tuple(_made(MissionItem, item) for item in found) for name, found in lists.items()}
         plans = tuple(plan.plan() for plan in self.survey_plans)
@@ -143,7 +143,7 @@ class RouteTable(SetupModel):
     open_items: Annotated[tuple[OpenItem, ...], Field(alias="open_items_item_text")] = ()
 
     def route(self, file: str) -> Route:
-        """The route of the table.  Raises LogError for columns that do not fit, and for a leg without length."""
+        """Return the route of the table.  Raises LogError for columns that do not fit, and for a leg without length."""
         waypoints = np.array(self.waypoints)
         if not (leg_runs(waypoints) > 0.0).all():
             raise self.fault(file, "waypoints", "a leg without horizontal length")
@@ -197,7 +197,7 @@ class EnvelopeTable(SetupModel):
     battery_guessed: bool = False
 
     def envelope(self, file: str) -> Envelope:
-        """The envelope of the table.  Raises LogError for tables that do not fit, and for axes out of order."""
+        """Return the envelope of the table.  Raises LogError for tables that do not fit, and for axes out of order."""
         for field in ("airspeed", "amsl"):
             if (np.diff(getattr(self, field)) <= 0.0).any():
                 raise self.fault(file, field, "not increasing")
@@ -251,5 +251,5 @@ class ProgramTable(SetupModel):
     unused: tuple[str, ...]
 
     def program(self) -> AutopilotProgram:
-        """The autopilot of the table."""
+        """Return the autopilot of the table."""
         return _made(AutopilotProgram, self)

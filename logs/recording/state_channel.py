@@ -114,12 +114,12 @@ class StateField(NamedTuple):
     component: int | None
 
     def of(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Its column of the values (t,) or (t, n) of the track's field."""
+        """Return its column of the values (t,) or (t, n) of the track's field."""
         return values if self.component is None else values[:, self.component]
 
 
 def _fields() -> tuple[StateField, ...]:
-    """Every field of the message after `row`, in order."""
+    """Return every field of the message after `row`, in order."""
     found = []
     for source, names in COLUMN_NAMES.items():
         kind = "<f8" if source in _DOUBLES else "<i4" if source == "leg" else "<f4"
@@ -263,7 +263,7 @@ def parse_row(data: bytes, parser: "type[Message]") -> StateRecords:
 
 @compiled
 def _count_matching(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> int:
-    """Count the first records, rows of bytes, that have the expected bytes in these columns."""
+    """Return count the first records, rows of bytes, that have the expected bytes in these columns."""
     for row in range(len(raw)):
         for k in range(len(columns)):
             if raw[row, columns[k]] != expected[k]:

@@ -94,7 +94,7 @@ def judge_flight(
 def _levels(
     requirements: RouteRequirements, flown: tuple[Finding, ...], flyable: bool, reference: ReferenceFlights | None
 ) -> tuple[LevelAnswer, ...]:
-    """What geometry and the airframe's reference flight say, where each differs, and the flight's own answer.
+    """Return what geometry and the airframe's reference flight say, where each differs, and the flight's own answer.
 
     Without the envelope there is the flight's own answer alone.
     """

@@ -32,7 +32,7 @@ from planner.plan import Plan, Violation
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """Findings of the mission's items alone, whoever flies them."""
+    """Return findings of the mission's items alone, whoever flies them."""
     return [item for rule in RULES.values() if rule.judge_items is not None for item in rule.judge_items(setup)]
 
 
@@ -47,7 +47,7 @@ def deciding_items(setup: FlightSetup) -> list[Finding]:
 
 
 def geometric_findings(requirements: RouteRequirements, flown: Sequence[Finding] | None = None) -> tuple[Finding, ...]:
-    """Findings of a route's geometry against the aircraft's envelope.
+    """Return findings of a route's geometry against the aircraft's envelope.
 
     flown: those of its flight, from which rules that say the same of both are taken.
     """
@@ -55,19 +55,19 @@ def geometric_findings(requirements: RouteRequirements, flown: Sequence[Finding]
 
 
 def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
-    """Those of `geometric_findings` that say something of legs, corners, threats or zones."""
+    """Return those of `geometric_findings` that say something of legs, corners, threats or zones."""
     return _judged(requirements, None, (), geometric=True, whole=False)
 
 
 def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
-    """Findings of a flown track against its route and the aircraft's envelope, but for how the flight ended."""
+    """Return findings of a flown track against its route and the aircraft's envelope, but for how the flight ended."""
     return (*deciding_items(requirements.setup), *_judged(requirements, aligned, (), geometric=False))
 
 
 def flown_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
 ) -> tuple[Finding, ...]:
-    """Findings of a flight: of its track, and of how it ended.
+    """Return findings of a flight: of its track, and of how it ended.
 
     ended: "completed" or what stopped it.  log_complete: the record has its end.
     """
@@ -85,7 +85,7 @@ def _judged(
     whole: bool = True,
     flown: Sequence[Finding] | None = None,
 ) -> tuple[Finding, ...]:
-    """Findings of all rules, and then those of how the flight ended, merged.
+    """Return findings of all rules, and then those of how the flight ended, merged.
 
     whole: whether those count that judge the flight as one.  flown: as of `geometric_findings`.
     """
@@ -146,7 +146,7 @@ def _other_sides(requirements: RouteRequirements, findings: Sequence[Finding]) -
 
 
 def one_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Findings with those of a rule at the corners of one stop, or at its legs, replaced by the worst of them.
+    """Return findings with those of a rule at the corners of one stop, or at its legs, replaced by the worst of them.
 
     >>> from logs.verdict.places import Place
     >>> legs = [Place("leg", k, to_item=4, number=2) for k in (2, 3, 4)]
@@ -235,7 +235,7 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
 
 
 def flown_level(setup: FlightSetup) -> LevelName:
-    """The level that a flight of a setup answers."""
+    """Return the level that a flight of a setup answers."""
     return setup.autopilot.level
 
 

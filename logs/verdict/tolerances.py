@@ -26,7 +26,8 @@ HOME_ERROR_M = 50.0
 HEIGHT_TOLERANCE_M = 0.1
 # m.  Radius of a loiter: 1e-7 degrees at its center.
 RADIUS_TOLERANCE_FRACTION = 0.02
-# Fraction.  The mean radius of a flown loiter may exceed its stated radius by this, in addition to `WAYPOINT_PASS_MARGIN_M`.
+# Fraction.  The mean radius of a flown loiter may exceed its stated radius by this, in addition to
+# `WAYPOINT_PASS_MARGIN_M`.
 LOITER_WIDENING_FRACTION = 0.25
 # Radii of the bank limit's arc.  Distance from its center that an autopilot that steers to it may reach on a loiter too
 # tight for its bank: up to 2.09 on 20 flights of ArduPlane's law with loiters of 10 to 100 m, in up to 12 m/s of wind.
@@ -176,13 +177,13 @@ EQUAL_DISTANCE_TOLERANCE_M = 0.5
 # m/s.  Error of a leg's mean airspeed.
 MEAN_SPEED_TOLERANCE_MPS = 1.0
 # Fraction of the commanded airspeed.  An airspeed that has settled further from its command than this, and by at least
-# `MEAN_SPEED_TOLERANCE_MPS`, is not held.  Five aircraft with three control laws flew legs within 10 % of it in still air, including
-# legs on which they took up 10 m/s more; 10 % less airspeed is a fifth less lift.
+# `MEAN_SPEED_TOLERANCE_MPS`, is not held.  Five aircraft with three control laws flew legs within 10 % of it in still
+# air, including legs on which they took up 10 m/s more; 10 % less airspeed is a fifth less lift.
 HELD_SPEED_FRACTION = 0.1
 # m/s.  PX4 flies faster on purpose if the commanded airspeed leaves less ground speed than this (FW_GND_SPD_MIN).
 MIN_GROUND_SPEED_MPS = 5.0
-# Fraction of a leg's duration at `MIN_CONTROLLED_AIRSPEED_MPS`.  Steady flight for this long is enough for the mean airspeed of a leg too
-# short for `SATURATED_TIME_S`.
+# Fraction of a leg's duration at `MIN_CONTROLLED_AIRSPEED_MPS`.  Steady flight for this long is enough for the mean
+# airspeed of a leg too short for `SATURATED_TIME_S`.
 MEASURED_FRACTION = 0.5
 # m.  Taking up another slope may put the aircraft this far ahead or behind, which matters on a short leg.
 SLOPE_CHANGE_LAG_M = 10.0
@@ -271,8 +272,8 @@ GO_AROUND_MODEL_ERROR_M = 6.0
 
 # Flown take-offs and landings
 
-# m.  Least height above ground of a climb-out beyond `LAUNCH_RUN_M`: less than the usual elevation files' own error, and
-# more than a small aircraft's banked wing reaches down.
+# m.  Least height above ground of a climb-out beyond `LAUNCH_RUN_M`: less than the usual elevation files' own error,
+# and more than a small aircraft's banked wing reaches down.
 LAUNCH_CLEARANCE_M = 2.0
 # m.  A climb-out that exceeds that by less than this is undecided: the simulated law's height was within 2.3 m of
 # ArduPlane's in the first 14 s of five flights.

@@ -188,7 +188,7 @@ class Verdict:
         return junit_text({name: self.present()})
 
     def _repr_html_(self) -> str:
-        """The verdict as a table for a notebook."""
+        """Return the verdict as a table for a notebook."""
         return verdict_html(self.present())
 
 

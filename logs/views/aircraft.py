@@ -209,7 +209,7 @@ def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool)
 
 
 def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
-    """A column for each control; each panel one quantity's change from level flight, over time (s).
+    """Return a column for each control; each panel one quantity's change from level flight, over time (s).
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.characteristics import step_responses

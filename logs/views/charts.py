@@ -149,7 +149,7 @@ class Chart:
     scaled: bool = False
 
     def shown_panels(self) -> tuple[Panel, ...]:
-        """The panels that have a value; the first where none has any."""
+        """Return the panels that have a value; the first where none has any."""
         return tuple(panel for panel in self.panels if panel.has_values()) or self.panels[:1]
 
     def shown_reach(self) -> tuple[float, float]:
@@ -162,7 +162,7 @@ class Chart:
 
 
 def series(name: str, role: str, along: Floats, values: ArrayLike, **more: Any) -> Layer:
-    """A line over a long axis, thinned without losing a peak.
+    """Return a line over a long axis, thinned without losing a peak.
 
     along, values: (t,).
     """
@@ -179,7 +179,7 @@ def filled_series(name: str, role: str, along: Floats, values: ArrayLike) -> Lay
 
 
 def parted(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Lines (k, 2) one behind another, a gap behind each: x and y of one layer.
+    """Return lines (k, 2) one behind another, a gap behind each: x and y of one layer.
 
     >>> x, y = parted([np.zeros((2, 2)), np.ones((1, 2))])
     >>> x.tolist()
@@ -207,7 +207,7 @@ def leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...
 
 
 def outline_rows(values: ArrayLike, count: int) -> Indices:
-    """Rows that keep the outline of a long series: lowest and highest of each of `count` equal blocks, in order.
+    """Return rows that keep the outline of a long series: lowest and highest of each of `count` equal blocks, in order.
 
     values: (t,); rows that are NaN are left out unless a block has nothing else.  Short series come back in full.
     """
@@ -245,7 +245,7 @@ def shorten(text: str, length: int) -> str:
 
 
 def numbers(values: Iterable[float], digits: int) -> list[float | None]:
-    """Numbers for JSON: rounded, None for what is not finite.
+    """Return numbers for JSON: rounded, None for what is not finite.
 
     >>> numbers([1.26, math.nan], 1)
     [1.3, None]
@@ -267,7 +267,7 @@ def telling_digits(values: Floats) -> int:
 
 
 def chart_json(chart: Chart) -> Json:
-    """The chart as what JSON can hold.
+    """Return the chart as what JSON can hold.
 
     >>> line = Layer("line", "flown", "flown", np.array([0.0, 1.0]), np.array([2.0, np.nan]))
     >>> made = chart_json(Chart("a flight", "time", "s", (Panel("bank", "°", (line,)),)))
@@ -286,7 +286,7 @@ def chart_json(chart: Chart) -> Json:
 
 
 def panel_json(panel: Panel) -> Json:
-    """A panel as what JSON can hold; layers without a value and limits that are NaN are left out."""
+    """Return a panel as what JSON can hold; layers without a value and limits that are NaN are left out."""
     labels = [label for label in panel.labels if label.rank in ("end", "number")]
     return {
         "title": panel.title,
@@ -320,7 +320,7 @@ class LegendEntry:
 
 
 def legend_entries(panels: Sequence[Panel]) -> tuple[LegendEntry, ...]:
-    """Each name of the panels' layers once, in their order; limits last, as lines without values."""
+    """Return each name of the panels' layers once, in their order; limits last, as lines without values."""
     found: dict[str, list[Layer]] = {}
     for panel in panels:
         for layer in panel.layers:

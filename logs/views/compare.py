@@ -29,7 +29,7 @@ class NamedFlight:
 
 
 def both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
-    """The first flight's map and route with both tracks over it, and both winds where they differ."""
+    """Return the first flight's map and route with both tracks over it, and both winds where they differ."""
     first, _ = flights
     winds = [
         NamedWind(flight.setup.scenario.wind, flight.name, role) for flight, role in zip(flights, ROLES, strict=True)
@@ -51,7 +51,7 @@ def both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
 
 
 def both_along(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
-    """Height, height above ground, airspeed, bank, cross-track and throttle of both over the distance flown.
+    """Return height, height above ground, airspeed, bank, cross-track and throttle of both over the distance flown.
 
     Without terrain, that of the height above it is left out.
     """
@@ -113,7 +113,7 @@ _REFLOWN = (
 
 
 def refly_charts(again: Reflight) -> dict[str, Chart]:
-    """Each quantity over the way, as flown and as simulated, by the name of its PNG; only what the log holds.
+    """Return each quantity over the way, as flown and as simulated, by the name of its PNG; only what the log holds.
 
     >>> from flight.simulation.setup import MissionStretch
     >>> from logs.recording.example_log import example_log

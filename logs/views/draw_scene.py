@@ -97,7 +97,7 @@ def draw_scene(view: SceneView) -> Figure:
 
 
 def _widened(bounds: Floats) -> Floats:
-    """Ground about a narrow scene, (2, 2) m: no side is less than a share of the other."""
+    """Return ground about a narrow scene, (2, 2) m: no side is less than a share of the other."""
     sides = np.ptp(bounds, axis=1)
     more = 0.5 * np.maximum(_MIN_SIDE * sides.max() - sides, 0.0)
     return np.asarray(bounds + np.stack([-more, more], axis=1))
@@ -239,7 +239,7 @@ def _zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
 
 
 def _handle(kind: LayerKind, role: str, text: str) -> Any:
-    """A line of the legend."""
+    """Return a line of the legend."""
     none = np.zeros(0)
     return legend_handle(LegendEntry(text, (Layer(kind, text, role, none, none),)))
 

@@ -112,7 +112,7 @@ def png_bytes(figure: Figure) -> bytes:
 
 
 def few_colours(png: bytes) -> bytes:
-    """A PNG with 256 colours at most: of shaded ground a fifth of its size, with no difference to see on paper.
+    """Return a PNG with 256 colours at most: of shaded ground a fifth of its size, with no difference to see on paper.
 
     >>> few_colours(png_bytes(new_figure(1.0)))[1:4]
     b'PNG'
@@ -231,7 +231,7 @@ def _axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
 
 
 def shares_legend(panels: Sequence[Panel]) -> bool:
-    """Whether one legend can stand for all panels: no look has two meanings, no meaning two looks, some repeat.
+    """Return True if one legend can stand for all panels: no look has two meanings, no meaning two looks, some repeat.
 
     >>> none = np.zeros(2)
     >>> flown, asked = Layer("line", "flown", "flown", none, none), Layer("line", "asked", "commanded", none, none)
@@ -476,7 +476,7 @@ def write_label(placer: LabelPlacer, label: Label) -> None:
 
 
 def legend_handle(entry: LegendEntry) -> Any:
-    """What a legend shows beside an entry's text."""
+    """Return what a legend shows beside an entry's text."""
     layer = entry.layers[0]
     look, text = theme.LOOKS[layer.role], textwrap.fill(entry.text, 36)
     if layer.kind in ("band", "area"):

@@ -25,7 +25,7 @@ class EnvelopeLine:
 
 
 def envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
-    """The envelope at the lowest and the highest height of the route."""
+    """Return the envelope at the lowest and the highest height of the route."""
     envelope, up = setup.envelope, setup.route.waypoints[:, 2]
     speeds = np.linspace(envelope.airspeed[0], envelope.airspeed[-1], 120)
     lines = []

@@ -80,7 +80,7 @@ def _rules_at(failed: list[Finding], kind: PlaceKind, count: int) -> dict[int, t
 
 
 def stop_rows(stops: Sequence[int]) -> list[int]:
-    """Waypoints at which a stop begins: of a loiter's corners the first.
+    """Return waypoints at which a stop begins: of a loiter's corners the first.
 
     stops: number of the stop of each waypoint, in flying order.
 
@@ -112,7 +112,7 @@ def paths_differ(a: Floats, b: Floats, tolerance: float) -> bool:
 
 
 def _farthest(points: Floats, path: Floats) -> float:
-    """Largest distance (m) from any of the points to the path."""
+    """Return largest distance (m) from any of the points to the path."""
     start, step = path[:-1], np.diff(path, axis=0)
     length2 = (step**2).sum(axis=1)
     farthest = 0.0
@@ -142,7 +142,7 @@ def track_distance(waypoints: Floats, track: Track) -> Floats:
 
 
 def fail_labels(failed: Failures, corners: Floats, threats_at: Mapping[int, tuple[float, float]]) -> tuple[Label, ...]:
-    """Name the failing rules at the first failing legs, threats and waypoints, as in the verdict.
+    """Return name the failing rules at the first failing legs, threats and waypoints, as in the verdict.
 
     corners: (w, 2) drawn positions of the route's waypoints.  threats_at: of threats by their index; others get none.
     """
@@ -162,7 +162,7 @@ def radius_of(threats: Threats, place: Place) -> float:
 
 
 def inside_threats(failed: Failures, threats: Threats, track: Track) -> NDArray[np.bool_]:
-    """Rows (t,) of the track inside a sphere whose rule fails."""
+    """Return rows (t,) of the track inside a sphere whose rule fails."""
     inside = np.zeros(len(track), dtype=bool)
     for place in failed.threats:
         away = track.position - threats.position[place.index or 0]

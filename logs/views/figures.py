@@ -56,7 +56,7 @@ class Subject:
         return f"{ground}, {threats} threats, the planned path of {legs} legs{self.flown(' and the flown track')}."
 
     def flown(self, words: str, otherwise: str = "") -> str:
-        """Words that are true of a flight, and others of a bare plan."""
+        """Return words that are true of a flight, and others of a bare plan."""
         return words if self.track is not None else otherwise
 
 
@@ -348,7 +348,7 @@ def draw(view: View) -> "Figure":
 
 
 def view_json(view: View) -> dict[str, Any]:
-    """A description as what JSON can hold, for the page."""
+    """Return a description as what JSON can hold, for the page."""
     if isinstance(view, MapChart):
         return map_json(view)
     return scene_data(view) if isinstance(view, SceneView) else chart_json(view)

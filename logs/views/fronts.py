@@ -25,7 +25,7 @@ class _Named:
 
 
 def _named(front: Front) -> list[_Named]:
-    """The best plan in each objective; one that is best in two is named once, for the first."""
+    """Return the best plan in each objective; one that is best in two is named once, for the first."""
     rows = front.objectives()
     names = ("shortest", "least exposed", "highest above ground", f"least {front.fourth}")
     roles = ("front-shortest", "front-unseen", "front-high", "front-sparing")

@@ -35,7 +35,7 @@ def equation_chart(equation: Equation) -> Chart:
 
 
 def replay_chart(names: Sequence[str], units: Sequence[str], logged: Floats, identified: Floats, hertz: float) -> Chart:
-    """Some windows of a replay behind each other: a panel a quantity.
+    """Return some windows of a replay behind each other: a panel a quantity.
 
     names, units: of the k quantities.  logged, identified: (t, k).
     """

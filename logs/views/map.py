@@ -83,7 +83,7 @@ def flight_map(
     waypoint_words: Sequence[str] = (),
     stops: Sequence[int] | None = None,
 ) -> MapChart:
-    """The map of a plan, or of its flight.
+    """Return the map of a plan, or of its flight.
 
     plan_waypoints: (p, 3) m or None; route_waypoints: (w, 3) m as flown, or None for a plan alone.  The route is
     numbered and carries the verdict's marks; a plan that differs from it by more than 1 m is drawn beside it.
@@ -150,7 +150,7 @@ def world_map(
     entered: frozenset[int] = frozenset(),
     winds: Sequence[NamedWind] = (),
 ) -> MapChart:
-    """A map of a scenario: its area, threats and zones under layers, start and destination over them.
+    """Return a map of a scenario: its area, threats and zones under layers, start and destination over them.
 
     labels: before the names of threats and zones.  extent: as of `map_extent`.  route: (w, 3) m, at whose heights
     missiles are filled; entered: threats whose rule fails.
@@ -172,7 +172,7 @@ def world_map(
 
 
 def map_json(chart: MapChart) -> Json:
-    """The map as what JSON can hold, lengths in m; its ground is the 3-D view's."""
+    """Return the map as what JSON can hold, lengths in m; its ground is the 3-D view's."""
     return {
         "origin": chart.origin,
         "east": numbers(chart.east, 1),
@@ -234,7 +234,7 @@ def _flown(drawn: DrawnTrack) -> Layer:
 
 
 def _inside(scenario: Scenario, track: Track, failed: Failures) -> list[Layer]:
-    """The part of a track inside a threat whose rule fails."""
+    """Return the part of a track inside a threat whose rule fails."""
     inside = inside_threats(failed, scenario.threats, track)
     if not inside.any():
         return []
@@ -279,7 +279,7 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int] | 
 
 
 def _same(a: Floats, b: Floats) -> bool:
-    """Two points lie within 50 m on the ground: one marker stands for both."""
+    """Return two points lie within 50 m on the ground: one marker stands for both."""
     return float(np.hypot(*(a[:2] - b[:2]))) < 50.0
 
 
@@ -296,7 +296,7 @@ def _numbers(scenario: Scenario, route: Floats, stops: Sequence[int], failed: Fa
 
 
 def position_text(lat_deg: float, lon_deg: float) -> str:
-    """A place as an axis names it; "" for one that is not known.
+    """Return a place as an axis names it; "" for one that is not known.
 
     >>> position_text(46.0, -8.5)
     '46.0000°, −8.5000°'

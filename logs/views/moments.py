@@ -17,7 +17,7 @@ MAX_MOMENTS = 2000
 
 
 def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", role: str = "flown") -> dict[str, Any]:
-    """Columns of at most `MAX_MOMENTS` rows of a flight, from its first to its last known place.
+    """Return columns of at most `MAX_MOMENTS` rows of a flight, from its first to its last known place.
 
     time (s); east, north, up (m AMSL), above (m above ground, null without terrain); airspeed, climb (m/s); bank (right
     positive), pitch, heading (°); leg.  What is not a number is null.  Beside them legs: what each leg is called.

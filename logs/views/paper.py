@@ -50,7 +50,7 @@ class PaperPath:
 
 
 def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -> Figure:
-    """Paths of one algorithm over contours, missile and radar circles (Yang, Tang and Lozano 2014, Figs. 5-8).
+    """Return paths of one algorithm over contours, missile and radar circles (Yang, Tang and Lozano 2014, Figs. 5-8).
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
@@ -79,7 +79,7 @@ def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -
 
 
 def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: int) -> Figure:
-    """One path of each encoding over the same map (Yang, Tang and Lozano 2014, Figs. 9-12).
+    """Return one path of each encoding over the same map (Yang, Tang and Lozano 2014, Figs. 9-12).
 
     chosen: paths by encoding.
 

@@ -39,7 +39,7 @@ def profile_chart(
     stops: Sequence[int] | None = None,
     above_ground: Floats | None = None,
 ) -> Chart:
-    """Heights (m AMSL) over the distance along the route (km).
+    """Return heights (m AMSL) over the distance along the route (km).
 
     The route is route_waypoints (w, 3), or plan_waypoints where there is none; without either, the straight line
     from start to destination.  The ground and the spheres' cuts are those under and about the route: a sphere or a zone
@@ -110,7 +110,7 @@ def _chart(scenario: Scenario, at: Floats, first: list[int], panel: Panel, *, st
 
 
 def _leg_begins(first: list[int], count: int) -> list[int]:
-    """Waypoints at which a leg as people count them begins: where the stop before it ends."""
+    """Return waypoints at which a leg as people count them begins: where the stop before it ends."""
     return [0, *(k - 1 for k in first[2:])] if count > 1 else []
 
 
@@ -131,7 +131,7 @@ def _over_ground(
 
 
 def ground_under(scenario: Scenario, points: Floats) -> Floats | None:
-    """Terrain height (s,) under the points, None where there is none at all."""
+    """Return terrain height (s,) under the points, None where there is none at all."""
     if scenario.terrain is None:
         return None
     heights = scenario.terrain.height(points[:, 0], points[:, 1])
@@ -157,7 +157,7 @@ def _span(scenario: Scenario, route: Floats, track: Track | None, ground: Floats
 
 
 def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
-    """The ground, the band above it that the path must stay out of, and the greatest height."""
+    """Return the ground, the band above it that the path must stay out of, and the greatest height."""
     ground, along = plane.ground, plane.kilometres
     if ground is None:
         return []

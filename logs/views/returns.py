@@ -34,7 +34,7 @@ def way_layers(
     place: Callable[[One], tuple[float, float]],
     words: Callable[[One], str],
 ) -> list[Layer]:
-    """The way in one layer for each look, in the order of the looks.
+    """Return the way in one layer for each look, in the order of the looks.
 
     looks: role and name of each kind of stretch.  place: what of a point is drawn.  words: what the page says of it.
     """
@@ -48,7 +48,7 @@ def way_layers(
 
 
 def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
-    """The way from above, coloured by what comes of a return from there, and the ways of the worst."""
+    """Return the way from above, coloured by what comes of a return from there, and the ways of the worst."""
     scenario, route = setup.scenario, setup.route.waypoints
     limit = drawn.returns.limit
 
@@ -98,7 +98,7 @@ def _targets(targets: dict[str, tuple[float, float, float]]) -> list[Layer]:
 
 
 def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None:
-    """Heights of the worst returns over what lies under them, a panel each; None where there is none."""
+    """Return heights of the worst returns over what lies under them, a panel each; None where there is none."""
     if not drawn.worst:
         return None
     scenario = setup.scenario
@@ -118,7 +118,7 @@ def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None
 
 
 def _span(scenario: Scenario, one: WorstReturn) -> tuple[float, float]:
-    """Lowest and highest of a way and the ground under it, with a margin, m."""
+    """Return lowest and highest of a way and the ground under it, with a margin, m."""
     ground = ground_under(scenario, one.way)
     heights = np.concatenate([one.way[:, 2], np.zeros(0) if ground is None else ground])
     low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
@@ -147,7 +147,7 @@ def _profile(scenario: Scenario, one: WorstReturn, number: int, span: tuple[floa
 
 
 def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track | None) -> Chart | None:
-    """Heights over time: the flight's by what comes of a return, and the least; what a glide has left over.
+    """Return heights over time: the flight's by what comes of a return, and the least; what a glide has left over.
 
     None where nothing was judged.
     """
@@ -182,7 +182,7 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
 
 
 def _flown_places(drawn: DrawnReturns, track: Track | None) -> tuple[Floats, Floats]:
-    """Times (t,) and places (t, 3) of the way: of the track, or of where returns begin."""
+    """Return times (t,) and places (t, 3) of the way: of the track, or of where returns begin."""
     first, last = drawn.returns.each[0].time, max(one.time for one in drawn.returns.each)
     if track is not None and drawn.returns.flown:
         whole = np.isfinite(track.position).all(axis=1) & (track.time >= first) & (track.time <= last)
@@ -195,7 +195,7 @@ def _flown_places(drawn: DrawnReturns, track: Track | None) -> tuple[Floats, Flo
 
 
 def _left_over(glides: Glides) -> Panel:
-    """Height left over for what can be reached without the engine, by time."""
+    """Return height left over for what can be reached without the engine, by time."""
     time = np.array([one.time for one in glides.each])
 
     def line(name: str, role: str, values: list[float]) -> Layer:

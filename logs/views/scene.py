@@ -89,7 +89,7 @@ def script_json(data: object) -> str:
 
 
 def scene_data(view: SceneView) -> dict[str, object]:
-    """The scene as what JSON can hold; of the flight only how far the scene reaches.
+    """Return the scene as what JSON can hold; of the flight only how far the scene reaches.
 
     Lengths are in m; heights of the ground are 16-bit shares of their range, little-endian, in base64.
     """
@@ -118,7 +118,7 @@ def scene_data(view: SceneView) -> dict[str, object]:
 
 
 def _zone_walls(setup: FlightSetup) -> dict[str, object]:
-    """Names, kinds and rings of zones, each corner's foot and upper edge; nothing where there are none."""
+    """Return names, kinds and rings of zones, each corner's foot and upper edge; nothing where there are none."""
     zones, up = setup.scenario.zones, setup.route.waypoints[:, 2]
     if not zones:
         return {}

@@ -17,7 +17,7 @@ _POINTS = 8000
 
 
 def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
-    """Each survey of a flight, its lines laid level; None where there is none, or nothing was flown of it."""
+    """Return each survey of a flight, its lines laid level; None where there is none, or nothing was flown of it."""
     if not surveys_of(setup):
         return None
     requirements = route_requirements(setup)
@@ -84,7 +84,7 @@ def _used(measure: LineMeasure | None) -> list[tuple[float, float]]:
 
 
 def _part(corners: Floats, low: float, high: float) -> Floats:
-    """The part of a line (n, 2) between two distances along it, m."""
+    """Return the part of a line (n, 2) between two distances along it, m."""
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
     at = np.concatenate([[low], run[(run > low) & (run < high)], [min(high, run[-1])]])
     return np.stack([np.interp(at, run, corners[:, axis]) for axis in range(2)], axis=1)

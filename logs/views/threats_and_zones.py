@@ -79,7 +79,7 @@ def circle(centre: Floats, radius: float) -> tuple[Floats, Floats]:
 
 
 def threat_names(threats: Threats, named: frozenset[int] = frozenset()) -> tuple[Label, ...]:
-    """Names of threats at their places on the map.  named: those that have labels of their own."""
+    """Return names of threats at their places on the map.  named: those that have labels of their own."""
     if len(threats) > _MAX_NAMES:
         return ()
     return tuple(
@@ -90,7 +90,7 @@ def threat_names(threats: Threats, named: frozenset[int] = frozenset()) -> tuple
 
 
 def kill_radius_at_path(threats: Threats, chosen: NDArray[np.intp], route: Floats | None) -> Floats:
-    """Radius (m) of each chosen missile sphere's cut at the height of the path where it passes nearest."""
+    """Return radius (m) of each chosen missile sphere's cut at the height of the path where it passes nearest."""
     radius = threats.kill_radius[chosen]
     if route is None:
         return radius
@@ -206,7 +206,7 @@ def entered_cuts(
 
 
 def zone_label(zone: Zone) -> str:
-    """A zone's name and band of heights.
+    """Return a zone's name and band of heights.
 
     >>> from world.airspace.zones import Cylinder
     >>> zone_label(Zone("mast", "exclusion", Cylinder(0.0, 0.0, 90.0), ceiling=ZoneLevel(120.0, "ground")))
@@ -227,7 +227,7 @@ def _level_text(level: ZoneLevel) -> str:
 
 
 def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
-    """Zones from above, m: exclusions as areas, holes left open, inclusions as lines."""
+    """Return zones from above, m: exclusions as areas, holes left open, inclusions as lines."""
     layers = []
     for zone in zones:
         gap = np.full((1, 2), np.nan)

@@ -24,14 +24,14 @@ def doubles(values: NDArray[np.float32]) -> Floats:
 
 
 def over_time(setup: FlightSetup, subject: str, panels: list[Panel], track: Track) -> Chart:
-    """A chart over the time since the start, with the legs marked."""
+    """Return a chart over the time since the start, with the legs marked."""
     title = f"{shorten(setup.scenario.name, 60)}: {subject}"
     marks = leg_marks(track.leg, track.time)
     return Chart(title, "time since the start", "s", tuple(panels), marks=marks, timed=True)
 
 
 def time_chart(setup: FlightSetup, track: Track) -> Chart:
-    """Airspeed, bank, climb, load factor, wind, cross-track error, height error and clearance over time.
+    """Return airspeed, bank, climb, load factor, wind, cross-track error, height error and clearance over time.
 
     Clearance is computed from track and terrain, not read from the log; its panel is missing without terrain.
     """

@@ -95,6 +95,6 @@ def _panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue
 
 
 def _is_near(limits: Floats, rule: str, largest: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Which limits are shown: of turns and corridors, one far above everything else would press that flat."""
+    """Return which limits are shown: of turns and corridors, one far above everything else would press that flat."""
     far = _FAR * max(largest, 1e-9) if rule in ("turn", "corridor") else math.inf
     return np.asarray(limits <= far, dtype=np.bool_)

@@ -174,7 +174,7 @@ def describe_aircraft(
 
 
 def _opened(name: str | Path) -> Aircraft:
-    """The aircraft of a name or in a folder.  Raises PlanflyError."""
+    """Return the aircraft of a name or in a folder.  Raises PlanflyError."""
     text = str(name.absolute()) if isinstance(name, Path) else name
     if not names_folder(text):
         return find_aircraft(text)

@@ -101,7 +101,7 @@ def _dispersions(file: str | Path | None) -> Dispersions:
 def continued_goal(
     folder: Path, flights: int | None, prove: float | None, at_least: float | None, confidence: float | None
 ) -> Goal:
-    """The goal of a campaign that goes on: what is asked for now, or, where nothing is, its own.
+    """Return the goal of a campaign that goes on: what is asked for now, or, where nothing is, its own.
 
     Raises PlanflyError for numbers out of their ranges, and for a folder without a campaign.
     """

@@ -69,7 +69,7 @@ def terrain(
 
 
 def _box(given: Sequence[float]) -> Box:
-    """Raises ArgumentError."""
+    """Raise ArgumentError."""
     try:
         south, west, north, east = (float(value) for value in given)
     except (TypeError, ValueError):
@@ -83,7 +83,7 @@ def _box(given: Sequence[float]) -> Box:
 
 
 def _around(file: Path) -> Box:
-    """The box of all places of a mission: its items, home, fences and rally points.  Raises PlanflyError."""
+    """Return the box of all places of a mission: its items, home, fences and rally points.  Raises PlanflyError."""
     mission = read_mission(file)
     places = [
         (one.lat_deg, one.lon_deg) for one in (*mission.items, *mission.fences, *mission.rally) if one.has_position
@@ -103,7 +103,7 @@ def _around(file: Path) -> Box:
 
 
 def _widened(box: Box, margin: float) -> Box:
-    """An area and the ground beside it.  margin: km."""
+    """Return an area and the ground beside it.  margin: km."""
     up = margin / _DEGREE
     across = up / math.cos(math.radians(min(_FURTHEST, max(abs(box.south), abs(box.north)))))
     return Box(box.south - up, box.west - across, box.north + up, box.east + across)

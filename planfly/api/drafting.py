@@ -80,7 +80,7 @@ def new_scenario(
 
 
 def _target(folder: Path, name: str, *, overwrite: bool) -> Path:
-    """The file to write.  Raises PlanflyError for one that is there, and for a folder that cannot be made."""
+    """Return the file to write.  Raises PlanflyError for one that is there, and for a folder that cannot be made."""
     if not name.isprintable() or not 1 <= len(name) <= 100:
         allowed = "a folder with a name of 1 to 100 printable characters is expected"
         raise PlanflyError.of_argument("folder", folder, allowed, shown=ascii(str(folder)))
@@ -106,12 +106,12 @@ def _place(keyword: str, given: Sequence[float]) -> Place:
 
 
 def _whole(given: str | Path, *, is_name: bool) -> str:
-    """A path from anywhere; a name of what planfly ships stays."""
+    """Return a path from anywhere; a name of what planfly ships stays."""
     return str(given) if is_name else whole_path(Path(given))
 
 
 def _from(folder: Path, given: str) -> str:
-    """A whole path as it is written in a file of a folder; a name stays."""
+    """Return a whole path as it is written in a file of a folder; a name stays."""
     if not Path(given).is_absolute():
         return given
     relative = os.path.relpath(given, whole_path(folder))

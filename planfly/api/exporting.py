@@ -132,7 +132,7 @@ def export(
 
 
 def _as_file(source: FlightLog | FlownMission | Plan | str | Path, place: contextlib.ExitStack) -> Path:
-    """The file that a source is, or one made for it while the place is open."""
+    """Return the file that a source is, or one made for it while the place is open."""
     if isinstance(source, Plan):
         file = place.enter_context(temporary_folder("planfly-export-")) / "plan.json"
         write_whole(file, plan_json(source))
@@ -218,14 +218,14 @@ def _read_mission(path: Path, options: MissionOptions, *, placed: bool, coloured
 
 
 def _with_zones(source: _Source, scenario: Scenario) -> _Source:
-    """The zones named as fence items, beside the mission's own."""
+    """Return the zones named as fence items, beside the mission's own."""
     items, notes = zone_fences(scenario.zones, scenario.origin)
     fenced = replace(source.mission, fences=numbered([*source.mission.fences, *items]))
     return replace(source, mission=fenced, notes=tuple(notes))
 
 
 def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
-    """Text of a target, and what it holds."""
+    """Return text of a target, and what it holds."""
     suffix, mission = target.suffix.lower(), source.mission
     if source.autopilot is not None:
         mission = replace(mission, autopilot=source.autopilot.name)
@@ -253,7 +253,7 @@ def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
 
 
 def judged_parameters(mission: str, autopilot: Autopilot) -> tuple[str, str]:
-    """Parameters of take-off, landing and returns as a file's text, and what it holds.
+    """Return parameters of take-off, landing and returns as a file's text, and what it holds.
 
     mission: its name in messages.  Raises MissionError for an autopilot that has none of them.
     """
@@ -267,7 +267,7 @@ def judged_parameters(mission: str, autopilot: Autopilot) -> tuple[str, str]:
 
 
 def _flown_text(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
-    """A flight's rows in another program's form, and what that holds; each form loads what it alone needs."""
+    """Return a flight's rows in another program's form, and what that holds; each form loads what it alone needs."""
     content = f"{len(log.track):,} rows, {log.end_time:.0f} s"
     if suffix == ".tlog":
         need_extra("live", ".tlog needs")

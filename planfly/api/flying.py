@@ -94,7 +94,7 @@ class FlownMission:
         return f"<FlownMission {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
 
     def _repr_html_(self) -> str:
-        """How a notebook shows it."""
+        """Return how a notebook shows it."""
         return self.verdict._repr_html_() + self.track._repr_html_()
 
 
@@ -320,7 +320,7 @@ def check(
 
 
 def _source_of(what: FlightLog | FlownMission | Plan | str | Path) -> str:
-    """The file that is judged, as messages name it."""
+    """Return the file that is judged, as messages name it."""
     if isinstance(what, FlightLog):
         return what.source
     if isinstance(what, FlownMission):

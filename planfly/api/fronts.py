@@ -114,7 +114,7 @@ def _write(front: Front, world: Scenario, folder: Path) -> None:
 
 
 def table_rows(front: Front) -> list[dict[str, Any]]:
-    """Rows of a front's table, by `COLUMNS`; None for energy that is not known."""
+    """Return rows of a front's table, by `COLUMNS`; None for energy that is not known."""
     return [_row(number, one) for number, one in enumerate(front.plans, 1)]
 
 

@@ -179,7 +179,7 @@ def _refuse_equal(logs: Sequence[MotionLog]) -> None:
 
 
 def _stretches(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
-    """The log's stretches, and its outputs: the base's own where it has the same outputs, rigged as stated.
+    """Return the log's stretches, and its outputs: the base's own where it has the same outputs, rigged as stated.
 
     Those of PX4, and elevons, which are mixed within the model, leave the base's own.
     """
@@ -196,14 +196,14 @@ def _stretches(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRecord], dic
 
 
 def _own_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
-    """Number of the output of each control that has one of its own."""
+    """Return number of the output of each control that has one of its own."""
     if log.program_kind == "px4":
         return {}
     return {name: output.output for name, output in log_outputs(log, prior).items()}
 
 
 def _same(one: ServoOutput, other: ServoOutput) -> bool:
-    """Whether two are the same output over the same travel, the same way round."""
+    """Return True if two are the same output over the same travel, the same way round."""
     (a, *_, b), (c, *_, d) = one.value, other.value
     ends = (one.pulse[0], one.pulse[-1]) == (other.pulse[0], other.pulse[-1])
     return one.output == other.output and ends and (b - a) * (d - c) > 0.0
@@ -270,6 +270,6 @@ def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
 
 
 def slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
-    """Those with few rows a second."""
+    """Return those with few rows a second."""
     rates = [(log, slowest_rows(log)) for log in logs]
     return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < PLENTY_HZ)

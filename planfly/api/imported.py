@@ -150,7 +150,7 @@ def _draw(folder: Path, again: Reflight, ending: str) -> list[Path]:
 
 
 def _record(folder: Path, again: Reflight, log: FlightLog, ending: str) -> Path:
-    """The simulated flight as a log of its own, for `compare` and `replay`."""
+    """Return the simulated flight as a log of its own, for `compare` and `replay`."""
     path = folder / f"simulated{ending}.mcap"
     verdict = judge_flight(again.setup, again.simulated, again.ended)
     with Recorder(path, replace(again.setup, seed=log.setup.seed)) as recorder:

@@ -39,7 +39,7 @@ class BestFound:
 
     @property
     def feasible(self) -> bool:
-        """Whether all constraints are met."""
+        """True if all constraints are met."""
         return not (self.violations > 0.0).any()
 
 
@@ -66,7 +66,7 @@ class Optimiser:
         self.evaluations = 0
 
     def ask(self) -> Floats:
-        """Points (n, d) in the box that want values: the whole population first, then half of it at a time.
+        """Return points (n, d) in the box that want values: the whole population first, then half of it at a time.
 
         "multistart" asks for as many as the generation of its search has.
         """

@@ -137,7 +137,7 @@ def _planned(
 
 
 def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
-    """What a search asks between generations: "interrupted", "budget" after so many seconds, or "" to go on."""
+    """Return what a search asks between generations: "interrupted", "budget" after so many seconds, or "" to go on."""
     deadline = None if seconds is None else time.monotonic() + seconds
 
     def ends() -> str:
@@ -156,7 +156,7 @@ def conditions_of_plan(plan: Plan) -> Conditions:
 
 
 def what_blocks(plan: Plan) -> tuple[str, ...]:
-    """What is in the way of a plan that is not feasible, a line each; nothing for a feasible one.
+    """Return what is in the way of a plan that is not feasible, a line each; nothing for a feasible one.
 
     >>> import planfly
     >>> planfly.what_blocks(planfly.plan("tight", seed=1))
@@ -168,7 +168,7 @@ def what_blocks(plan: Plan) -> tuple[str, ...]:
 
 
 def scenarios() -> dict[str, str]:
-    """Name and description of each embedded scenario.
+    """Return name and description of each embedded scenario.
 
     >>> import planfly
     >>> list(planfly.scenarios())[0]

@@ -52,7 +52,7 @@ def replayed_part(log: FlightLog, start: float | None, end: float | None) -> tup
 def timeline(
     log: FlightLog | str | Path, *, start: float | None = None, end: float | None = None
 ) -> tuple[TimelineEntry, ...]:
-    """What happened in a flight, in order of time: legs, turns, clearances, threats and events.
+    """Return what happened in a flight, in order of time: legs, turns, clearances, threats and events.
 
     log: a flight log, or its path.  start, end: of the part that is listed, s of the flight; None for all of it.
     Raises a `planfly.PlanflyError` for bad input.
@@ -69,7 +69,7 @@ def timeline(
 
 @with_warm_up()
 def instruments(log: FlightLog | str | Path) -> Instruments:
-    """The instruments of a recorded flight: `Instruments.frame` gives them at a time, as lines of text.
+    """Return the instruments of a recorded flight: `Instruments.frame` gives them at a time, as lines of text.
 
     >>> import planfly
     >>> from logs.recording.example_log import example_log
@@ -196,7 +196,7 @@ def play_to_foxglove(
 
 
 def _origin(text: str) -> str:
-    """The origin of web pages, as browsers state it.  Raises LogError for what is none."""
+    """Return the origin of web pages, as browsers state it.  Raises LogError for what is none."""
     if not _ORIGIN.fullmatch(text):
         allowed = "the origin of a web page is expected, such as https://example.com or http://localhost:8080"
         raise LogError.of_argument("allow_origin", text, allowed)

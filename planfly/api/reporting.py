@@ -41,7 +41,7 @@ class WrittenReport:
     verdict: Verdict | None = None
 
     def _repr_html_(self) -> str:
-        """How a notebook shows it."""
+        """Return how a notebook shows it."""
         return html_table(f"Report {self.page}", [(file.name,) for file in self.files])
 
 
@@ -58,7 +58,7 @@ class _Shown(NamedTuple):
 
 @with_warm_up()
 def figures(source: Source) -> "dict[str, Figure]":
-    """The pictures of a flight, or of a plan that was not flown, as matplotlib figures by name.
+    """Return the pictures of a flight, or of a plan that was not flown, as matplotlib figures by name.
 
     source: a flight log or its path, what `planfly.fly` gave, or a `Plan`.
     "map", "profile", "scene", "turns", "envelope", and of a flight "time", "exposure", "controls" and "energy".
@@ -143,7 +143,7 @@ def compare(
     svg: bool = False,
     overwrite: bool = False,
 ) -> Comparison:
-    """Two flights judged and measured alike.
+    """Return two flights judged and measured alike.
 
     first, second: flight logs, or their paths.
     out: a folder for ``compare.html`` and its pictures; None draws none.  svg, overwrite: as of `planfly.report`.

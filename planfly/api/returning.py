@@ -80,12 +80,12 @@ class ReturnsFound:
 
     @property
     def safe(self) -> bool:
-        """Whether every return is."""
+        """True if every return is."""
         return self.returns.safe
 
     @property
     def undecided(self) -> bool:
-        """Whether none is known to be unsafe, and of some it is not known."""
+        """True if none is known to be unsafe, and of some it is not known."""
         return self.returns.undecided
 
     @property
@@ -217,7 +217,7 @@ def _imported(path: Path, options: LogOptions) -> "ImportedFlight":
 
 
 def _over(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
-    """A setup with another ground, where one is named."""
+    """Return a setup with another ground, where one is named."""
     return setup if terrain is None else setup.in_scenario(over_terrain(setup.scenario, str(terrain)))
 
 
@@ -292,7 +292,7 @@ def _judged(setup: FlightSetup, track: Track, asked: _Asked, ended: str) -> Retu
 
 
 def _suggested(world: ReturnWorld, starts: ReturnStarts, found: ReturnsFound, every: float) -> tuple[Suggested, ...]:
-    """What helps of what would make them safe."""
+    """Return what helps of what would make them safe."""
     # What sinks to the ground in a take-off or a landing, nothing of this would help.
     judged = [one.time for one in found.returns.each]
     aloft = starts.at(np.flatnonzero(np.isin(starts.time, judged)))

@@ -73,7 +73,7 @@ class SurveyFound:
 
     @property
     def usable(self) -> bool:
-        """Whether enough of every line can be used, and photos overlap as asked."""
+        """True if enough of every line can be used, and photos overlap as asked."""
         return all(usable(one) for lines in self.lines for one in lines) and all(map(kept_overlap, self.overlaps))
 
     @property
@@ -162,7 +162,7 @@ def survey(
 
 
 def _camera(numbers: tuple[float, ...] | None) -> Camera | None:
-    """A call's camera.  Raises ArgumentError for one that is none."""
+    """Return a call's camera.  Raises ArgumentError for one that is none."""
     if numbers is None:
         return None
     try:
@@ -234,7 +234,7 @@ def _written(found: SurveyFound, out: str | Path | None, overwrite: bool) -> Sur
 
 
 def _with_lines(scenario: Scenario) -> Scenario:
-    """A scenario that judges all parallel lines as a survey's: that is what was asked for."""
+    """Return a scenario that judges all parallel lines as a survey's: that is what was asked for."""
     limits = scenario.limits.model_copy(update={"surveys": "lines"})
     return replace(scenario, limits=limits, spec=scenario.spec.model_copy(update={"limits": limits}))
 

@@ -57,11 +57,11 @@ class CampaignBase:
     name: str
 
     def nominal_setup(self) -> FlightSetup:
-        """The flight with nothing drawn.  Raises PlanflyError for a mission that cannot be laid out."""
+        """Return the flight with nothing drawn.  Raises PlanflyError for a mission that cannot be laid out."""
         return make_setup(self.scenario, self.airframe, self.mission, self.seed, plan=self.plan, placed=self.placed)
 
     def conditions(self) -> Conditions:
-        """What flights are drawn about: whose they are, in which weather and world, and who flies."""
+        """Return what flights are drawn about: whose they are, in which weather and world, and who flies."""
         return setup_conditions(self.nominal_setup())
 
     def world_hash(self) -> str:
@@ -82,7 +82,7 @@ class CampaignBase:
 
 
 def is_mission_file(target: str) -> bool:
-    """Whether a target is a plan's or a mission's file, by its name, and no scenario.
+    """Return True if a target is a plan's or a mission's file, by its name, and no scenario.
 
     >>> is_mission_file("a/plan.json"), is_mission_file("jacksboro"), is_mission_file("valley.toml")
     (True, False, False)
@@ -224,7 +224,7 @@ class VariedFlight:
 
 
 def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
-    """The flight of a draw; wind: about which it varies, None for the scenario's.
+    """Return the flight of a draw; wind: about which it varies, None for the scenario's.
 
     Scenario and limits are in the flight's wind, as `planfly fly --wind` has them; mass, drag, control power, the
     drawn aircraft and the start's place are known to nobody who steers.
@@ -247,7 +247,7 @@ def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> Varie
 
 
 def _in_wind(scenario: Scenario, values: dict[str, float], mean: GivenWind | None) -> Scenario:
-    """The scenario in the wind of a draw; gusts have the flight's seed, whatever the scenario states."""
+    """Return the scenario in the wind of a draw; gusts have the flight's seed, whatever the scenario states."""
     old = scenario.wind
     about = mean or GivenWind(old.speed, math.degrees(old.from_course))
     speed = min(MAX_WIND, max(0.0, about.speed + values["wind_speed"]))
@@ -265,7 +265,7 @@ def _raised(terrain: Terrain, by: float) -> Terrain:
 
 
 def _limits(airframe: Airframe, scenario: Scenario, *, drawn: bool) -> Limits:
-    """The airframe's limits in another wind; drawn: whether the flight's aircraft is one of several draws."""
+    """Return the airframe's limits in another wind; drawn: whether the flight's aircraft is one of several draws."""
     old = airframe.limits
     # A drawn aircraft is one that is known: each of its flights is decided.
     known = replace(old.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)

@@ -97,7 +97,7 @@ class CampaignResult:
 
     @property
     def answer(self) -> Answer:
-        """Whether the target is reached, missed, or undecided."""
+        """True if the target is reached, missed, or undecided."""
         return self.summary.estimate.answer
 
     @property
@@ -132,12 +132,12 @@ class CampaignResult:
         )
 
     def _repr_html_(self) -> str:
-        """How a notebook shows it."""
+        """Return how a notebook shows it."""
         return html_table(campaign_lines(self.summary)[0], self.by_rule.items(), ("rule", "flights that it fails"))
 
 
 def make_goal(flights: int | None, prove: float | None, at_least: float | None, confidence: float | None) -> Goal:
-    """The goal that keywords come to.  Raises ArgumentError for numbers out of their ranges.
+    """Return the goal that keywords come to.  Raises ArgumentError for numbers out of their ranges.
 
     >>> make_goal(None, 0.99, None, None)
     Goal(target=0.99, stops=True, flights=5000, confidence=0.95, changed=False)

@@ -150,11 +150,11 @@ class Dispersions:
     draws: Draws | None = None
 
     def without(self, names: tuple[str, ...]) -> "Dispersions":
-        """The dispersions without these quantities."""
+        """Return the dispersions without these quantities."""
         return replace(self, varying=tuple(one for one in self.varying if one.quantity.name not in names))
 
     def with_draws(self, draws: Draws) -> "Dispersions":
-        """The dispersions with draws of the aircraft, which take the place of drag and control power.
+        """Return the dispersions with draws of the aircraft, which take the place of drag and control power.
 
         >>> import numpy as np
         >>> made = default_dispersions().with_draws(Draws(("ident/thrust",), np.array([[1.1]]), "mine/draws.csv"))
@@ -180,7 +180,7 @@ class Dispersions:
 
 
 def default_dispersions() -> Dispersions:
-    """The dispersions that campaigns have where no others are given.
+    """Return the dispersions that campaigns have where no others are given.
 
     >>> [one.quantity.name for one in default_dispersions().varying][:3]
     ['wind_speed', 'wind_from', 'wind_gradient']
@@ -197,7 +197,7 @@ def read_dispersions(path: Path) -> Dispersions:
 
 
 def parse_dispersions(text: str, name: str) -> Dispersions:
-    r"""The dispersions of a file's text; name: of the file in messages.
+    r"""Return the dispersions of a file's text; name: of the file in messages.
 
     Raises SpreadError, in one line, for what is no TOML, an unknown quantity, an unknown distribution, a parameter that
     the distribution has not or may not have, and a distribution that lies outside the quantity's range.
@@ -228,7 +228,7 @@ def parse_dispersions(text: str, name: str) -> Dispersions:
 
 
 def _draws(table: Any, name: str) -> Draws:
-    """The draws that a file names, relative to it."""
+    """Return the draws that a file names, relative to it."""
     given = table.get("draws") if isinstance(table, dict) else None
     if not isinstance(given, str) or not given or (isinstance(table, dict) and len(table) > 1):
         allowed = 'a file of draws is expected, and nothing else, such as draws = "mine/draws.csv"'
@@ -371,7 +371,7 @@ def standard_population(dispersions: Dispersions, count: int) -> Floats:
 
 
 def _drawn(seed: int, index: int) -> tuple[Floats, int]:
-    """Of each of `QUANTITIES` the share of its distribution, and the seed of what changes within the flight."""
+    """Return of each of `QUANTITIES` the share of its distribution, and the seed of what changes within the flight."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
     return random.random(len(QUANTITIES)), int(random.integers(2**63))
 

@@ -52,7 +52,7 @@ USUAL_WIND_FLIGHTS = 5000
 
 
 def asked_flights(asked: int | None, folder: Path, *, resume: bool) -> int:
-    """The most flights of a search: as asked for, or those that the one in a folder was to have.
+    """Return the most flights of a search: as asked for, or those that the one in a folder was to have.
 
     Raises StoreError for a file that is none of ours or is held.
     """
@@ -86,7 +86,7 @@ class WindsFound:
 
 
 def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool) -> WindsStore:
-    """The search's table in a folder, new or to go on with.
+    """Return the search's table in a folder, new or to go on with.
 
     base: of dispersions without the quantities of `SEARCHED_QUANTITIES`.
     Raises StoreError, also for one that was asked for something else; more flights may be asked for, or fewer, of which
@@ -143,7 +143,7 @@ class _Search:
         self.lost: list[int] = []
 
     def next_round(self) -> list[AskedFlight]:
-        """The flights to fly next; none where all is known or used up."""
+        """Return the flights to fly next; none where all is known or used up."""
         self.open = [number for number in self.open if self._is_open(number)]
         each = max(_FEWEST_EACH, min(_MAX_EACH, _ROUND // max(1, len(self.open))))
         asked: list[AskedFlight] = []
@@ -179,19 +179,19 @@ class _Search:
         return FlightRequest(asked.draw, GivenWind(asked.speed, 360.0 * asked.direction / self.goal.directions))
 
     def at_least(self) -> int:
-        """Flights that are to come before any direction that is open can be known, of all of them."""
+        """Return flights that are to come before any direction that is open can be known, of all of them."""
         to_come = sum(max(0, FEWEST - len(self.directions[number].speeds)) for number in self.open)
         return min(to_come, self.goal.flights - len(self.flown))
 
     def found(self) -> WindsFound:
-        """The answer."""
+        """Return the answer."""
         boundaries = tuple(one.boundary() for one in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
         return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions)
 
 
 def _way(rule: str, place: Place) -> Hashable:
-    """A way of failing: the rule, and where."""
+    """Return a way of failing: the rule, and where."""
     return rule, place.kind, place.index
 
 
@@ -205,7 +205,7 @@ class _Known:
         self.flown = {number: flown for number, (_, flown) in known.items()}
 
     def missing(self, asked: list[AskedFlight]) -> list[AskedFlight]:
-        """Those that have still to be flown.  Raises StoreError for one that was asked for otherwise."""
+        """Return those that have still to be flown.  Raises StoreError for one that was asked for otherwise."""
         for one in asked:
             if self._asked.get(one.number, one) != one:
                 path = self._store.path

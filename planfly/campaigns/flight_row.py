@@ -61,7 +61,7 @@ def narrow_passes(findings: Iterable[Finding], scenario: Scenario, track: Track)
 
 
 def _outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, float]]:
-    """How far outside each missile's sphere the track stays, m."""
+    """Return how far outside each missile's sphere the track stays, m."""
     threats = scenario.threats
     if scenario.external or len(track) < 2:
         return []
@@ -217,13 +217,13 @@ class FlightRow:
 
 
 def scaled(rule: str, margin: LeastMargin) -> float | None:
-    """A margin in the scale of its rule; None where either has no number."""
+    """Return a margin in the scale of its rule; None where either has no number."""
     scale = RULE_WORDS[rule].scale
     return None if margin.value is None or scale is None else margin.value / scale
 
 
 def _fields() -> dict[str, Column]:
-    """The fields of `FlightRow` that are a column each, by name, in order."""
+    """Return the fields of `FlightRow` that are a column each, by name, in order."""
     hints = get_type_hints(FlightRow, include_extras=True)
     found = {name: get_args(hint) for name, hint in hints.items()}
     return {name: args[-1] for name, args in found.items() if args and isinstance(args[-1], Column)}
@@ -267,7 +267,7 @@ def failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
 
 
 def least_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, LeastMargin], ...]:
-    """Of each rule that was judged the finding with the least margin, in the verdict's order.
+    """Return of each rule that was judged the finding with the least margin, in the verdict's order.
 
     >>> from logs.verdict.findings import make_finding
     >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
@@ -286,5 +286,5 @@ def least_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, LeastMargin
 
 
 def lost_row(base: CampaignBase, index: int, reason: str) -> FlightRow:
-    """The row of a flight that could not be flown."""
+    """Return the row of a flight that could not be flown."""
     return FlightRow(draw_flight(base.dispersions, base.seed, index), "lost", reason)

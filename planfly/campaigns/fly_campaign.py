@@ -36,7 +36,7 @@ class _Book:
             self.decided = self.goal.stops and self.estimator.decides(self.tally)
 
     def following(self) -> FlightRequest | None:
-        """The next flight to send."""
+        """Return the next flight to send."""
         self.sent = max(self.sent, self.tally.flown)
         while self.sent in self.beyond:
             self.sent += 1
@@ -52,7 +52,7 @@ def _with_outcome(tally: Tally, outcome: str) -> Tally:
 
 
 def resumed_goal(asked: Goal | None, folder: Path, confidence: float | None = None) -> Goal:
-    """The goal with which a folder's campaign is gone on with: that asked for now, or else its own.
+    """Return the goal with which a folder's campaign is gone on with: that asked for now, or else its own.
 
     confidence: of either; None for the campaign's own.
     Raises StoreError for a folder without a campaign.
@@ -68,7 +68,7 @@ def resumed_goal(asked: Goal | None, folder: Path, confidence: float | None = No
 
 
 def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) -> Store:
-    """The campaign's table in a folder, new or to go on with.
+    """Return the campaign's table in a folder, new or to go on with.
 
     Raises StoreError, also where more flights than the goal's are there.
     """
@@ -135,7 +135,7 @@ class _Pace:
         self._rate = FlightRate(known.flown)
 
     def _total(self, tally: Tally) -> int:
-        """How many flights there will be, at least."""
+        """Return how many flights there will be, at least."""
         return max(self._estimator.fewest, tally.flown) if self._goal.stops else self._goal.flights
 
     def tell(self, tally: Tally, last: bool = False) -> None:

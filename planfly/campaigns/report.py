@@ -51,7 +51,7 @@ _DRAWN = 3000
 
 
 def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, command: str) -> bytes:
-    """The page's bytes; command: the line that flies it again."""
+    """Return the page's bytes; command: the line that flies it again."""
     pictures = [_both_widths(figure, words) for figure, words in _pictures(base, summary, store)]
     lines = campaign_lines(summary)
     text = _render(
@@ -101,13 +101,13 @@ def _render(template: str, **values: object) -> str:
 
 
 def winds_page(name: str, figure: Figure, lines: list[str], rows: Sequence[tuple[str, ...]], command: str) -> bytes:
-    """The page of a go/no-go chart, which is narrowed."""
+    """Return the page of a go/no-go chart, which is narrowed."""
     picture = _both_widths(figure, "Go/no-go chart: wind from each direction")
     return _render("winds.html", name=name, picture=picture, lines=lines, rows=rows, command=command).encode("utf-8")
 
 
 def _both_widths(figure: Figure, words: str) -> Markup:
-    """A picture as a page shows it: wide, and on a phone narrow, to which the figure is changed."""
+    """Return a picture as a page shows it: wide, and on a phone narrow, to which the figure is changed."""
     wide = page_svg(figure, words)
     narrow = page_svg(narrowed(figure), f"{words} (narrow)")
     return Markup(f'<div class="wide">{wide}</div><div class="narrow">{narrow}</div>')
@@ -207,7 +207,7 @@ class OutputDirectory:
         raise PlanflyError(f"{folder}: exists and is not empty; overwrite=True replaces its results", file=folder)
 
     def open(self, opened: Callable[[Path | None], CampaignBase]) -> CampaignBase:
-        """The mission, and the folder ready for it: cleared, or with what is to be gone on with.
+        """Return the mission, and the folder ready for it: cleared, or with what is to be gone on with.
 
         opened: gives the mission, with its plan from a file where it is gone on with.
         A scenario's plan is kept in the folder, for those that go on.
@@ -225,7 +225,7 @@ class OutputDirectory:
 
 @contextmanager
 def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwrite: bool) -> Iterator[OutputDirectory]:
-    """A campaign's folder; out: None for one that is removed at the end.
+    """Yield a campaign's folder; out: None for one that is removed at the end.
 
     Raises ArgumentError for a campaign to resume without a folder.
     """
@@ -298,7 +298,7 @@ SCHEMA = "planfly.winds/1"
 
 
 def spokes(found: WindsFound) -> list[Spoke]:
-    """The chart's data."""
+    """Return the chart's data."""
     out = []
     for number, boundary in enumerate(found.boundaries):
         counts: dict[float, list[bool]] = {}
@@ -363,7 +363,7 @@ def _speed_text(speed: float, most: float) -> str:
 
 
 def _interval_text(low: float, high: float, most: float) -> str:
-    """An interval, m/s, of which what lies beyond all that was looked at is not known."""
+    """Return an interval, m/s, of which what lies beyond all that was looked at is not known."""
     if low >= most - 1e-9:
         return f"over {most:g}"
     return f"{low:.1f} to {f'over {most:g}' if high >= most - 1e-9 else f'{high:.1f}'}"
@@ -382,7 +382,7 @@ def _open_lines(found: WindsFound) -> list[str]:
 
 
 def _lost_lines(found: WindsFound) -> list[str]:
-    """Which flights could not be flown, where some could not."""
+    """Return which flights could not be flown, where some could not."""
     if not found.lost:
         return []
     named = ", ".join(
@@ -393,7 +393,7 @@ def _lost_lines(found: WindsFound) -> list[str]:
 
 
 def _none_failed_lines(found: WindsFound) -> list[str]:
-    """What the flights of directions in which none failed show by themselves."""
+    """Return what the flights of directions in which none failed show by themselves."""
     most, confidence = found.goal.most, found.goal.confidence
     at_most = Counter(direction for direction, speed, _ in found.flights if speed == most)
     failed = {direction for direction, _, flyable in found.flights if not flyable}
@@ -408,7 +408,7 @@ def _none_failed_lines(found: WindsFound) -> list[str]:
 
 
 def wind_lines(found: WindsFound) -> list[str]:
-    """What was found, in a few lines."""
+    """Return what was found, in a few lines."""
     chart = spokes(found)
     least, largest = (pick(chart, key=lambda one: one.boundary) for pick in (min, max))
     most, percent = found.goal.most, f"{100 * found.goal.confidence:g} %"
@@ -431,7 +431,7 @@ def wind_lines(found: WindsFound) -> list[str]:
 def finish_campaign(
     base: CampaignBase, goal: Goal, estimate: Estimate, folder: Path, command: str, advance: Advance | None = None
 ) -> CampaignSummary:
-    """Sum a campaign up from the table in its folder, which nobody holds, and write its files.
+    """Return sum a campaign up from the table in its folder, which nobody holds, and write its files.
 
     command: the line that repeats it, for the report.
     Raises a `world.errors.PlanflyError`, or OSError for a full disk.

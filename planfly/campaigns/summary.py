@@ -128,7 +128,7 @@ def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str
 
 
 def _sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensitivity, ...]:
-    """Of the rule's least margin to each quantity that varies, the strongest first."""
+    """Return of the rule's least margin to each quantity that varies, the strongest first."""
     if not rule:
         return ()
     margin = store.column(RULE_WORDS[rule].margin_column)
@@ -197,7 +197,7 @@ def _flight(row: FlightRow) -> dict[str, Any]:
 
 
 def closest_text(row: FlightRow) -> str:
-    """The least margin of a flight in words; "" where none is known."""
+    """Return the least margin of a flight in words; "" where none is known."""
     known = [(share, rule, margin) for rule, margin in row.margins if (share := scaled(rule, margin)) is not None]
     if not known:
         return ""
@@ -206,12 +206,12 @@ def closest_text(row: FlightRow) -> str:
 
 
 def log_name(row: FlightRow) -> str:
-    """Name of the log of a flight, among the worst."""
+    """Return name of the log of a flight, among the worst."""
     return f"worst/flight-{row.draw.index:06d}.mcap"
 
 
 def campaign_lines(summary: CampaignSummary) -> list[str]:
-    """The summary on a terminal."""
+    """Return the summary on a terminal."""
     found, goal = summary.estimate, summary.goal
     tally, sure = found.tally, f"{100.0 * goal.confidence:g} %"
     lines = [

@@ -16,7 +16,7 @@ _LISTED = 8
 
 
 def stored(value: Any, kind: str) -> Any:
-    """A value as SQLite gives it back from a column of a kind: numpy's numbers are plain ones, and NaN is NULL.
+    """Return a value as SQLite gives it back from a column of a kind: numpy's numbers are plain ones, and NaN is NULL.
 
     >>> stored(3, "REAL NOT NULL"), stored(math.nan, "REAL"), stored(True, "INTEGER")
     (3.0, None, 1)
@@ -52,7 +52,7 @@ class Examined(NamedTuple):
     after: int | None = None
 
     def text(self) -> str:
-        """What is damaged, and what becomes of it, in words.
+        """Return what is damaged, and what becomes of it, in words.
 
         >>> Examined([0, 1, 3], [2]).text()
         'flight 2 is damaged and was taken out: 3 flights are whole and stay; --resume flies what is missing'
@@ -72,7 +72,7 @@ class Examined(NamedTuple):
 
 
 def examine(connection: sqlite3.Connection, columns: Sequence[str], asked: int, most: int) -> Examined:
-    """Which rows of the table ``flights`` are whole, whatever has happened to its file.
+    """Return which rows of the table ``flights`` are whole, whatever has happened to its file.
 
     columns: that the checksum is of, in order, the flight's number first.  asked: flights that were asked for.  most:
     flights that it may hold, where that has to be tried number by number.
@@ -113,7 +113,7 @@ def _by_checksum(rows: Iterable[tuple[Any, ...]]) -> Examined:
 
 
 def _row_of(connection: sqlite3.Connection, query: str, number: int) -> tuple[Any, ...] | None:
-    """A row by its number; one that cannot be read has no checksum."""
+    """Return a row by its number; one that cannot be read has no checksum."""
     try:
         found: tuple[Any, ...] | None = connection.execute(f"{query} WHERE flight = ?", (number,)).fetchone()
     except sqlite3.Error as error:

@@ -39,7 +39,7 @@ SHAPES = tuple(name for name, column in FIELDS.items() if column.kind.startswith
 
 
 def _row_columns() -> dict[str, str]:
-    """Name and kind of each column of a row, in the order of the row's fields."""
+    """Return name and kind of each column of a row, in the order of the row's fields."""
     columns = {"seed": "INTEGER NOT NULL", **dict.fromkeys(NAMES, "REAL NOT NULL")}
     for name in FlightRow.__dataclass_fields__:
         if name in FIELDS:
@@ -56,7 +56,7 @@ ROW_COLUMNS = _row_columns()
 
 
 def row_values(row: FlightRow) -> dict[str, Any]:
-    """A value for each of `ROW_COLUMNS`."""
+    """Return a value for each of `ROW_COLUMNS`."""
     values: dict[str, Any] = dict.fromkeys(ROW_COLUMNS)
     values |= {"seed": row.draw.seed, **row.draw.values}
     values |= {name: column.write(getattr(row, name)) for name, column in FIELDS.items()}
@@ -69,7 +69,7 @@ def row_values(row: FlightRow) -> dict[str, Any]:
 
 
 def row_of(index: int, known: Mapping[str, Any]) -> FlightRow:
-    """The row of a draw's index and its values by column."""
+    """Return the row of a draw's index and its values by column."""
     margins = []
     for rule in RULE_WORDS.values():
         if (place := known[rule.place_column]) is not None:
@@ -228,7 +228,7 @@ class LockedTable:
         say(f"{self.path}: {examined.text()}")
 
     def _last(self) -> int:
-        """The largest number of a flight that can be read, one after the other; -1 for none."""
+        """Return the largest number of a flight that can be read, one after the other; -1 for none."""
         last = -1
         for order in ("", " DESC"):
             with suppress(sqlite3.Error, UnicodeDecodeError):
@@ -285,13 +285,13 @@ class LockedTable:
             raise OSError(errno.EIO, words, str(self.path))
 
     def tally(self) -> Tally:
-        """How many flights came out how."""
+        """Return how many flights came out how."""
         counts = dict(self._connection.execute("SELECT outcome, COUNT(*) FROM flights GROUP BY outcome"))
         return Tally(counts.get("flyable", 0), counts.get("not flyable", 0), counts.get("lost", 0))
 
 
 def kept_settings(path: Path) -> dict[str, Any]:
-    """What the flights of a table were asked for with; nothing where there is no such file.
+    """Return what the flights of a table were asked for with; nothing where there is no such file.
 
     Raises StoreError for a file that is none of ours or is held.
     """
@@ -305,7 +305,7 @@ def kept_settings(path: Path) -> dict[str, Any]:
 
 
 def _kept(connection: sqlite3.Connection) -> dict[str, str]:
-    """What a file says of itself, by key."""
+    """Return what a file says of itself, by key."""
     connection.text_factory = lambda data: data.decode("utf-8", "surrogateescape")
     return dict(connection.execute("SELECT key, value FROM campaign").fetchall())
 
@@ -392,18 +392,18 @@ class Store(LockedTable):
         return np.fromiter((math.nan if value is None else value for (value,) in rows), dtype=np.float64)
 
     def texts(self, name: str) -> list[str]:
-        """A column of words, in the order of flights."""
+        """Return a column of words, in the order of flights."""
         return [
             str(value) for (value,) in self._connection.execute(f"SELECT {_known(name)} FROM flights ORDER BY flight")
         ]
 
     def blobs(self, name: str, most: int) -> list[bytes]:
-        """A column of arrays' bytes, of the first flights that have some."""
+        """Return a column of arrays' bytes, of the first flights that have some."""
         query = f"SELECT {_known(name)} FROM flights WHERE LENGTH({name}) > 0 ORDER BY flight LIMIT ?"
         return [value for (value,) in self._connection.execute(query, (most,))]
 
     def has_track(self) -> list[bool]:
-        """Whether each flight, in order, has a track's shape."""
+        """Return True if each flight, in order, has a track's shape."""
         return [bool(n) for (n,) in self._connection.execute("SELECT LENGTH(clearance) FROM flights ORDER BY flight")]
 
     def closest(self, most: int) -> list[FlightRow]:
@@ -413,12 +413,12 @@ class Store(LockedTable):
         return [_row(values) for values in rows]
 
     def flight(self, index: int) -> FlightRow | None:
-        """The flight of an index; None where there is none."""
+        """Return the flight of an index; None where there is none."""
         found = self._connection.execute(f"{_SELECT} WHERE flight = ?", (index,)).fetchone()
         return None if found is None else _row(found)
 
     def rows(self) -> Iterator[FlightRow]:
-        """All flights in order."""
+        """Yield all flights in order."""
         for values in self._connection.execute(f"{_SELECT} ORDER BY flight"):
             yield _row(values)
 
@@ -497,7 +497,7 @@ class WindsStore(LockedTable):
         self.insert({**asked_for, **row_values(replace(row, made_of=self.made_of))})
 
     def known(self) -> dict[int, tuple[AskedFlight, FlownFlight]]:
-        """Each flight there is and what came of it, by number."""
+        """Return each flight there is and what came of it, by number."""
         rows = self._connection.execute(
             "SELECT flight, direction, asked_speed, draw, outcome, failed, narrow FROM flights ORDER BY flight"
         )
@@ -529,7 +529,7 @@ _TYPES: dict[str, type] = {"INTEGER": np.int64, "REAL": np.float64, "TEXT": obje
 
 
 def read_table(path: Path) -> dict[str, NDArray[Any]]:
-    """The columns of a campaign's table by name, (n,) each, in the order of flights; of arrays' bytes none.
+    """Return the columns of a campaign's table by name, (n,) each, in the order of flights; of arrays' bytes none.
 
     Numbers are float64 with NaN for none, or int64; words are Python's, None for none, each kept once.  Some 60 MB for
     100,000 flights.
@@ -556,7 +556,7 @@ def count_flights(path: Path) -> int:
 
 
 def read_shapes(path: Path) -> dict[str, NDArray[np.float32]]:
-    """What a campaign keeps of each flight's way, in the order of flights; NaN for flights that have none.
+    """Return what a campaign keeps of each flight's way, in the order of flights; NaN for flights that have none.
 
     "clearance": (n, 150) least height above ground on each equal piece of the route's length, m.
     "crossings": (n, s, 2) distance right of and above each stop of the route at its nearest, m.

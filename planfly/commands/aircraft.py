@@ -137,7 +137,7 @@ def aircraft(args: argparse.Namespace) -> int:
 
 
 def _answer(chosen: "Sequence[Aircraft]", numbers: "AircraftNumbers | None" = None) -> object:
-    """What --json writes: of one aircraft with its numbers, or of several without."""
+    """Return what --json writes: of one aircraft with its numbers, or of several without."""
     from planfly.terminal.answers import AircraftAnswer, aircraft_detail, aircraft_entry
 
     detail = None if numbers is None else aircraft_detail(numbers)

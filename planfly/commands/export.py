@@ -59,7 +59,7 @@ def export(args: argparse.Namespace) -> int:
 
 
 def _kind(suffix: str) -> str:
-    """What a file of a suffix is about."""
+    """Return what a file of a suffix is about."""
     if suffix in (".kml", ".gpx"):
         return "map"
     if suffix == ".parm":

@@ -33,7 +33,7 @@ class Command(NamedTuple):
     function: str = ""
 
     def load(self, ending: str = "") -> Any:
-        """The command's function; with the ending "_options" the one that adds its parser."""
+        """Return the command's function; with the ending "_options" the one that adds its parser."""
         module = import_module(f"planfly.commands.{self.module or self.name}")
         return getattr(module, (self.function or self.name) + ending)
 
@@ -80,7 +80,7 @@ first steps:
 
 
 def build_parser() -> LineParser:
-    """The parser of the whole command line."""
+    """Return the parser of the whole command line."""
     line = LineParser(
         __version__,
         "Will this plan really fly?  Plans a fixed-wing path over terrain and threats,\n"
@@ -94,7 +94,7 @@ def build_parser() -> LineParser:
 
 
 def find_command(name: str) -> CommandFunction:
-    """The function that carries a command out: parsed arguments to exit code.
+    """Return the function that carries a command out: parsed arguments to exit code.
 
     Its results go to standard output, its progress to standard error.  Raises KeyError for a name that is none.
 
@@ -115,12 +115,12 @@ _DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def answering_commands() -> list[str]:
-    """The commands that have ``--json``."""
+    """Return the commands that have ``--json``."""
     return [command.name for command in COMMANDS if command.answer]
 
 
 def answer_schema(name: str) -> dict[str, Any]:
-    """The JSON schema, draft 2020-12, of a command's answer.  Raises KeyError for a command without one.
+    """Return the JSON schema, draft 2020-12, of a command's answer.  Raises KeyError for a command without one.
 
     >>> sorted(answer_schema("scenarios")["properties"])
     ['exit_code', 'scenarios', 'schema']
@@ -137,7 +137,7 @@ def answer_schema(name: str) -> dict[str, Any]:
 
 
 def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
-    """The object that an answer is, by its schema; each of them, where options choose one.
+    """Return the object that an answer is, by its schema; each of them, where options choose one.
 
     >>> [one["properties"]["schema"]["const"] for one in answer_objects(answer_schema("check"))]
     ['planfly.verdict/3', 'planfly.verdicts/1']
@@ -147,5 +147,5 @@ def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def schema_text(name: str) -> str:
-    """The schema as the text of a file."""
+    """Return the schema as the text of a file."""
     return json.dumps(answer_schema(name), indent=1) + "\n"

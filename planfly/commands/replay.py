@@ -118,7 +118,7 @@ def replay(args: argparse.Namespace) -> int:
 
 
 def _answer(args: argparse.Namespace, log: "FlightLog", code: int) -> object:
-    """The timeline of the part that is replayed, all of it where it goes to ground stations."""
+    """Return the timeline of the part that is replayed, all of it where it goes to ground stations."""
     from planfly.terminal.answers import ReplayAnswer, TimelineEvent
 
     entries = planfly.timeline(log) if isinstance(args.to, str) else call(planfly.timeline, args, log=log)

@@ -92,7 +92,7 @@ def scenarios_options(line: LineParser) -> None:
 
 
 def scenarios(args: argparse.Namespace) -> int:
-    """Name and description of each embedded scenario, on standard output."""
+    """Return name and description of each embedded scenario, on standard output."""
     known = planfly.scenarios()
     for name, description in known.items():
         print(f"{name:<12} {description}")

@@ -27,7 +27,7 @@ _SLUG_FT2 = 1.3558179483314004
 
 
 def base_model(aircraft: Aircraft) -> BaseModel:
-    """Numbers of an aircraft.
+    """Return numbers of an aircraft.
 
     Raises FlightError for one without steady flight at cruise, and for one whose motor is neither in the form of the
     Aerosonde's nor in that of the Zagi's or the X8's.
@@ -159,7 +159,7 @@ def _reacts(aircraft: Aircraft) -> bool:
 
 
 def _model(aircraft: Aircraft) -> ElementTree.Element | None:
-    """The model's text as it is parsed; None of one that JSBSim will say is wrong."""
+    """Return the model's text as it is parsed; None of one that JSBSim will say is wrong."""
     try:
         return ElementTree.parse(aircraft.model_file).getroot()
     except (OSError, ElementTree.ParseError):
@@ -223,7 +223,7 @@ def _electric_motor(functions: dict[str, ElementTree.Element], volts: float) -> 
 
 
 def scaled(base: BaseModel, mass: float, span: float, area: float, volts: float | None = None) -> BaseModel:
-    """The same kind of aircraft with another mass (kg), span (m) and area (m^2).
+    """Return the same kind of aircraft with another mass (kg), span (m) and area (m^2).
 
     Inertia goes with mass and span squared.  The chord keeps its share of the mean chord.  Induced drag is CL^2 over
     pi, the span efficiency and the aspect ratio (Anderson, Fundamentals of Aerodynamics, section 5.3.2): the efficiency

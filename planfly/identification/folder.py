@@ -73,7 +73,7 @@ class Identified:
     cruise: float
 
     def performance(self) -> tuple[Performance, Performance]:
-        """Of the estimate (1,), and of all draws (512,)."""
+        """Return of the estimate (1,), and of all draws (512,)."""
         return (
             performance(self.numbers, self.estimate.values, self.cruise, DENSITY),
             performance(self.numbers, self.draws, self.cruise, DENSITY),
@@ -93,7 +93,7 @@ def make_identified(
 
 
 def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> dict[str, str]:
-    """The files of its folder but for the page, by their names; battery: V and J.
+    """Return the files of its folder but for the page, by their names; battery: V and J.
 
     The mission of manoeuvres begins at the logs' home, and is left out where none of them says where that is.
     Raises FlightError for an aircraft that does not trim.
@@ -146,7 +146,7 @@ def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
 
 
 def _metadata(found: Identified, battery: tuple[float, float], slow: float, fast: float = math.inf) -> str:
-    """The text of ``name.toml``; slow, fast: of level flight, m/s."""
+    """Return the text of ``name.toml``; slow, fast: of level flight, m/s."""
     base, value = found.base, flown_parameters(found.logs[-1]).get
     _, lowest, highest = _airspeeds(found.logs[-1], base)
     least = max(min(lowest, found.cruise), slow + 0.1)
@@ -182,7 +182,7 @@ def _metadata(found: Identified, battery: tuple[float, float], slow: float, fast
 
 
 def flown_parameters(log: MotionLog) -> dict[str, float]:
-    """Parameters of a log that say how it flew, by their present names and units.
+    """Return parameters of a log that say how it flew, by their present names and units.
 
     The log may have those of ArduPlane's law by the names of 4.4 and before; values out of range are left out.
     """
@@ -219,7 +219,7 @@ def _servos(outputs: Mapping[str, ServoOutput]) -> str:
 
 
 def posterior_text(found: Identified) -> str:
-    """The text of ``posterior.toml``."""
+    """Return the text of ``posterior.toml``."""
     estimate = found.estimate
     best, drawn = found.performance()
     # As a share; more than the whole of it is as good as nothing known.

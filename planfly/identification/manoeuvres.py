@@ -27,7 +27,7 @@ _UP = 150.0
 def identification_mission(
     aircraft: Aircraft, envelope: Envelope, lat_deg: float, lon_deg: float, ground: float, repeats: int = 1
 ) -> Mission:
-    """The mission about a place.
+    """Return the mission about a place.
 
     lat_deg, lon_deg, ground: of home, degrees and m above sea level.  repeats: how often all of it is flown.
 

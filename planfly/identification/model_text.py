@@ -24,7 +24,7 @@ _LARGEST_ALPHA = 0.25
 
 
 def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats) -> str:
-    """The text of ``name.xml``.
+    """Return the text of ``name.xml``.
 
     base: whose model's text it begins with.  numbers: scaled to the aircraft.  values: (n,) of
     `aircraft.identification.parameters.PARAMETERS`.
@@ -114,7 +114,7 @@ def _set_sizes(root: ElementTree.Element, numbers: BaseModel, base: Aircraft) ->
 
 
 def _factor(name: str) -> str:
-    """A factor less 1."""
+    """Return a factor less 1."""
     return f"<sum> <p> ident/{name} </p> <v> -1 </v> </sum>"
 
 
@@ -123,7 +123,7 @@ def _term(coefficient: float, *factors: str) -> str:
 
 
 def _lift_functions(numbers: BaseModel) -> str:
-    """Coefficients of lift of the angle of attack alone, before and after the estimate, as far as seen."""
+    """Return coefficients of lift of the angle of attack alone, before and after the estimate, as far as seen."""
     c = numbers.coefficients
     return f"""
     <function name="ident/alpha-rad"> <min> <v> {_LARGEST_ALPHA} </v>
@@ -136,7 +136,7 @@ def _lift_functions(numbers: BaseModel) -> str:
 
 
 def _additions(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control: str) -> str:
-    """The function that joins an axis; none for an axis of which nothing was estimated."""
+    """Return the function that joins an axis; none for an axis of which nothing was estimated."""
     c = numbers.coefficients
     surfaces = [
         f"<product> <p> {reading.name} </p> <v> {number(reading.factor)} </v> </product>{control}"
@@ -197,7 +197,7 @@ _AIR = "<p> motor/airspeed-mps </p>"
 
 
 def _reactions(numbers: BaseModel, values: Floats, kept: list[ElementTree.Element]) -> str:
-    """The text of ``<external_reactions>``: the properties, and what drives the propeller."""
+    """Return the text of ``<external_reactions>``: the properties, and what drives the propeller."""
     own = "\n".join(
         f'<property value="{values[INDEX[parameter.name]]:.9g}"> {parameter.property_name} </property>'
         for parameter in PARAMETERS
@@ -226,7 +226,7 @@ def _reactions(numbers: BaseModel, values: Floats, kept: list[ElementTree.Elemen
 
 
 def _motor_functions(motor: Motor) -> dict[str, str]:
-    """The inside of each JSBSim function ``motor/NAME``, in the order in which they are computed."""
+    """Return the inside of each JSBSim function ``motor/NAME``, in the order in which they are computed."""
     shared = {
         "rho-kg_m3": "<product> <p> atmosphere/rho-slugs_ft3 </p> <v> 515.3788183931961 </v> </product>",
         "airspeed-mps": "<product> <p> velocities/vt-fps </p> <v> 0.3048 </v> </product>",

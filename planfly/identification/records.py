@@ -62,7 +62,7 @@ _PROFILE = 17
 def flight_records(
     log: MotionLog, aircraft: Aircraft, servos: Mapping[str, ServoOutput] | None = None
 ) -> list[FlightRecord]:
-    """The stretches of a log that an identification can use, as flown by wings alone.
+    """Return the stretches of a log that an identification can use, as flown by wings alone.
 
     servos: which output moves what, where it is known better than the log's SERVOn_* say.
     Raises LogError, in one line, for a log that cannot be used.
@@ -180,12 +180,12 @@ def _refuse(log: MotionLog) -> None:
 
 
 def slowest_rows(log: MotionLog) -> float:
-    """Rows a second of inertial sensors or of the commands to the surfaces, whichever are fewer."""
+    """Return rows a second of inertial sensors or of the commands to the surfaces, whichever are fewer."""
     return min(log.inertial.rate, log.moved.rate)
 
 
 def recording_setting(log: MotionLog) -> str:
-    """The parameter with its value that records both at a high rate."""
+    """Return the parameter with its value that records both at a high rate."""
     return f"SDLOG_PROFILE {_PROFILE}" if log.program_kind == "px4" else f"LOG_BITMASK {_BITMASK}"
 
 
@@ -264,7 +264,7 @@ def _refuse_base_of_elevons(log: MotionLog, aircraft: Aircraft) -> None:
 
 
 def _travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
-    """Least, middle and largest pulse of an output, us, and its sign."""
+    """Return least, middle and largest pulse of an output, us, and its sign."""
     value = log.parameters.get
     lowest, highest = value(f"SERVO{number}_MIN", 1100.0), value(f"SERVO{number}_MAX", 1900.0)
     middle = min(max(value(f"SERVO{number}_TRIM", 1500.0), lowest + 1.0), highest - 1.0)
@@ -272,7 +272,7 @@ def _travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
 
 
 def _grid(log: MotionLog) -> Floats:
-    """Times that all series cover."""
+    """Return times that all series cover."""
     series = (log.inertial, log.moved, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
     first, last = max(one.time[0] for one in series), min(one.time[-1] for one in series)
     return np.arange(first, last, 1.0 / GRID_HZ)
@@ -289,7 +289,7 @@ def _held(samples: Samples, grid: Floats) -> Floats:
 
 
 def _ratio_of_height(height: Floats) -> Floats:
-    """True by equivalent airspeed in the standard atmosphere."""
+    """Return True by equivalent airspeed in the standard atmosphere."""
     return np.asarray((1.0 - 2.25577e-5 * np.clip(height, -500.0, 9000.0)) ** -2.12794)
 
 
@@ -312,7 +312,7 @@ def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
 
 
 def _usable(log: MotionLog, grid: Floats, equivalent: Floats, pulses: Floats) -> Flags:
-    """Rows in free flight on the wing, without a pause of the sensors, of airspeed or of wind."""
+    """Return rows in free flight on the wing, without a pause of the sensors, of airspeed or of wind."""
     least = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))
     flying = (equivalent > _FLYING * least) & ~_vtol_rows(log, grid, pulses)
     sensors = [(samples, _GAP) for samples in (log.inertial, log.moved, log.attitude, log.velocity)]

@@ -131,10 +131,10 @@ def _window(fdm: Fdm, signals: Signals, air: Floats, start: int, rows: int) -> F
 
 
 def _near(angle: float, other: float) -> float:
-    """The angle, whole turns nearer to another."""
+    """Return the angle, whole turns nearer to another."""
     return angle + 2.0 * math.pi * round((other - angle) / (2.0 * math.pi))
 
 
 def _height_of(density: float) -> float:
-    """Height of the standard atmosphere with a density (kg/m^3), m."""
+    """Return height of the standard atmosphere with a density (kg/m^3), m."""
     return float((1.0 - (density / 1.225) ** (1.0 / 4.25588)) / 2.25577e-5)

@@ -21,7 +21,7 @@ class ServoOutput:
     value: tuple[float, ...]
 
     def control(self, pulses: Floats) -> Floats:
-        """The control (n,) at pulses (n,), held at its ends.
+        """Return the control (n,) at pulses (n,), held at its ends.
 
         >>> ServoOutput(3, (1000.0, 2000.0), (0.0, 1.0)).control(np.array([900.0, 1250.0]))
         array([0.  , 0.25])
@@ -35,7 +35,7 @@ class ServoOutput:
 
 
 def read_servos(file: Path) -> Mapping[str, ServoOutput]:
-    """The outputs of a file by control: elevator, aileron, rudder, throttle.  Raises FlightError for a bad file.
+    """Return the outputs of a file by control: elevator, aileron, rudder, throttle.  Raises FlightError for a bad file.
 
     >>> from aircraft.catalog import load_aircraft
     >>> outputs = read_servos(load_aircraft("aerosonde").folder / "ardupilot.toml")

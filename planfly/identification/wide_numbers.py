@@ -35,7 +35,7 @@ Interval = tuple[float, float, float]
 
 
 def wide_numbers(sink: Interval, power: Interval, *, with_current: bool) -> tuple[WideNumber, ...]:
-    """Those of sink and power whose intervals (lower end, estimate, upper end) are wide.
+    """Return those of sink and power whose intervals (lower end, estimate, upper end) are wide.
 
     with_current: whether the battery's current was logged, without which nothing tells what the propeller takes.
 

@@ -145,7 +145,7 @@ def do_unit(unit: str, report: Callable[[str], None]) -> None:
 
 
 def is_ready(kernel: str) -> bool:
-    """Whether a kernel, "module.name", has been compiled, or loaded from the cache, in this process.
+    """Return True if a kernel, "module.name", has been compiled, or loaded from the cache, in this process.
 
     >>> is_ready("world.terrain.steepest_slopes") in (True, False)
     True

@@ -127,7 +127,7 @@ BOTH = (*_SHARED, "scores", "flight", "shortening", "routes", "certificates", "p
 
 
 def kernels_of(units: tuple[str, ...]) -> frozenset[str]:
-    """All kernels of units, each once.
+    """Return all kernels of units, each once.
 
     >>> len(kernels_of(("scores", "paper")))
     13

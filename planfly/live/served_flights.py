@@ -249,8 +249,8 @@ class ServedLog:
     def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
         """Judge the flight and close the log.
 
-        hurry: see `planfly.workflow.reference_flights.judge_with_reference_flights`.  In a hurry, a path that was abandoned is
-        not judged: `planfly check` does it.  A path abandoned within a second leaves no log.
+        hurry: see `planfly.workflow.reference_flights.judge_with_reference_flights`.  In a hurry, a path that was
+        abandoned is not judged: `planfly check` does it.  A path abandoned within a second leaves no log.
         """
         track = join_tracks(self._blocks)
         left = ended.startswith((DIVERTED_TEXT, STILL_LOITERING_TEXT))

@@ -210,7 +210,7 @@ def _plan_task(task: tuple[int, str, int]) -> SeededPlan:
 
 
 def table(plans: Sequence[SeededPlan]) -> list[TableRow]:
-    """One row for each problem and algorithm, in the order they were planned."""
+    """Return one row for each problem and algorithm, in the order they were planned."""
     groups: dict[tuple[int, str], list[SeededPlan]] = {}
     for item in plans:
         groups.setdefault((item.threats, item.algorithm), []).append(item)

@@ -1,7 +1,7 @@
 """Worst returns to launch, flown again by the ArduPlane program to check planfly's control law.
 
-Each is a separate flight, on the mission by which `planfly.returns.jsbsim_returns` flies a return by the control law.  The
-result of the program replaces the result of the law only if it is worse; it never improves a judgement.
+Each is a separate flight, on the mission by which `planfly.returns.jsbsim_returns` flies a return by the control law.
+The result of the program replaces the result of the law only if it is worse; it never improves a judgement.
 """
 
 import math

@@ -49,7 +49,7 @@ def watch_address_space() -> None:
 
 
 def limit_of_address_space() -> int | None:
-    """Bytes that this process may map; None without a limit, as on Windows.
+    """Return bytes that this process may map; None without a limit, as on Windows.
 
     >>> limit_of_address_space() is None or limit_of_address_space() > 0
     True

@@ -71,7 +71,7 @@ def say_replaced(*files: Path) -> None:
 
 
 def is_received() -> bool:
-    """Whether stages are shown to anybody.
+    """Return True if stages are shown to anybody.
 
     >>> is_received()
     False

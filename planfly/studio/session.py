@@ -67,7 +67,7 @@ class Session:
 
     @classmethod
     def of(cls, document: Document, options: MissionOptions) -> "Session":
-        """A session that begins with what was opened."""
+        """Return a session that begins with what was opened."""
         desk = EditContext.of(document.setup, options.get("terrain"), read_named_fences(options.get("fence") or ()))
         judged = desk.judge(document.setup.mission)
         history = History(document.setup.mission)
@@ -360,7 +360,7 @@ class Session:
 
     @property
     def has_news(self) -> bool:
-        """Whether anything is to be kept: the mission, or how it is flown, differs from what was opened."""
+        """True if anything is to be kept: the mission, or how it is flown, differs from what was opened."""
         return self.is_changed or self.desk.scenario is not self.document.setup.scenario
 
     def kept_file(self, file: Path) -> Path:

@@ -1,6 +1,7 @@
 """Tasks of the studio's processes: fly a mission, plan a path.
 
-Arguments are pickled, results are data.  Returns and campaigns, which take longer, are in `planfly.studio.long_worker_tasks`.
+Arguments are pickled, results are data.  Returns and campaigns, which take longer, are in
+`planfly.studio.long_worker_tasks`.
 """
 
 import math

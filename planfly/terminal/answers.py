@@ -82,7 +82,7 @@ class AircraftAnswer:
 
 
 def aircraft_entry(one: Aircraft, detail: AircraftDetail | None) -> AircraftEntry:
-    """An aircraft's metadata, and what was worked out."""
+    """Return an aircraft's metadata, and what was worked out."""
     return AircraftEntry(
         name=one.name,
         title=one.title,
@@ -100,7 +100,7 @@ def aircraft_entry(one: Aircraft, detail: AircraftDetail | None) -> AircraftEntr
 
 
 def aircraft_detail(numbers: AircraftNumbers) -> AircraftDetail:
-    """What was worked out, in the answer's units."""
+    """Return what was worked out, in the answer's units."""
     slow, fast = numbers.envelope.level_speeds(0.0)
     trims = [
         TrimEntry(

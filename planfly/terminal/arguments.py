@@ -15,7 +15,7 @@ from planfly.arguments import CAMERA, CHOICES, RANGES, is_camera, is_place, is_w
 
 
 def number(keyword: str) -> Callable[[str], Any]:
-    """What turns a text into the number that a keyword of the API may be.
+    """Return what turns a text into the number that a keyword of the API may be.
 
     >>> number("seed")("3"), number("max_hours")("1.5")
     (3, 1.5)
@@ -90,7 +90,7 @@ def area(text: str) -> tuple[float, ...]:
 
 
 def autopilots(text: str) -> list[str]:
-    """Names of autopilots with commas between."""
+    """Return names of autopilots with commas between."""
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in CHOICES["autopilot_law"]:
@@ -99,7 +99,7 @@ def autopilots(text: str) -> list[str]:
 
 
 def time_or_stations(text: str) -> float | str:
-    """A time of the flight, or where ground stations listen: an address has a colon."""
+    """Return a time of the flight, or where ground stations listen: an address has a colon."""
     if ":" in text:
         return text
     return number("end")(text)
@@ -131,7 +131,7 @@ def threat(text: str) -> tuple[float, float, float, float]:
 
 
 def problems(text: str) -> tuple[int, ...]:
-    """Numbers of threats out of the paper's four."""
+    """Return numbers of threats out of the paper's four."""
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})
     if not all(part.isdecimal() for part in parts) or not set(numbers) <= set(CHOICES["problems"]):
@@ -153,7 +153,7 @@ IMPORTED_LOGS = ("BIN", "log", *(suffix[1:] for suffix in SUFFIXES))
 
 
 def completed(action: argparse.Action, completer: Completer) -> argparse.Action:
-    """An argument that a completer proposes values for."""
+    """Return an argument that a completer proposes values for."""
     # argcomplete's own way of telling it.
     action.completer = completer  # type: ignore[attr-defined]
     return action
@@ -171,7 +171,7 @@ def files(*suffixes: str) -> Completer:
 
 
 def scenario_words(prefix: str, **_about: object) -> list[str]:
-    """Names of the scenarios that come with planfly, and scenario files.
+    """Return names of the scenarios that come with planfly, and scenario files.
 
     >>> scenario_words("jack")
     ['jacksboro', 'jacksboro-air', 'jacksboro-field']
@@ -181,7 +181,7 @@ def scenario_words(prefix: str, **_about: object) -> list[str]:
 
 
 def aircraft_words(prefix: str, **_about: object) -> list[str]:
-    """Names of the aircraft that come with planfly, and folders.
+    """Return names of the aircraft that come with planfly, and folders.
 
     >>> aircraft_words("aero")
     ['aerosonde']
@@ -203,7 +203,7 @@ def answer_shell(parser: argparse.ArgumentParser) -> None:
 
 
 def shell_script(shell: str) -> str:
-    """The script that has a shell ask planfly.  shell: one of `SHELLS`."""
+    """Return the script that has a shell ask planfly.  shell: one of `SHELLS`."""
     from argcomplete.shell_integration import shellcode
 
     return shellcode(["planfly"], shell=shell)

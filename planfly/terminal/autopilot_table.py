@@ -12,7 +12,7 @@ _GAP = "  "
 
 
 def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
-    """The table by rule, then what each autopilot's verdict says first.
+    """Return the table by rule, then what each autopilot's verdict says first.
 
     verdicts: by the autopilot's name, in the order of the columns.
 
@@ -54,7 +54,7 @@ def _answer(verdict: Verdict) -> str:
 
 
 def _state(rule: RuleFindings | None) -> str:
-    """Count the findings of a rule that failed, or that pass."""
+    """Return count the findings of a rule that failed, or that pass."""
     if rule is None or not rule.judged:
         return "not judged" if rule else ""
     return f"{len(rule.failed)} of {rule.judged} failed" if rule.failed else f"{rule.judged} ok"

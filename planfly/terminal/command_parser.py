@@ -34,7 +34,7 @@ def wants_colour(stream: TextIO) -> bool:
 
 
 def coloured(text: str, style: Style, stream: TextIO | None = None) -> str:
-    """A text as a stream, standard output if None, is to get it.
+    """Return a text as a stream, standard output if None, is to get it.
 
     >>> coloured("flyable", "good")
     'flyable'
@@ -50,7 +50,7 @@ _NAMED = re.compile(r"(?<![\w/-])--?[a-z][a-z-]*")
 
 
 def coloured_help(text: str) -> str:
-    r"""A help as a terminal that wants colour gets it; the text is the same.
+    r"""Return a help as a terminal that wants colour gets it; the text is the same.
 
     >>> coloured_help("usage: planfly fly [--at TIME]").split("\x1b")
     ['', '[33musage:', '[0m planfly fly [', '[36m--at', '[0m TIME]']
@@ -85,7 +85,7 @@ class CommandParser(argparse.ArgumentParser):
         self.exit(BAD_INPUT, coloured(line, "bad", sys.stderr) + "\n")
 
     def format_help(self) -> str:
-        """The help, with what is made for it alone."""
+        """Return the help, with what is made for it alone."""
         epilog, more = self.epilog, self.more()
         if more:
             self.epilog = (epilog or "").replace(EXIT_CODES, f"{more}\n\n{EXIT_CODES}")
@@ -94,7 +94,7 @@ class CommandParser(argparse.ArgumentParser):
         return coloured_help(text) if wants_colour(sys.stdout) else text
 
     def group(self, title: str, description: str | None = None) -> OptionTaker:
-        """Options that stand together in the help, under a title."""
+        """Return options that stand together in the help, under a title."""
         return self.add_argument_group(title, description)
 
     def alias(self, keyword: str, option: str) -> None:
@@ -102,12 +102,12 @@ class CommandParser(argparse.ArgumentParser):
         self._aliases[keyword] = option
 
     def keywords(self) -> dict[str, str]:
-        """The option that states each keyword of the API."""
+        """Return the option that states each keyword of the API."""
         named = {action.dest: action.option_strings[-1] for action in self._actions if action.option_strings}
         return named | self._aliases
 
     def options(self) -> list[str]:
-        """The long options that it takes."""
+        """Return the long options that it takes."""
         return list(dict.fromkeys(_OPTION.findall(self.format_usage())))
 
 
@@ -163,7 +163,7 @@ class LineParser(CommandParser):
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> argparse.Namespace:
-        """The arguments by name; for bad usage one line that names what may have been meant, and SystemExit."""
+        """Return the arguments by name; for bad usage one line that names what may have been meant, and SystemExit."""
         words = _with_negatives(sys.argv[1:] if args is None else list(args))
         if words and not words[0].startswith("-") and words[0] not in self.commands:
             there = did_you_mean(words[0], self.commands) or f"; there are {', '.join(self.commands)}"
@@ -185,7 +185,7 @@ _NEGATIVES = re.compile(r"-\.?\d[^=]*")
 
 
 def _with_negatives(words: list[str]) -> list[str]:
-    """A command line in which negative numbers stand with the option that they follow: --from -33.9,18.4."""
+    """Return a command line in which negative numbers stand with the option that they follow: --from -33.9,18.4."""
     joined: list[str] = []
     for word in words:
         if _NEGATIVES.fullmatch(word) and joined and _OPTION.fullmatch(joined[-1]):
@@ -203,7 +203,7 @@ _KEYWORD = re.compile(r"`(\w+)`|\b(\w+)=True\b")
 
 
 def error_text(error: PlanflyError, parser: CommandParser) -> str:
-    """An error's line with the options of a command's parser in place of the keywords that they state.
+    """Return an error's line with the options of a command's parser in place of the keywords that they state.
 
     >>> parser = CommandParser(prog="planfly replay")
     >>> _ = parser.add_argument("--from", dest="start")

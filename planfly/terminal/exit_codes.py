@@ -23,7 +23,7 @@ INTERRUPTED = 130
 
 
 def verdict_code(verdict: "Verdict") -> int:
-    """The exit code of a verdict: flyable, not flyable, or not judged in full."""
+    """Return the exit code of a verdict: flyable, not flyable, or not judged in full."""
     if verdict.undecided:
         return LOSS
     return FLYABLE if verdict.flyable else NOT_FLYABLE

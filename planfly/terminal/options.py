@@ -82,7 +82,7 @@ def json_option(group: OptionTaker, command: str) -> None:
 
 
 def world_options(parser: CommandParser) -> OptionTaker:
-    """What a mission is judged in."""
+    """Return what a mission is judged in."""
     group = parser.group("where it flies")
     completed(
         group.add_argument(
@@ -161,7 +161,7 @@ def turbulence_option(group: OptionTaker) -> None:
 
 
 def pilot_options(parser: CommandParser) -> OptionTaker:
-    """The autopilot."""
+    """Return the autopilot."""
     group = parser.group("autopilot")
     found = group.add_argument(
         "--params",
@@ -186,7 +186,7 @@ def pilot_options(parser: CommandParser) -> OptionTaker:
 
 
 def steering_options(parser: CommandParser) -> OptionTaker:
-    """The autopilot, and how well it knows where it is."""
+    """Return the autopilot, and how well it knows where it is."""
     group = pilot_options(parser)
     group.add_argument(
         "--nav",
@@ -289,7 +289,7 @@ def own_link_options(parser: CommandParser, *, bind: str) -> None:
 
 @contextlib.contextmanager
 def stop_signals() -> Iterator[Callable[[], bool]]:
-    """Turn SIGINT and SIGTERM into a question, so that logs are closed in order: gives whether to stop."""
+    """Yield turn SIGINT and SIGTERM into a question, so that logs are closed in order: gives whether to stop."""
     asked = False
 
     def ask(_number: int, _frame: FrameType | None) -> None:

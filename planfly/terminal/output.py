@@ -40,7 +40,7 @@ class _TolerantStream(io.TextIOBase):
         return True
 
     def isatty(self) -> bool:
-        """Whether the stream behind is a terminal."""
+        """Return True if the stream behind is a terminal."""
         return self._stream.isatty()
 
     def write(self, text: str, /) -> int:
@@ -99,7 +99,7 @@ def open_standard_streams() -> None:
 
 
 def printable(text: str) -> str:
-    r"""One line without what would move a terminal's cursor or turn its text around: escapes take its place.
+    r"""Return one line without what would move a terminal's cursor or turn its text around: escapes take its place.
 
     >>> print(printable("a\nb \x1b[2J \u202e"))
     a b \x1b[2J \u202e
@@ -213,7 +213,7 @@ class _TimeLeft:
         return "no estimate yet" if to_do > 0.0 else "no estimate"
 
     def is_due(self) -> bool:
-        """Whether it is time to tell again; asked by what then tells."""
+        """Return True if it is time to tell again; asked by what then tells."""
         passed = self._passed()
         if passed < self._due:
             return False
@@ -221,7 +221,7 @@ class _TimeLeft:
         return True
 
     def elapsed(self) -> float:
-        """Seconds since it began."""
+        """Return seconds since it began."""
         return time.monotonic() - self._started
 
     def keep(self) -> None:
@@ -235,7 +235,7 @@ class _TimeLeft:
 
 
 def _duration(seconds: float) -> str:
-    """A duration that is an estimate.
+    """Return a duration that is an estimate.
 
     >>> _duration(0.4), _duration(89.0), _duration(600.0), _duration(9000.0)
     ('1 s', '89 s', '10 min', '2.5 h')
@@ -285,7 +285,7 @@ def _joined(*parts: str) -> str:
 
 
 def _says_left(remark: str) -> bool:
-    """Whether a remark has an estimate of its own: of work that is resumed, or that may turn out to be more."""
+    """Return True if a remark has an estimate of its own: of work that is resumed, or that may turn out to be more."""
     return " left" in remark
 
 
@@ -400,7 +400,7 @@ SILENT = Receiver(lambda *_: contextlib.nullcontext(_ignore), _ignore)
 
 
 def answer_text(answer: object) -> str:
-    """An answer as the text of a file; what is no number is null."""
+    """Return an answer as the text of a file; what is no number is null."""
     # Imported here: nobody else needs schemas.
     from pydantic import TypeAdapter
 

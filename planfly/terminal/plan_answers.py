@@ -76,7 +76,7 @@ PlanDocument = PlanAnswer | FrontAnswer
 
 
 def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
-    """The answer of a front in a folder."""
+    """Return the answer of a front in a folder."""
     from planfly.api.fronts import table_rows
     from planfly.api.planning import conditions_of_plan
 
@@ -111,7 +111,7 @@ def fewer_line(front: "Front") -> str:
 
 
 def front_lines(front: "Front", folder: Path) -> list[str]:
-    """A front on the terminal: a line a plan, and what was written."""
+    """Return a front on the terminal: a line a plan, and what was written."""
     from logs.verdict.conditions import autopilot_line, condition_lines
     from planfly.api.fronts import PICTURES
     from planfly.api.planning import conditions_of_plan

@@ -210,7 +210,7 @@ class ReturnsAnswer:
 
 
 def suggestion_entry(found: ReturnsFound, one: Suggested) -> ReturnSuggestion:
-    """A suggestion as an answer has it."""
+    """Return a suggestion as an answer has it."""
     rally = None
     if one.remedy.rally is not None:
         rally = []
@@ -229,7 +229,7 @@ def suggestion_entry(found: ReturnsFound, one: Suggested) -> ReturnSuggestion:
 
 
 def program_entry(found: ReturnsFound) -> ByProgram | None:
-    """What ArduPlane's program flew as an answer has it."""
+    """Return what ArduPlane's program flew as an answer has it."""
     if found.by_program is None:
         return None
     names = {log.name: str(log) for log in found.files}
@@ -257,12 +257,12 @@ def _measured(one: ReturnFlown) -> MeasuredReturn:
 
 
 def _tenths(value: float) -> float | None:
-    """A number as an answer has it; None for none."""
+    """Return a number as an answer has it; None for none."""
     return round(value, 1) if math.isfinite(value) else None
 
 
 def glides_entry(found: ReturnsFound) -> GlidesEntry:
-    """What can be reached without the engine as an answer has it."""
+    """Return what can be reached without the engine as an answer has it."""
     glides = found.glides
     entries = []
     for group in glides.ranges:
@@ -306,7 +306,7 @@ def glides_entry(found: ReturnsFound) -> GlidesEntry:
 
 
 def return_entry(found: ReturnsFound, group: ReturnRange) -> ReturnEntry:
-    """A range of returns as an answer has it."""
+    """Return a range of returns as an answer has it."""
     one, scenario, number = group.worst, found.setup.scenario, _tenths
 
     return ReturnEntry(

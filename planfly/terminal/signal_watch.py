@@ -91,7 +91,7 @@ def _called_by_compiled_code(frame: FrameType | None) -> bool:
 
 
 def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
-    """What reads the numbers of signals, and the handle that Python writes them to, which never blocks."""
+    """Return what reads the numbers of signals, and the handle that Python writes them to, which never blocks."""
     if hasattr(os, "set_blocking"):
         read, write = os.pipe()
         os.set_blocking(write, False)

@@ -99,7 +99,7 @@ class SurveyAnswer:
 
 
 def photo_line_entry(setup: FlightSetup, line: PhotoLine, one: LineMeasure | None) -> PhotoLineEntry:
-    """A photo line as an answer has it."""
+    """Return a photo line as an answer has it."""
     first, last = (int(setup.route.items[i]) for i in (line.first, line.last))
 
     def share(value: float | None) -> float | None:
@@ -121,7 +121,7 @@ def photo_line_entry(setup: FlightSetup, line: PhotoLine, one: LineMeasure | Non
 
 
 def overlap_entry(one: OverlapMeasure) -> OverlapEntry:
-    """A survey's overlap as an answer has it."""
+    """Return a survey's overlap as an answer has it."""
     low, high = sorted(one.pair)
     return OverlapEntry(
         front=None if one.front is None else round(one.front, 4),
@@ -134,12 +134,12 @@ def overlap_entry(one: OverlapMeasure) -> OverlapEntry:
 
 
 def near_miss_entry(one: NearMiss) -> NearMissEntry:
-    """What came nearest as an answer has it."""
+    """Return what came nearest as an answer has it."""
     return NearMissEntry(what=one.what, usable=one.usable, lines=one.lines, headline=one.verdict.headline)
 
 
 def survey_remedy_entry(one: SurveyRemedy) -> SurveyRemedyEntry:
-    """What would help as an answer has it."""
+    """Return what would help as an answer has it."""
     return SurveyRemedyEntry(
         kind=one.kind,
         name=one.name,

@@ -67,14 +67,14 @@ def laid_from_the_ground(plan: Plan, airframe: Airframe, flown: Plan | None = No
 
 
 def choose_seed(scenario: Scenario, seed: int | None) -> int:
-    """The seed asked for, else the scenario's, else 1."""
+    """Return the seed asked for, else the scenario's, else 1."""
     if seed is not None:
         return seed
     return scenario.planner.seed if scenario.planner.seed is not None else 1
 
 
 def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = None) -> Airframe:
-    """The scenario's aircraft, its envelope, and the limits that both set.
+    """Return the scenario's aircraft, its envelope, and the limits that both set.
 
     parameters: of its autopilot, by the autopilot's names and in its units, in place of those that its file states.
     Raises ScenarioError for an unknown aircraft or autopilot, or a speed that the aircraft cannot fly, and
@@ -114,7 +114,7 @@ def bank_limit(scenario: Scenario, autopilot: Autopilot) -> float:
 
 
 def with_tracking(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> Limits:
-    """Limits that leave free what an autopilot strays from its legs in a scenario."""
+    """Return limits that leave free what an autopilot strays from its legs in a scenario."""
     table = scenario.flight
     tracking = autopilot.tracking_error(
         limits.airspeed, table.steering.nav, fly_over=table.fly_over, turbulence=scenario.wind.turbulence
@@ -123,7 +123,7 @@ def with_tracking(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> L
 
 
 def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
-    """The scenario's aircraft, and the energy it carries, Wh.  Raises ScenarioError for an unknown aircraft.
+    """Return the scenario's aircraft, and the energy it carries, Wh.  Raises ScenarioError for an unknown aircraft.
 
     >>> from world.scenario import load_scenario
     >>> find_airframe(load_scenario("tight"))[0].name

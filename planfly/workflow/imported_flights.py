@@ -62,14 +62,14 @@ class ImportedFlight:
 
     @property
     def lossy(self) -> bool:
-        """Whether some of the log could not be read."""
+        """True if some of the log could not be read."""
         return self.setup.source is not None and self.setup.source.damage.lossy
 
     def __repr__(self) -> str:
         return f"<ImportedFlight {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
 
     def _repr_html_(self) -> str:
-        """How a notebook shows it."""
+        """Return how a notebook shows it."""
         return self.verdict._repr_html_() + self.track._repr_html_()
 
 
@@ -215,7 +215,7 @@ def _setup(
 
 
 def _limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, usual: float) -> Limits:
-    """Limits at the speed that was to be flown: the autopilot's, the scenario's, or the one that was flown."""
+    """Return limits at the speed that was to be flown: the autopilot's, the scenario's, or the one that was flown."""
     aircraft, _ = find_airframe(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
     airspeed, bank = scenario.flight.airspeed_mps or usual, math.radians(scenario.flight.max_bank_deg)
@@ -272,7 +272,7 @@ def _differing(flight: LoggedFlight, mission: Mission, options: LogOptions) -> t
 
 
 def _events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
-    """What the vehicle said during the flight, and the modes it was in."""
+    """Return what the vehicle said during the flight, and the modes it was in."""
     if not len(flight.time):
         return ()
     low, high = float(flight.time[0]), float(flight.time[-1])

@@ -23,7 +23,7 @@ Advance = Callable[[float, float, str], None]
 
 
 def planned_for(scenario: Scenario, airframe: Airframe) -> Conditions:
-    """What a plan of a scenario is for."""
+    """Return what a plan of a scenario is for."""
     return conditions_of(scenario, airframe.aircraft.name, airframe.airspeed, airframe.autopilot)
 
 
@@ -41,8 +41,10 @@ def make_plan(
     """Plan within the scenario's and the aircraft's limits, as far as these are known for certain.
 
     All commands plan by this, so that what one calls safe no other calls unsafe. Where gusts make the autopilot circle
-    at waypoints, the plan has as few of them as it can (`planfly.planning.gust_orbits`); where gusts take the aircraft from its
-    height, the plan leaves as much below or above it (`planfly.planning.gust_altitude_margin`); the ways from and to the ground are
+    at waypoints, the plan has as few of them as it can (`planfly.planning.gust_orbits`); where gusts take the aircraft
+    from its
+    height, the plan leaves as much below or above it (`planfly.planning.gust_altitude_margin`); the ways from and to
+    the ground are
     laid; and where the autopilot circles at the mission's end, the certificate names what the circles may come too near
     to.
 
@@ -79,12 +81,12 @@ def make_plan(
 
 
 def finish_plan(plan: Plan, airframe: Airframe, *, onward: bool = False) -> Plan:
-    """A path that was found, with all that `make_plan` does after its search; nothing else is searched for."""
+    """Return a path that was found, with all that `make_plan` does after its search; nothing else is searched for."""
     return _completed(keep_height(limit_waypoint_orbits(plan, airframe), airframe), airframe, onward=onward)
 
 
 def _completed(plan: Plan, airframe: Airframe, old: Plan | None = None, *, onward: bool) -> Plan:
-    """The plan with its ways from and to the ground, and with what the circles at its end may come too near to.
+    """Return the plan with its ways from and to the ground, and with what the circles at its end may come too near to.
 
     old: the plan that is being flown.
     """

@@ -61,7 +61,7 @@ class PlanThenFly:
         return f"<PlanThenFly {self.plan!r}, {self.verdict!r}>"
 
     def _repr_html_(self) -> str:
-        """How a notebook shows it."""
+        """Return how a notebook shows it."""
         return self.plan._repr_html_() + self.verdict._repr_html_()
 
 
@@ -135,7 +135,8 @@ def fly_and_judge(
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
     autopilot: the program of ArduPlane or PX4, which then flies; its own log is kept beside ours.
     off_nominal: how the flight differs from what guidance knows; none of a program's.
-    reference: when reference flights are flown, as of `planfly.workflow.reference_flights.judge_with_reference_flights`.
+    reference: when reference flights are flown, as of
+    `planfly.workflow.reference_flights.judge_with_reference_flights`.
     returns: whether returns from a few places are judged and drawn in the log, if one is named.
     limits: how long it may fly, and how large its log may grow.
 

@@ -31,7 +31,7 @@ Passes = Callable[[Autopilot], bool]
 
 
 def deciding_parameter(autopilot: Autopilot, findings: tuple[Finding, ...], passes: Passes) -> DecidingParameter | None:
-    """The first candidate that passes with another value, and the nearest value that does; None where none does.
+    """Return the first candidate that passes with another value, and the nearest value that does; None where none does.
 
     findings: of the flight that failed.
     passes: flies the law with other parameters and says whether that flight passes; called about ten times.
@@ -87,7 +87,7 @@ def _nearest(current: float, step: float, far: float, passes: Callable[[float], 
 
 
 def _off(failed: Finding, findings: tuple[Finding, ...]) -> float | None:
-    """How far off (m) the flight was where it failed, as `DecidingParameter` has it."""
+    """Return how far off (m) the flight was where it failed, as `DecidingParameter` has it."""
     if failed.rule == "corridor":
         return failed.flown
     if failed.place.kind != "leg" or failed.rule not in ("clearance", "height"):
@@ -163,7 +163,7 @@ HEIGHT_ERROR = 1.2
 
 
 def has_room(flown: Sequence[Finding], failed: Sequence[Finding]) -> bool:
-    """Whether what failed passes with the margin that the law's own error asks for.
+    """Return True if what failed passes with the margin that the law's own error asks for.
 
     flown: findings of a flight with another value of a parameter.  failed: of the one before.  Both are compared where
     that failed: beside the legs, and low above ground.

@@ -290,7 +290,7 @@ def cartesian(space: Space, waypoints: int) -> Encoding:
 
 
 def polar(space: Space, waypoints: int) -> Encoding:
-    """Each inner waypoint as a step from the previous one: r, theta, up (section III.A).
+    """Return each inner waypoint as a step from the previous one: r, theta, up (section III.A).
 
     theta: "the turning angle at each waypoint", relative to the previous leg, of the first to the direction
     start-destination; within +-180 degrees, positive to the left. r: from 5 % to 200 % of the straight distance over

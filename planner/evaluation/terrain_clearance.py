@@ -32,7 +32,7 @@ HEIGHT_LAG = np.dtype([(name, np.float64) for name in ("steady", "slant", "rest"
 
 @inlined
 def _left(lengths: float) -> float:
-    """Share of a difference that remains after this many lag lengths: an upper bound on exp(-x)."""
+    """Return share of a difference that remains after this many lag lengths: an upper bound on exp(-x)."""
     # By four terms of exp(x): a library's exponential rounds differently on different machines.
     return 1.0 / (1.0 + lengths * (1.0 + lengths * (0.5 + lengths / 6.0)))
 

@@ -266,7 +266,7 @@ def kill_density(
 
 @inlined
 def _part(f: float, g: float) -> tuple[float, float]:
-    """Two fractions of a line in increasing order, clipped to it."""
+    """Return two fractions of a line in increasing order, clipped to it."""
     f, g = (f, g) if f < g else (g, f)
     return f if f > 0.0 else 0.0, g if g < 1.0 else 1.0
 

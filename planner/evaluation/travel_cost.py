@@ -131,7 +131,7 @@ class LegTime(NamedTuple):
 
 @inner
 def leg_time(dx: float, dy: float, dz: float, wind_east: float, wind_north: float, airspeed: float) -> LegTime:
-    """Time of a leg (m) at an airspeed in a wind (m/s): the smaller positive T with |d - w T| = V T.
+    """Return time of a leg (m) at an airspeed in a wind (m/s): the smaller positive T with |d - w T| = V T.
 
     From |d|^2 - 2 T w.d - (V^2 - w^2) T^2 = 0: T = |d|^2 / (w.d + D), D^2 = (w.d)^2 + (V^2 - w^2) |d|^2, and its
     derivative by d is (d - w T) / D.

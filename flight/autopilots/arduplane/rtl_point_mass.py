@@ -96,8 +96,8 @@ RETURN_RESULT = record_dtype(
     "energy",  # Wh, NaN if the envelope has no power data
     ("rows", np.int64),  # number of stored positions
 )
-# An RTL has arrived at its loiter within this distance of its target (m), or within `flight.simulation.tick.RTL_ARRIVAL_LOITER_RADII` of
-# its radii.  Flights of ArduPlane were compared up to there.
+# An RTL has arrived at its loiter within this distance of its target (m), or within
+# `flight.simulation.tick.RTL_ARRIVAL_LOITER_RADII` of its radii.  Flights of ArduPlane were compared up to there.
 LOITER_CAPTURE_RADIUS_M = 200.0
 # An RTL that hits the ground is continued to this depth (m), to know by how much it hits, and what an RTL that barely
 # hits would meet after that.
@@ -175,7 +175,8 @@ def fly_returns(
     landings: n landing sequences to join afterwards, up to the line-up or a loiter, None for no sequence; or empty.
     keep: True to store the positions.
     least: (n,) heights above ground and (n,) distances outside spheres, m, below which an RTL is aborted.
-    engine_out: True after an engine failure: the aircraft flies on for `ENGINE_FAILURE_REACTION_S` s, and ends at its loiter.
+    engine_out: True after an engine failure: the aircraft flies on for `ENGINE_FAILURE_REACTION_S` s, and ends at its
+    loiter.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters

@@ -267,7 +267,7 @@ class SitlFlight(ProgramFlight):
 
     @contextlib.contextmanager
     def _name_program(self, kind: type[FlightError] = FlightError) -> Iterator[None]:
-        """Name the program in its errors, and raise them as an error of this kind."""
+        """Yield name the program in its errors, and raise them as an error of this kind."""
         try:
             yield
         except FlightError as error:
@@ -275,7 +275,7 @@ class SitlFlight(ProgramFlight):
             raise kind.from_error(error, "" if named else self._binary) from error
 
     def _make_rail(self, setup: FlightSetup) -> RailEnd:
-        """Trim the aircraft at its release: before the first waypoint, straight and level, without ground.
+        """Return trim the aircraft at its release: before the first waypoint, straight and level, without ground.
 
         For a take-off the rail is the launch's rail.
         """

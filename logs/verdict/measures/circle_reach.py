@@ -1,6 +1,7 @@
 """Find hazards within reach of a loiter that is flown wider than drawn.
 
-An autopilot that steers to the loiter's center and then orbits it as wide as it can may be anywhere within `LOITER_SWING_RADII`
+An autopilot that steers to the loiter's center and then orbits it as wide as it can may be anywhere within
+`LOITER_SWING_RADII`
 radii of the bank limit from the center if the loiter is too tight for its bank; the direction of arrival decides where.
 A circle drawn around the center says nothing about the hazards next to it.
 """

@@ -598,8 +598,8 @@ def slope_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
 def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
     """Return the fly-by arc at a leg's end if it is too steep.
 
-    None if the airspeed stays within `SPEED_TOLERANCE_MPS`: the climb or descent that the aircraft cannot make on the arc changes
-    its speed by g dh / V.
+    None if the airspeed stays within `SPEED_TOLERANCE_MPS`: the climb or descent that the aircraft cannot make on the
+    arc changes its speed by g dh / V.
     """
     i = leg + 1
     if i == requirements.legs or requirements.setup.route.fly_over[i] or requirements.setup.route.arcs[i] > 0.0:

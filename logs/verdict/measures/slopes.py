@@ -173,7 +173,8 @@ class SlopeMeasure:
     height_error: m, largest distance above (negative: below) the leg's line.
     short: True if no part of the leg is clear of the blends.
     at_full, at_idle: s with the throttle at its limits.
-    slow, fast: m/s, the largest mean airspeed error below and above the command over `SATURATED_TIME_S` seconds at those
+    slow, fast: m/s, the largest mean airspeed error below and above the command over `SATURATED_TIME_S` seconds at
+    those
         limits, without the part that a gust explains; 0 for none.
     ability: the aircraft's ability at the throttle limit that the leg needs, if the flight reached that limit.
     finished: the leg was flown to its end.

@@ -117,8 +117,8 @@ def glide_notes(glides: Glides) -> list[str]:
     if not glides.each:
         return []
     notes = [
-        f"without the engine: on for {ENGINE_FAILURE_REACTION_S:.0f} s, then at AIRSPEED_MIN {glides.airspeed:g} m/s, {MARGIN:.0f} m"
-        " above ground all the way, outside missiles' spheres, through zones",
+        f"without the engine: on for {ENGINE_FAILURE_REACTION_S:.0f} s, then at AIRSPEED_MIN {glides.airspeed:g} m/s,"
+        f" {MARGIN:.0f} m above ground all the way, outside missiles' spheres, through zones",
         "flat by the elevation file: it knows no trees, houses or water",
     ]
     if glides.fuel:

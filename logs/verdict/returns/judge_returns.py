@@ -461,7 +461,8 @@ def sinks_down(one: ReturnFlown, height: float) -> bool:
 
     That is no fault of its path.
 
-    height: its starting height above ground, m.  Below `MIN_JUDGED_HEIGHT_M` this is any return that hits the ground or gets low
+    height: its starting height above ground, m.  Below `MIN_JUDGED_HEIGHT_M` this is any return that hits the ground
+    or gets low
     near its start; higher up, one that loses half of its height by then.  A return that flies into rising ground, or
     hits a hill later, is judged.
     """

@@ -5,7 +5,8 @@ touchdown rule judge what is flown there.  Other departures and approaches are n
 mission's items and judged against ground, missile spheres and zones, whether the mission was flown or not.
 
 If a mission takes off, the aircraft climbs from the ground at home towards the next place, or on the course that the
-scenario's `[launch]` states.  An obstacle at its steepest climb fails; an obstacle only at `MIN_CLIMB_FRACTION` of that climb
+scenario's `[launch]` states.  An obstacle at its steepest climb fails; an obstacle only at `MIN_CLIMB_FRACTION` of
+that climb
 leaves the finding undecided.  If the mission does not take off, a pilot flies the aircraft to its first waypoint,
 perhaps on another path: an obstacle on the straight path leaves the finding undecided.
 

@@ -180,7 +180,7 @@ def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[
 
 
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
-    """Return a note if a leg is too short to take up its speed at `MAX_STEADY_ACCELERATION_MPS2` from the leg before."""
+    """Return a note if a leg is too short to take up its speed at `MAX_STEADY_ACCELERATION_MPS2`."""
     before = float(requirements.route.airspeed[leg - 1]) if leg else commanded
     change, run = commanded - before, float(requirements.runs[leg])
     seconds = abs(change) / MAX_STEADY_ACCELERATION_MPS2

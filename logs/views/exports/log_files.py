@@ -44,7 +44,7 @@ def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
 
 
 def csv_text(log: FlightLog) -> str:
-    """The table as CSV: a line of names, then a line a row; each number as short as reads back to the same one.
+    """Return the table as CSV: a line of names, then a line a row; each number as short as reads back to the same one.
 
     >>> from logs.recording.example_log import example_log
     >>> csv_text(example_log()).splitlines()[1].split(",")[:6]
@@ -60,7 +60,7 @@ def csv_text(log: FlightLog) -> str:
 
 
 def parquet_bytes(log: FlightLog) -> bytes:
-    """The table as a Parquet file, in the types of the log, with the scenario's name and origin as metadata.
+    """Return the table as a Parquet file, in the types of the log, with the scenario's name and origin as metadata.
 
     Raises MissingExtraError without the extra ``tables``.
 
@@ -121,7 +121,7 @@ class _Topic(NamedTuple):
 
 
 def px4_log_bytes(log: FlightLog) -> bytes:
-    r"""Bytes of the `.ulg`; rows without a position are left out.
+    r"""Return bytes of the `.ulg`; rows without a position are left out.
 
     >>> from logs.recording.example_log import example_log
     >>> px4_log_bytes(example_log())[:7]
@@ -160,7 +160,7 @@ def _message(letter: bytes, body: bytes) -> bytes:
 
 
 def _format(topic: _Topic) -> str:
-    """The fields as ULog describes them."""
+    """Return the fields as ULog describes them."""
     return "".join(
         f"{_TYPES[kind]}{f'[{shape[0]}]' if shape else ''} {name};"
         for name, kind, *shape in [("timestamp", "<u8"), *topic.fields]

@@ -105,7 +105,7 @@ class MapZone:
 
 
 def map_zones(setup: FlightSetup) -> list[MapZone]:
-    """Zones of a setup's scenario, and its mission's own fence.
+    """Return zones of a setup's scenario, and its mission's own fence.
 
     >>> from logs.recording.example_log import example_log
     >>> map_zones(example_log().setup)
@@ -147,7 +147,7 @@ def _line(setup: FlightSetup, name: str, places: ArrayLike, folder: str, role: s
 
 
 def glide_shapes(setup: FlightSetup, drawn: DrawnReturns) -> list[MapZone]:
-    """The glide's footprint: from how low above ground a chosen place is in reach, and flat ground."""
+    """Return the glide's footprint: from how low above ground a chosen place is in reach, and flat ground."""
     footprint = drawn.glides.footprint
     if footprint is None:
         return []
@@ -217,7 +217,7 @@ class _Folders:
         return folder
 
     def named(self, name: str) -> ElementTree.Element:
-        """The one of a name that several share."""
+        """Return the one of a name that several share."""
         if name not in self._named:
             self._named[name] = self.new(name)
         return self._named[name]

@@ -57,7 +57,7 @@ def telemetry_bytes(log: FlightLog) -> bytes:
 
 
 def _frames(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], Any]]:
-    """Messages in order: when (s of the flight), from whom, and what."""
+    """Yield messages in order: when (s of the flight), from whom, and what."""
     for message in _upload(log):
         yield 0.0, _STATION, message
     for time, message in _messages_of(log):

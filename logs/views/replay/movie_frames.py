@@ -62,7 +62,7 @@ class MovieFrames:
         return np.minimum(self.end, self.start + np.arange(len(self)) * self.speed / RATE)
 
     def frames(self) -> Iterator[Pixels]:
-        """Each frame as (height, width, 3); both even, as video formats want them."""
+        """Yield each frame as (height, width, 3); both even, as video formats want them."""
         setup, track = self.setup, with_legs(self.track, find_leg_ends(self.setup, self.track))
         figure = draw_map(
             flight_map(

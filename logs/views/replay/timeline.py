@@ -59,7 +59,7 @@ def timeline(log: FlightLog) -> list[TimelineEntry]:
 
 
 def log_with_legs(log: FlightLog) -> FlightLog:
-    """The log with its track's legs found from the track, whatever was recorded."""
+    """Return the log with its track's legs found from the track, whatever was recorded."""
     return replace(log, track=with_legs(log.track, find_leg_ends(log.setup, log.track)))
 
 
@@ -94,7 +94,7 @@ def entry_lines(entry: TimelineEntry) -> list[str]:
 
 
 def _printable(text: str) -> str:
-    """Text from a file must not steer the terminal that it is shown on."""
+    """Return text from a file must not steer the terminal that it is shown on."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
@@ -108,7 +108,7 @@ def _leg_rows(track: Track, route: Route) -> list[_LegRows]:
 
 
 def _by_circle(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:
-    """Parts in order, those around one circle together."""
+    """Return parts in order, those around one circle together."""
     first: list[int] = []
     for leg in range(route.legs):
         around = min(route.arcs[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]
@@ -118,7 +118,7 @@ def _by_circle(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:
 
 
 def waypoint_name(route: Route, index: int) -> str:
-    """Name a waypoint by its number and, where it has one, its mission item."""
+    """Return name a waypoint by its number and, where it has one, its mission item."""
     item = int(route.items[index])
     number = int(route.stops[index])
     return f"waypoint {number}" if item < 0 else f"waypoint {number} (item {item})"

@@ -198,7 +198,7 @@ _TOGETHER = 32
 
 
 def nearest_distances(points: Floats, track: Floats) -> Floats:
-    """Distance (n,) from each of some points (n, 3) to the nearest of a track (m, 3), both along a way.
+    """Return distance (n,) from each of some points (n, 3) to the nearest of a track (m, 3), both along a way.
 
     Neighbours along a way lie near each other: boxes about some of them say which of the others may be nearest.
 
@@ -339,7 +339,7 @@ def comparison_data(flights: tuple[NamedFlight, NamedFlight], views: Mapping[str
 def _page(
     comparison: Comparison, flights: tuple[NamedFlight, NamedFlight], views: Mapping[str, View], files: dict[str, bytes]
 ) -> str:
-    """The page, its pictures, charts and scripts inside."""
+    """Return the page, its pictures, charts and scripts inside."""
     pictures = [(*_PICTURES[name.removesuffix(".png")], picture_address(data)) for name, data in files.items()]
     data, script = comparison_data(flights, views), script_text(CHART_SCRIPTS)
     verdicts = [

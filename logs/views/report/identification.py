@@ -75,7 +75,7 @@ class ParameterRow(NamedTuple):
 
 
 def parameter_rows(estimate: Estimate) -> list[ParameterRow]:
-    """Every parameter with its prior, its estimate and its 95 % interval."""
+    """Return every parameter with its prior, its estimate and its 95 % interval."""
     shares = np.round(100.0 * estimate.of_log()).astype(int).tolist()
     rows = []
     for parameter, value, sd, share in zip(
@@ -96,7 +96,7 @@ def parameter_rows(estimate: Estimate) -> list[ParameterRow]:
 
 
 def shift_rows(estimate: Estimate, count: int = 3) -> list[tuple[str, str]]:
-    """What is held fixed, and which parameters move most with one standard deviation of it."""
+    """Return what is held fixed, and which parameters move most with one standard deviation of it."""
     rows = []
     sds = np.array([parameter.sd for parameter in PARAMETERS])
     for name, shift in estimate.shifts.items():
@@ -107,7 +107,7 @@ def shift_rows(estimate: Estimate, count: int = 3) -> list[tuple[str, str]]:
 
 
 def identification_page(facts: IdentificationFacts) -> str:
-    """The page, whole: its pictures, charts and scripts inside."""
+    """Return the page, whole: its pictures, charts and scripts inside."""
     charts = {f"fit-{k}": equation_chart(one) for k, one in enumerate(facts.estimate.equations)}
     if facts.replay is not None:
         names, units = [row[0] for row in facts.replay.rows], [row[1] for row in facts.replay.rows]
@@ -135,7 +135,7 @@ def identification_page(facts: IdentificationFacts) -> str:
 def _fits(
     estimate: Estimate, charts: Mapping[str, Chart], pictures: Mapping[str, bytes]
 ) -> Sequence[tuple[str, str, str, str]]:
-    """Name of the chart, its words, its picture, and how good the fit is."""
+    """Return name of the chart, its words, its picture, and how good the fit is."""
     made = []
     for k, equation in enumerate(estimate.equations):
         name = f"fit-{k}"

@@ -82,7 +82,7 @@ def report_pictures(subject: Subject, pictures: Mapping[str, bytes]) -> list[Rep
 
 
 def picture_address(png: bytes) -> str:
-    """A picture as an address that holds it; one that is large with few colours, as it is seen on paper alone.
+    """Return a picture as an address that holds it; one that is large with few colours, as it is seen on paper alone.
 
     >>> picture_address(b"PNG")
     'data:image/png;base64,UE5H'
@@ -148,7 +148,7 @@ def _templates(package: str) -> Environment:
 
 
 def page_template(name: str, package: str = "logs.views.report") -> Template:
-    """A template of a package's folder ``templates``, compiled once in a process.
+    """Return a template of a package's folder ``templates``, compiled once in a process.
 
     What it is rendered with is escaped, and a name in it that is not given is an error.
     """
@@ -167,14 +167,14 @@ def script_text(names: tuple[str, ...]) -> str:
 
 
 def style_text(*names: str) -> str:
-    """The theme's colours and style sheets of ``templates`` as one: "style" is what both pages share."""
+    """Return the theme's colours and style sheets of ``templates`` as one: "style" is what both pages share."""
     files = resources.files("logs.views.report").joinpath("templates")
     sheets = [files.joinpath(f"{name}.css").read_text(encoding="utf-8") for name in names]
     return "\n".join([theme.css_variables(), *sheets])
 
 
 def script_digest(text: str) -> str:
-    """A script as a policy names it (Content Security Policy Level 3, "hash-source").
+    """Return a script as a policy names it (Content Security Policy Level 3, "hash-source").
 
     >>> script_digest("")
     'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='
@@ -289,7 +289,7 @@ def _page(
 
 
 def _page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View]) -> dict[str, Any]:
-    """What the page's scripts read, made safe for where it stands, and the scripts themselves."""
+    """Return what the page's scripts read, made safe for where it stands, and the scripts themselves."""
     script, flight = script_text((*CHART_SCRIPTS, *VIEW_SCRIPTS)), report_flight(setup, track)
     charts = page_charts(views)
     scene = charts.pop("scene")
@@ -310,12 +310,12 @@ def _page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View
 
 
 def page_charts(views: Mapping[str, View]) -> dict[str, Any]:
-    """What the page's scripts draw by the figure's name; a chart without panels is left to its picture."""
+    """Return what the page's scripts draw by the figure's name; a chart without panels is left to its picture."""
     return {name: view_json(view) for name, view in views.items() if not isinstance(view, Chart) or view.panels}
 
 
 def report_flight(setup: FlightSetup, track: Track | None) -> dict[str, Any]:
-    """The flight for slider and map, and the model of the aircraft; no flight of a bare plan."""
+    """Return the flight for slider and map, and the model of the aircraft; no flight of a bare plan."""
     flights = [] if track is None else [flight_moments(setup, track)]
     # A flight of which no place is known cannot be shown at any moment.
     known = [flight for flight in flights if flight["time"]]

@@ -80,7 +80,7 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
 
 
 def ground_clearance(setup: FlightSetup, track: Track) -> Floats | None:
-    """Height above ground of each row, (t,) m, from track and terrain; None without terrain."""
+    """Return height above ground of each row, (t,) m, from track and terrain; None without terrain."""
     terrain = setup.scenario.terrain
     if terrain is None:
         return None
@@ -106,7 +106,7 @@ def _flown_cells(track: Track | None, above: Floats | None, leg: int) -> tuple[s
 
 
 def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
-    """The flight in one line; "" where there was none."""
+    """Return the flight in one line; "" where there was none."""
     if track is None:
         return ""
     seconds, distance = float(track.time[-1] - track.time[0]), float(path_length(track.position)) / 1000.0
@@ -229,7 +229,7 @@ def notes_of(setup: FlightSetup) -> list[str]:
 
 
 def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
-    """Sum up what the flight took from the battery."""
+    """Return sum up what the flight took from the battery."""
     if track is None or len(track) == 0:
         return []
     used = float(track.energy[-1])

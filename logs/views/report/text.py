@@ -191,7 +191,7 @@ def in_unit(value: float | None, unit: str) -> tuple[float | None, str]:
 
 
 def state_of(ok: bool | None) -> str:
-    """Name a finding's state, from its answer."""
+    """Return name a finding's state, from its answer."""
     return "unjudged" if ok is None else "pass" if ok else "fail"
 
 
@@ -212,7 +212,7 @@ def badge_of(verdict: Verdict) -> Badge:
 
 
 def level_rows(verdict: Verdict, autopilot: Autopilot) -> list[LevelRow]:
-    """Each level that was asked, geometry first; the verdict's own is the last.
+    """Return each level that was asked, geometry first; the verdict's own is the last.
 
     autopilot: of the flight.
     """
@@ -227,7 +227,7 @@ def level_rows(verdict: Verdict, autopilot: Autopilot) -> list[LevelRow]:
 
 
 def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None = None) -> list[FindingRow]:
-    """All findings as text: failing first, then passed, then not judged; otherwise in the verdict's order.
+    """Return all findings as text: failing first, then passed, then not judged; otherwise in the verdict's order.
 
     deciding: the verdict's parameter, for what would pass.
     """
@@ -336,7 +336,7 @@ def _sentence(finding: Finding) -> str:
 
 
 def rule_rows(findings: Sequence[Finding]) -> list[RuleRow]:
-    """Count the findings by rule, in the order of `RULE_WORDS`; a rule without findings is left out."""
+    """Return count the findings by rule, in the order of `RULE_WORDS`; a rule without findings is left out."""
     return [_rule_row(rule) for rule in findings_by_rule(findings)]
 
 
@@ -362,7 +362,7 @@ _HEAD = ("", "cross-track (m)", "height (m)", "ground speed (m/s)", "bank (deg)"
 
 
 def refly_lines(again: Reflight) -> list[str]:
-    """Tables of legs and turns, each number as flown and as simulated, and how far the model can be trusted.
+    """Return tables of legs and turns, each number as flown and as simulated, and how far the model can be trusted.
 
     >>> from flight.simulation.setup import MissionStretch
     >>> from logs.recording.example_log import example_log
@@ -408,7 +408,7 @@ def trust_line(again: Reflight) -> str:
 
 
 def left_lines(agains: Sequence[Reflight], stretches: Sequence[MissionStretch], flown_again: int) -> list[str]:
-    """Which stretches were not flown again, and why.
+    """Return which stretches were not flown again, and why.
 
     stretches: of the imported flight.  flown_again: the most that are.
 
