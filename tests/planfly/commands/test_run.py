@@ -275,4 +275,5 @@ def test_a_run_takes_what_a_flight_takes(tmp_path: Path, monkeypatch: pytest.Mon
     # The plan was made in that wind, too, and the report names the line that repeats it.
     assert json.loads(Path("out/plan.json").read_text(encoding="utf-8"))["scenario"]["wind"]["speed_mps"] == 5.0
     page = Path("out/report.html").read_text(encoding="utf-8")
-    assert "planfly run field.toml --seed 1 --airspeed 22.0 --wind 5,90 --turbulence none" in page
+    repeated = "--wind 5,90 --turbulence none --airspeed 22.0 --guidance path --nav rtk --log-hz 10"
+    assert f"planfly run field.toml --seed 1 {repeated}" in page
