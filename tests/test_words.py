@@ -1,4 +1,4 @@
-"""The countable part of how this project writes: docstring openings, names of constants and words that CONTRIBUTING.md replaces."""
+"""The countable part of how this project writes: openings of docstrings, constants, and words that are replaced."""
 
 import ast
 import re

@@ -152,7 +152,9 @@ def _layout() -> tuple[np.dtype[np.void], dict[str, int]]:
 
 
 STATE_FILE = _file()
-STATE_BODY, _TAGS = _layout()
+_LAYOUT = _layout()
+STATE_BODY = _LAYOUT[0]
+_TAGS = _LAYOUT[1]
 # One MCAP message record of this channel, header included.
 RECORD = np.dtype(
     [

@@ -33,7 +33,10 @@ from world.geometry import path_length
 
 SCORE_COLUMNS = len(Violation) + len(Objective)
 # Columns of the objectives in a row of scores.
-LENGTH, KILL, DETECTION, HEIGHT = (len(Violation) + item for item in Objective)
+LENGTH = len(Violation) + Objective.LENGTH_RATIO
+KILL = len(Violation) + Objective.KILL_EXPOSURE
+DETECTION = len(Violation) + Objective.DETECTION_EXPOSURE
+HEIGHT = len(Violation) + Objective.HEIGHT_SUM
 CONSTRAINTS = Level(tuple(Violation), (0.0,) * len(Violation))
 # Order of the archive: feasible paths first, then the lowest kill exposure, then the shortest.
 ARCHIVE_LEVELS = (CONSTRAINTS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_GOAL,)))
