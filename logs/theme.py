@@ -26,7 +26,7 @@ _BROWN = "#7a1f1f"
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How a role is drawn.
+    """Style in which a role is drawn.
 
     light, dark: colour on light and on dark ground, "#rrggbb".
     width: of its lines, points; on a page 1.25 pixels stand for a point.

@@ -140,7 +140,7 @@ def is_place(lat: float, lon: float) -> bool:
 
 
 def is_camera(numbers: Sequence[float]) -> bool:
-    """Whether numbers are a camera's sensor, across the way and along it, its focal length, all mm, and maybe overlaps.
+    """Return True if numbers are a camera's sensor size across and along the track, its focal length (mm) and overlaps.
 
     The overlaps, with the next photo and with those of the next line, are percent.
 

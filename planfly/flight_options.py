@@ -30,7 +30,7 @@ MAX_MEGABYTES = 256.0
 
 
 class FlightOptions(TypedDict, total=False):
-    """How a mission is flown.  An option that is missing or None keeps what the scenario states.
+    """Options of a flight.  A missing option, or None, keeps the value of the scenario.
 
     terrain: an elevation file in place of the scenario's.
     wind: speed, m/s, and where it comes from, degrees.  turbulence: "none", "light" or "moderate".
@@ -55,7 +55,7 @@ class FlightOptions(TypedDict, total=False):
 
 
 class MissionOptions(FlightOptions, total=False):
-    """How a mission file or a plan is flown, and in which world.
+    """Options of the flight of a mission file or a plan, and of its world.
 
     scenario: a name or a TOML file; None for the plan's own scenario, or for one made around the mission.
     fence: files of fences and zones in addition to the mission's own.
@@ -68,7 +68,7 @@ class MissionOptions(FlightOptions, total=False):
 
 
 class PlanOptions(FlightOptions, total=False):
-    """How a path is searched for, and for which flight.
+    """Options of the search for a path, and of the flight that it is for.
 
     seed: of the search; None takes the scenario's, or 1.
     algorithm: a name of ``planfly plan --help``; None for the default.
@@ -84,7 +84,7 @@ class PlanOptions(FlightOptions, total=False):
 
 
 class LogOptions(MissionOptions, total=False):
-    """What another program's log does not say.
+    """Facts that a log of another program does not state.
 
     plan: the mission that was to be flown, in place of the log's own.  flight: which of the log's flights, from 1.
     datum: what the log's heights are above.
@@ -99,7 +99,7 @@ LOG_OPTIONS = ("plan", "flight", "datum")
 
 
 class SimulationOptions(TypedDict, total=False):
-    """Who flies a simulated flight, what is recorded of it, and when it is stopped.
+    """Autopilot of a simulated flight, its recording, and its limits.
 
     autopilot: the program of ArduPlane or PX4, which then flies.
     log_hz: rows a second in the log.
@@ -115,7 +115,7 @@ class SimulationOptions(TypedDict, total=False):
 
 
 class CampaignOptions(MissionOptions, total=False):
-    """What a campaign flies, and until when.
+    """Flights of a campaign, and when it ends.
 
     spread: a TOML file of what varies; None takes planfly's default.
     flights: how many.  prove: a probability to reach or miss.  at_least: one to answer after all flights.
@@ -130,7 +130,7 @@ class CampaignOptions(MissionOptions, total=False):
 
 
 class WindsOptions(MissionOptions, total=False):
-    """What a search for the largest winds flies, and until when.
+    """Flights of a search for the largest winds, and when it ends.
 
     spread: a TOML file of what varies.  flights: at most, of all directions.  confidence: of each interval.
     workers: processes on this machine; None for one a core.  scheduler: the address of a running dask scheduler.
@@ -241,7 +241,7 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
     """Return a scenario in the weather and flown as the options state; its terrain stays.
 
     program: the autopilot's program that flies.
-    Where nobody names an autopilot, it is the one that the file of parameters was written for.
+    If no autopilot is named, it is the one that the file of parameters was written for.
     Raises ScenarioError for what a scenario file may not have either, and ParameterError for another autopilot's file.
 
     >>> changed = apply_options(load_scenario("tight"), {"wind": (8.0, 270.0), "airspeed": 28.0})

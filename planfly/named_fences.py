@@ -14,7 +14,7 @@ from world.scenario import Scenario, with_zones
 
 @dataclass(frozen=True, slots=True)
 class NamedFences:
-    """What the files hold.
+    """Content of the files.
 
     items: of fences, which join the mission's own.
     zones: of files of zones, by the file that each comes from; they join the scenario's.

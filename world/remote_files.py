@@ -113,7 +113,7 @@ class RemoteFile:
                 raise _Unfinished(f"{at - begin:,} of {end - begin:,} bytes came")
 
     def forget(self) -> None:
-        """Begin anew, with a copy that holds nothing.  Raises OSError."""
+        """Begin again with an empty copy.  Raises OSError."""
         _notes(self.copy).unlink(missing_ok=True)
         self.held = {}
         # A file of its own, so that another process that reads the old one keeps that.
@@ -178,7 +178,7 @@ def _opener() -> urllib.request.OpenerDirector:
 
 
 def is_address(text: str) -> bool:
-    """Whether a text is the address of a folder on a web server: http or https, and what it holds can be asked for.
+    """Return True if a text is the http or https address of a folder on a web server.
 
     >>> is_address("HTTPS://example.com:8443/tiles"), is_address("http://[::1/"), is_address("http://a/?b")
     (True, False, False)

@@ -50,7 +50,7 @@ class Box(NamedTuple):
 
 
 class CutTerrain(NamedTuple):
-    """What was written.
+    """Summary of the written file.
 
     file: the GeoTIFF.  shape: its rows and columns.  tiles: names of those it is from.
     absent: degrees (south-west corners) of which the server has no tile.

@@ -117,7 +117,7 @@ class Estimate:
 
 
 def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics: bool = True) -> Estimate:
-    """Return estimate all parameters from stretches of flight.
+    """Estimate all parameters from stretches of flight.
 
     dynamics: True to include the moments; otherwise only lift, drag and thrust, for logs too slow for the rest.
     """
@@ -219,7 +219,7 @@ def _log_unexplained(fit: Fit, lag: float) -> float:
 def fit_all(
     signals: Signals, base: BaseModel, lift: Floats | None = None, level: float = 0.0, *, dynamics: bool = True
 ) -> Estimate:
-    """Return estimate all parameters from aligned signals, with all else held fixed, without shifts.
+    """Estimate all parameters from aligned signals, with all else held fixed, without shifts.
 
     lift: (2,) values of slope and offset of the lift curve to hold fixed too.
     level: error of the autopilot's level, rad.

@@ -57,7 +57,7 @@ _SOURCE_NAMES: dict[Origin, str] = {"file": "the file", "aircraft": "the aircraf
 
 
 def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
-    """Return name the values of a file that contradict the order of two parameters.
+    """Name the values of a file that contradict the order of two parameters.
 
     orders: names of parameters whose values must not fall from one to the next.
 

@@ -128,7 +128,7 @@ def modes_at(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_AMSL) -> tu
 
 
 def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
-    """Return name the modes of A (8, 8), states as in `flight.dynamics.trim.linearise`, by their eigenvectors.
+    """Name the modes of A (8, 8), states as in `flight.dynamics.trim.linearise`, by their eigenvectors.
 
     Longitudinal, from fast to slow: short period, phugoid. Lateral: an oscillation is the Dutch roll, and a second,
     slower one is the roll-spiral; of the real roots the faster is roll, the slower spiral.

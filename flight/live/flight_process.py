@@ -358,7 +358,7 @@ class _LoggedFlight:
         self._loiter_logs = 0
 
     def run_in_real_time(self) -> tuple[str, bool]:
-        """Return step the flight by the clock; return how it ended, and True if the process continues."""
+        """Step the flight by the clock; return how it ended, and True if the process continues."""
         clock, speed = time.monotonic, self._factory.speed
         started = begun = clock()
         ticks, flushed, beat = 0, started, 0

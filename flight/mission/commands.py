@@ -358,4 +358,4 @@ def support_of(command: int) -> Support:
     (<Treatment.FLOWN: 'flown'>, <Treatment.REFUSED: 'refused'>, <Treatment.REFUSED: 'refused'>)
     """
     # A number that is not a member is not found.
-    return SUPPORT.get(command, _UNKNOWN)  # type: ignore[call-overload, no-any-return]
+    return SUPPORT.get(command, _UNKNOWN)  # type: ignore[call-overload]

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from flight.mission.items import Mission
-from flight.simulation.setup import Gap, HeightOffset, MissionStretch, Quantity, RowFaults
+from flight.simulation.setup import Gap, HeightOffset, Heights, MissionStretch, Quantity, RowFaults
 from flight.simulation.track import THROTTLE, Track
 from logs.importers.clean_places import DEGREE, Places, clean_places, find_gaps, metres_between
 from logs.importers.raw_log import COLUMNS, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
-from world.arrays import Floats, Heights
+from world.arrays import Floats
 from world.errors import LogError
 from world.frames import GeoOrigin, to_map
 

@@ -94,7 +94,7 @@ class _Dataflash:
         )
 
     def _messages(self, name: str) -> Messages:
-        """Return of the first instance where there are several."""
+        """Return the series of the first instance if there are several."""
         found = self._index.messages(name)
         for column in _INSTANCES:
             if name in ("IMU", "XKF1", "XKF2", "NKF1", "NKF2", "ARSP", "BAT") and found.has(column):

@@ -428,7 +428,7 @@ def _order(
 
 @compiled
 def _fill(entries: Entries, rows: Bytes, blob: Bytes, front: Bytes) -> Bytes:
-    """Return copy the messages one after the other, behind ``front``."""
+    """Copy the messages one after the other, behind ``front``."""
     total = len(front)
     for k in range(len(entries)):
         total += entries[k].length

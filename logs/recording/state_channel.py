@@ -265,7 +265,7 @@ def parse_row(data: bytes, parser: "type[Message]") -> StateRecords:
 
 @compiled
 def _count_matching(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> int:
-    """Return count the first records, rows of bytes, that have the expected bytes in these columns."""
+    """Count the first records, rows of bytes, that have the expected bytes in these columns."""
     for row in range(len(raw)):
         for k in range(len(columns)):
             if raw[row, columns[k]] != expected[k]:

@@ -17,12 +17,12 @@ def _with_place(noun: str, item: Finding, text: str) -> str:
 
 
 def name_reason(noun: str, item: Finding) -> str:
-    """Return name the place and the reason in brief."""
+    """Name the place and the reason in brief."""
     return _with_place(noun, item, shortened(item.brief))
 
 
 def name_event(noun: str, item: Finding) -> str:
-    """Return name the reason in brief, of an event that ends the flight wherever it is."""
+    """Name the reason in brief, of an event that ends the flight wherever it is."""
     return f"{noun} ({shortened(item.brief)})"
 
 
@@ -53,7 +53,7 @@ def name_circle(noun: str, item: Finding) -> str:
 
 
 def name_zone(noun: str, item: Finding) -> str:
-    """Return name a violated zone and the depth of the violation."""
+    """Name a violated zone and the depth of the violation."""
     if not item.place.name:
         return name_excess(noun, item)
     depth = max(item.flown or 0.0, item.planned or 0.0)
@@ -61,7 +61,7 @@ def name_zone(noun: str, item: Finding) -> str:
 
 
 def name_missile(_noun: str, item: Finding) -> str:
-    """Return name the missile and the time inside its sphere; a missile without a name is "threat 3 (missile)"."""
+    """Name the missile and the time inside its sphere; a missile without a name is "threat 3 (missile)"."""
     where = place_text(item.place)
     named = f"threat {where}" if item.place.name else where
     return f"{named} ({max(item.flown or 0.0, item.planned or 0.0):.1f} s inside)"
@@ -73,7 +73,7 @@ def name_photo_line(noun: str, item: Finding) -> str:
 
 
 def name_missed_waypoint(_noun: str, item: Finding) -> str:
-    """Return name a missed waypoint and the distance at which it was passed."""
+    """Name a missed waypoint and the distance at which it was passed."""
     if item.flown is not None and item.brief != item.reason:
         return f"{place_text(item.place)} {item.brief}"
     over = item.flown is not None and item.limit is not None and item.flown > item.limit

@@ -121,7 +121,7 @@ def _levels(
 def _differing(
     level: str, outcomes: Mapping[tuple[str, Place], bool | None], flown: tuple[Finding, ...]
 ) -> tuple[Disagreement, ...]:
-    """Where a level and the flight judge differently, in the level's order."""
+    """Return the disagreements between a level and the flight, in the order of the level."""
     judged = {(item.rule, item.place): item.ok for item in flown}
     out = []
     for (rule, place), there in outcomes.items():

@@ -32,7 +32,7 @@ from planner.plan import Plan, Violation
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """Return findings of the mission's items alone, whoever flies them."""
+    """Return findings of the mission's items alone, for any autopilot."""
     return [item for rule in RULES.values() if rule.judge_items is not None for item in rule.judge_items(setup)]
 
 

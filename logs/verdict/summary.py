@@ -124,7 +124,7 @@ def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
 
 
 def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
-    """Return name each threat that the aircraft missed by less than its navigation error."""
+    """Name each threat that the aircraft missed by less than its navigation error."""
     out = []
     for item in findings:
         facts = {fact.what: fact.value for fact in item.facts if item.rule == "threat" and item.ok}
@@ -250,7 +250,7 @@ def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
 
 
 def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
-    """Return name the settings of the scenario's returns for which the autopilot has no parameter."""
+    """Name the settings of the scenario's returns for which the autopilot has no parameter."""
     returns, parameters = setup.scenario.returns, setup.autopilot.parameters
     if returns is None or returns.rtl_autoland is None or parameters is None or hasattr(parameters, "rtl_autoland"):
         return []

@@ -49,7 +49,7 @@ class Failures:
         return place_text(self.places.get((kind, number), Place(kind, number)))
 
     def threat_names(self) -> dict[int, str]:
-        """What the verdict calls each failing threat, by its index; one whose missile fails is called by that."""
+        """Return the verdict's name of each failing threat, by its index; a failing missile names its threat."""
         radars_first = sorted(self.threats, key=lambda place: place.kind == "missile")
         return {place.index or 0: place_text(place) for place in radars_first}
 
@@ -142,7 +142,7 @@ def track_distance(waypoints: Floats, track: Track) -> Floats:
 
 
 def fail_labels(failed: Failures, corners: Floats, threats_at: Mapping[int, tuple[float, float]]) -> tuple[Label, ...]:
-    """Return name the failing rules at the first failing legs, threats and waypoints, as in the verdict.
+    """Name the failing rules at the first failing legs, threats and waypoints, as in the verdict.
 
     corners: (w, 2) drawn positions of the route's waypoints.  threats_at: of threats by their index; others get none.
     """

@@ -23,7 +23,7 @@ from world.scenario_tables import names_folder
 
 @dataclass(frozen=True, slots=True)
 class AircraftNumbers:
-    """What `planfly.describe_aircraft` returns.
+    """Result of `planfly.describe_aircraft`.
 
     aircraft: its metadata.  model_sha256: of its JSBSim model.
     envelope: climb and descent by airspeed and height.

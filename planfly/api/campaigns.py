@@ -1,4 +1,4 @@
-"""How likely a mission is to fly, and the largest wind from each direction: many flights, each somewhat different."""
+"""Probability that a mission flies, and the largest wind from each direction, from many flights that differ."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -42,7 +42,7 @@ from world.extras import need_extra, needs_extra
 
 @dataclass(frozen=True, slots=True)
 class CampaignFlight:
-    """What `planfly.campaign_flight` returns: a flight of a campaign, flown again as the table has it.
+    """Result of `planfly.campaign_flight`: a flight of a campaign, flown again as in its table.
 
     row: outcome, how it ended, and the rules that it failed.  log: the file that it is recorded in.
     """

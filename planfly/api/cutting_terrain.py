@@ -110,7 +110,7 @@ def _widened(box: Box, margin: float) -> Box:
 
 
 def _cache(instead: Path) -> Path:
-    """Where fetched parts are kept; in a temporary folder where the user's cache cannot be written."""
+    """Yield the cache of fetched parts; a temporary folder if the user's cache cannot be written."""
     folder = Path(user_cache_dir("planfly")) / "terrain"
     try:
         folder.mkdir(parents=True, exist_ok=True)

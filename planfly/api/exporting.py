@@ -52,7 +52,7 @@ _CONTENTS = {"fence": "fence items", "rally": "rally points"}
 
 @dataclass(frozen=True, slots=True)
 class ExportedFiles:
-    """What `planfly.export` wrote.
+    """Files that `planfly.export` wrote.
 
     files: in the order asked for.  contents: what each holds, in words.
     notes: what of the source they do not hold, and what PX4 would refuse of a plan for it, a line each.
@@ -67,7 +67,7 @@ class ExportedFiles:
 
 @dataclass(frozen=True, slots=True)
 class _Source:
-    """What an input holds.
+    """Content of an input.
 
     mission: its items, and a plan's threats as fences.
     name: a map's title.

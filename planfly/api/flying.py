@@ -49,7 +49,7 @@ from world.scenario import Scenario, over_terrain
 
 @dataclass(frozen=True, slots=True, repr=False)
 class FlownMission:
-    """What `planfly.fly` returns.
+    """Result of `planfly.fly`.
 
     setup: everything that decided the flight.
     track: its rows; none of a flight that could not begin.
@@ -100,7 +100,7 @@ class FlownMission:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """What `planfly.judge` returns.
+    """Result of `planfly.judge`.
 
     setup: everything that decides the flight.
     verdict: whether it flies, with a finding for every rule and place.

@@ -57,7 +57,7 @@ class SlowLog:
 
 @dataclass(frozen=True, slots=True)
 class IdentifiedAircraft:
-    """What `planfly.identify_aircraft` returns.
+    """Result of `planfly.identify_aircraft`.
 
     aircraft: as its folder has it.
     estimate: of each parameter, with covariance.

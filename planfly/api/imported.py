@@ -27,7 +27,7 @@ _ROWS_AT_ONCE = 4096
 
 @dataclass(frozen=True, slots=True)
 class Reflown:
-    """What `planfly.refly` returns.
+    """Result of `planfly.refly`.
 
     flights: the longest stretch of the mission first, each beside its simulation.
     lines: where model and flight differ, in words.
@@ -186,7 +186,7 @@ def recover(log: str | Path, out: str | Path | None = None, *, overwrite: bool =
 
 
 def recovered_path(log: str | Path) -> Path:
-    """Where a recovered log goes that nobody named a file for.
+    """Return the default file of a recovered log.
 
     >>> recovered_path("runs/flight.mcap").name
     'flight-recovered.mcap'

@@ -157,7 +157,7 @@ def optimise(
     model: "umda", the paper's univariate Gaussians; "emna", one Gaussian of full covariance; "multistart", Gaussians of
     full covariance from starts of many widths, for a cost with walls, gaps or several valleys; "differential",
     differential evolution beside them.
-    population: even number of points, 4 at least; half of them are drawn anew in each generation.  Of "multistart" the
+    population: even number of points, 4 at least; half of them are drawn again in each generation.  Of "multistart" the
     largest generation.
     seed: a whole number, or a generator of random numbers.
     initial: (population, d) first points; None for uniform.

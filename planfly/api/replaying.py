@@ -172,7 +172,7 @@ def play_to_foxglove(
     allow_origin: web pages that may connect beside Foxglove's own, each as "https://HOST"; several are a sequence, or
     separated by commas.
     stop: asked all the time; once it is true the call returns.  on_message: called with the address.
-    Raises a `planfly.PlanflyError` for bad input, and where nobody subscribes in time.
+    Raises a `planfly.PlanflyError` for bad input, and if no client subscribes in time.
     """
     # Nobody else needs foxglove-sdk.
     from planfly.replays import foxglove_server

@@ -30,7 +30,7 @@ Source = FlightLog | FlownMission | Plan | str | Path
 
 @dataclass(frozen=True, slots=True)
 class WrittenReport:
-    """What `planfly.report` wrote.
+    """Files that `planfly.report` wrote.
 
     page: the HTML page, which needs no other file.  files: it and the pictures beside it.
     verdict: of the flight or plan that it shows.
@@ -46,7 +46,7 @@ class WrittenReport:
 
 
 class _Shown(NamedTuple):
-    """What pictures and pages are made of; the versions are those of the packages that flew it, none for today's."""
+    """Content of pictures and pages; versions of the packages that flew it, None for the present packages."""
 
     setup: FlightSetup
     verdict: Verdict

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Suggested:
-    """What would help, and the returns that it leads to, by the law, the least sure in JSBSim."""
+    """A remedy, and the returns with it: by the control law, the least certain ones in JSBSim."""
 
     remedy: Remedy
     returns: Returns
@@ -61,7 +61,7 @@ class Suggested:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class ReturnsFound:
-    """What `planfly.returns` returns.
+    """Result of `planfly.returns`.
 
     setup: what was flown, and by what.
     returns: each of them, and in ranges of seconds, the worst first.
@@ -95,7 +95,7 @@ class ReturnsFound:
 
     @property
     def lines_of_causes(self) -> tuple[str, ...]:
-        """What makes it return, what does not, and how a return ends."""
+        """Triggers of a return, settings that trigger none, and the end of a return."""
         return (*causes_text(self.returns.causes), *landing_text(self.returns))
 
     @property
@@ -105,7 +105,7 @@ class ReturnsFound:
 
     @property
     def lines_of_program(self) -> tuple[str, ...]:
-        """What ArduPlane itself made of the worst, and what the law did; none where it flew none."""
+        """Outcomes of the worst returns by the ArduPlane program and by the control law; empty if it flew none."""
         if self.by_program is None:
             return ()
         return (self.by_program.headline(), *self.by_program.lines(self.returns, self.setup.scenario))
@@ -117,7 +117,7 @@ class ReturnsFound:
 
     @property
     def headline_of_glides(self) -> str:
-        """What can be reached without the engine, in a line."""
+        """Reach of the aircraft without its engine, in a line."""
         return glides_headline(self.glides)
 
     @property
@@ -127,12 +127,12 @@ class ReturnsFound:
 
     @property
     def lines_of_suggestions(self) -> tuple[str, ...]:
-        """What would help, in words, each with what its returns come to."""
+        """Remedies in words, each with the outcome of its returns."""
         return tuple(remedy_text(one.remedy, one.returns, self.setup.scenario) for one in self.suggested)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a person has to know of how they were flown."""
+        """Notes on how the returns were flown."""
         found = ["on a point mass by ArduPlane's law, in the mean wind"]
         if self.returns.again:
             most = max(abs(one) for one in self.returns.again)
@@ -222,7 +222,7 @@ def _over(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
 
 
 class _Asked(NamedTuple):
-    """What is asked of returns: how many, what would help, which of them a program flies, and pictures in a folder."""
+    """Request for returns: their number, remedies, returns flown by a program, and a folder for pictures."""
 
     every: float
     suggest: bool

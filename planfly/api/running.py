@@ -59,7 +59,7 @@ class Round:
 
 @dataclass(frozen=True, slots=True)
 class RunResult:
-    """What `planfly.run` returns.
+    """Result of `planfly.run`.
 
     scenario: its name.  seed: of planner and turbulence.
     folder: where the files are; those of earlier rounds in round-0, round-1, ...
@@ -87,7 +87,7 @@ class RunResult:
 
 @dataclass(frozen=True, slots=True)
 class _Task:
-    """What every round has in common.
+    """Settings that every round has in common.
 
     scenario: what each round is judged in.
     airframe: its aircraft.

@@ -48,7 +48,7 @@ from world.scenario import Scenario
 
 @dataclass(frozen=True, slots=True, repr=False)
 class SurveyFound:
-    """What `planfly.survey` returns.
+    """Result of `planfly.survey`.
 
     setup, track, verdict: of the flight.
     surveys: of the mission, in flying order.
@@ -92,7 +92,7 @@ class SurveyFound:
 
     @property
     def lines_of_remedies(self) -> tuple[str, ...]:
-        """What would help, in words."""
+        """Remedies, in words."""
         return tuple(remedy_text(one, self.setup.path.length) for one in self.remedies)
 
     @property

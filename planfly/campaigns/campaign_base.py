@@ -1,4 +1,4 @@
-"""What all flights of a campaign share (mission, world, aircraft, dispersions), and how one is varied by its draw."""
+"""Mission, world, aircraft and dispersions that all flights of a campaign share, and the variation by a draw."""
 
 import hashlib
 import json
@@ -227,7 +227,7 @@ def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> Varie
     """Return the flight of a draw; wind: about which it varies, None for the scenario's.
 
     Scenario and limits are in the flight's wind, as `planfly fly --wind` has them; mass, drag, control power, the
-    drawn aircraft and the start's place are known to nobody who steers.
+    drawn aircraft and the start's place are unknown to the autopilot.
     """
     values = draw.values
     scenario = _in_wind(base.scenario, values, wind)

@@ -1,4 +1,4 @@
-"""What a campaign gives: its result, its goal, and the command line that repeats it."""
+"""Result of a campaign, its goal, and the command line that repeats it."""
 
 import shlex
 from collections.abc import Mapping
@@ -70,7 +70,7 @@ MAX_FLIGHTS = 5000
 
 @dataclass(frozen=True, repr=False)
 class CampaignResult:
-    """What `planfly.campaign` returns.
+    """Result of `planfly.campaign`.
 
     columns: the table of flights, (n,) each.
     table: its file; None where none was kept.

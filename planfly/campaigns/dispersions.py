@@ -118,7 +118,7 @@ class Varying:
 
     @property
     def share_inside(self) -> float:
-        """How much of the distribution lies within the quantity's range, 0 to 1; NaN for parameters that it has not."""
+        """Return the share of the distribution within the quantity's range, 0 to 1; NaN for parameters out of range."""
         low, high = self._inside
         return high - low
 
@@ -308,7 +308,7 @@ _MIDDLES = 4096
 
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """What flight `index` of a campaign has of its own.
+    """Return the draw of flight `index` of a campaign.
 
     seed: of what changes within the flight: turbulence, and the error of navigation.
     values: by quantity, all of them; those that do not vary have their nominal value.
@@ -371,7 +371,7 @@ def standard_population(dispersions: Dispersions, count: int) -> Floats:
 
 
 def _drawn(seed: int, index: int) -> tuple[Floats, int]:
-    """Return of each of `QUANTITIES` the share of its distribution, and the seed of what changes within the flight."""
+    """Return the share of its distribution for each of `QUANTITIES`, and the seed of changes within the flight."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
     return random.random(len(QUANTITIES)), int(random.integers(2**63))
 

@@ -38,7 +38,7 @@ Advance = Callable[[float, float, str], None]
 
 @dataclass(frozen=True)
 class WindsGoal:
-    """What is asked: the probability, the directions, how far to look (m/s), the most flights of all directions."""
+    """Request: probability, directions, largest wind to try (m/s), and the most flights of all directions."""
 
     target: float
     confidence: float
@@ -75,7 +75,7 @@ class WindsFound:
     conditions: Conditions | None = None
 
     def from_deg(self, direction: int) -> float:
-        """Where the wind of a direction comes from, degrees."""
+        """Directions that the winds come from, degrees."""
         return 360.0 * direction / self.goal.directions
 
     def __repr__(self) -> str:
@@ -128,7 +128,7 @@ def find_winds(
 
 
 class _Search:
-    """What has been asked for, round after round, and what came of it."""
+    """Flights requested in each round, and their results."""
 
     def __init__(self, goal: WindsGoal, base: CampaignBase) -> None:
         self.goal, self._base = goal, base
@@ -242,14 +242,14 @@ class _Pace:
         self._search, self._advance, self._rate = search, advance, FlightRate(known)
 
     def begin(self, flights: int) -> None:
-        """How much there is to do, at least, before the first flight."""
+        """Describe the least amount of work before the first flight."""
         if self._advance is not None:
             total = max(len(self._search.flown) + self._search.at_least(), flights + 1)
             remark = f"{flights} of {total} flights at least"
             self._advance(float(flights), float(total), remark)
 
     def tell(self, flights: int, last: bool = False) -> None:
-        """How far it is: directions settled, flights, flights a minute, and time left while flights are known to come.
+        """Describe the progress: directions settled, flights, flights a minute, and the time left if it is known.
 
         last: whether or not it is due.
         How many a direction takes beyond the fewest shows only when it has them: no time is given then.

@@ -141,12 +141,12 @@ class LeastMargin:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """How a table keeps a field of `FlightRow`.
+    """Storage of a field of `FlightRow` in a table.
 
     kind: SQLite's type and constraint.
     write, read: the field's value to the column's, and back.
     entry: of an array's bytes (a BLOB, float32), the shape of each of its entries; () for numbers.
-    same: whether the same flight has the same value whoever flew it, and however long that took.
+    same: whether the same flight has the same value wherever and however fast it was flown.
     """
 
     kind: str
@@ -267,7 +267,7 @@ def failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
 
 
 def least_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, LeastMargin], ...]:
-    """Return of each rule that was judged the finding with the least margin, in the verdict's order.
+    """Return the finding with the least margin of each judged rule, in the order of the verdict.
 
     >>> from logs.verdict.findings import make_finding
     >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))

@@ -16,7 +16,7 @@ Advance = Callable[[float, float, str], None]
 
 @dataclass
 class _Book:
-    """Which flights are known, and what the first of them without a gap come to.
+    """Known flights, and the result of the first of them without a gap.
 
     beyond: outcome of the known ones after the first gap.
     """
@@ -139,7 +139,7 @@ class _Pace:
         return max(self._estimator.fewest, tally.flown) if self._goal.stops else self._goal.flights
 
     def tell(self, tally: Tally, last: bool = False) -> None:
-        """How far it is: flights, P with its bounds, flights a minute, time left.  last: whether or not it is due."""
+        """Show the progress: flights, P with its bounds, flights a minute, time left.  last: True shows it at once."""
         if self._advance is None or not tally.flown or not (self._rate.due() or last):
             return
         found = self._estimator.estimate(tally)

@@ -431,7 +431,7 @@ def wind_lines(found: WindsFound) -> list[str]:
 def finish_campaign(
     base: CampaignBase, goal: Goal, estimate: Estimate, folder: Path, command: str, advance: Advance | None = None
 ) -> CampaignSummary:
-    """Return sum a campaign up from the table in its folder, which nobody holds, and write its files.
+    """Sum up a campaign from the table in its folder, which no process holds, and write its files.
 
     command: the line that repeats it, for the report.
     Raises a `world.errors.PlanflyError`, or OSError for a full disk.

@@ -1,4 +1,4 @@
-"""What a campaign came to, as data: its probability, what failed where, what decides it, and its worst flights."""
+"""Summary of a campaign as data: probability, failures by place, deciding quantities, and worst flights."""
 
 import json
 import math
@@ -36,7 +36,7 @@ class RuleFailures:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How much of the variance of a rule's least margin a quantity explains, and which way it goes.
+    """Share of the variance of a rule's least margin that a quantity explains, and the sign of its effect.
 
     index: first-order, 0 to 1.  slope: rank correlation, negative where more of the quantity leaves less margin.
     """
@@ -128,7 +128,7 @@ def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str
 
 
 def _sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensitivity, ...]:
-    """Return of the rule's least margin to each quantity that varies, the strongest first."""
+    """Return the sensitivity of the rule's least margin to each quantity that varies, the strongest first."""
     if not rule:
         return ()
     margin = store.column(RULE_WORDS[rule].margin_column)

@@ -1,4 +1,4 @@
-"""What a damaged table of flights still holds: each row is known by its checksum, and those that are whole are kept."""
+"""Recover the whole rows of a damaged table of flights, each known by its checksum."""
 
 import contextlib
 import hashlib

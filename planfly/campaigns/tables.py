@@ -83,7 +83,7 @@ def row_of(index: int, known: Mapping[str, Any]) -> FlightRow:
 
 
 def same_flight(one: FlightRow, other: FlightRow) -> bool:
-    """Whether two rows tell of the same flight, whoever flew it, in whichever table, and however long that took."""
+    """Return True if two rows hold the same flight, apart from where and how fast it was flown."""
     mine, theirs = (row_values(replace(row, made_of="")) for row in (one, other))
     same = all(mine[name] == theirs[name] for name in ROW_COLUMNS if name not in RUN_DEPENDENT_COLUMNS)
     return same and one.draw.index == other.draw.index
@@ -102,7 +102,7 @@ class StoreError(PlanflyError):
 
 @dataclass(frozen=True)
 class TableKind:
-    """What a file of this kind holds.
+    """Content of a file of this kind.
 
     name: of the schema.
     columns: of the table of flights, name and kind of each; the first is the key, a flight's number.  A checksum of
@@ -211,7 +211,7 @@ class LockedTable:
                 )
 
     def _mend(self, known: dict[str, str]) -> None:
-        """Keep the flights that are whole, and say which are not; the file is made anew then."""
+        """Keep the flights that are whole, report the others, and write the file again."""
         # A search may have been asked for fewer flights than are there: those beyond are kept, too.
         asked = json.loads(known["settings"]).get("flights", _MAX_FLIGHTS)
         examined = examine(self._connection, tuple(self._kind.columns), asked, max(asked, self._last() + 1))
@@ -311,14 +311,14 @@ def _kept(connection: sqlite3.Connection) -> dict[str, str]:
 
 
 def _refuse_damaged(known: Mapping[str, str], path: Path) -> None:
-    """Refuse a file that says of itself what nobody has written.  Raises StoreError."""
+    """Refuse a file with settings that planfly did not write.  Raises StoreError."""
     if known.get("checksum") != checksum(known.get(name) for name in ("schema", "made_of", "settings")):
         words = "its settings are damaged, or another version's: it cannot be resumed, and --overwrite begins anew"
         raise StoreError(f"{path}: {words}", file=path, field="settings")
 
 
 def refuse_held(path: Path) -> None:
-    """Refuse a table that another process holds; a file that is none is nobody's.  Raises StoreError."""
+    """Refuse a table that another process holds; no process holds a missing file.  Raises StoreError."""
     if not path.is_file():
         return
     connection = sqlite3.connect(path, timeout=1.0, isolation_level=None)
@@ -471,7 +471,7 @@ class AskedFlight:
 
 @dataclass(frozen=True, slots=True)
 class FlownFlight:
-    """What came of a flight: its outcome, rule and place of each finding that failed, and its narrow passes."""
+    """Outcome of a flight, rule and place of each failed finding, and its narrow passes."""
 
     outcome: Outcome
     failed: tuple[tuple[str, Place], ...]
@@ -550,7 +550,7 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def count_flights(path: Path) -> int:
-    """How many flights a table of either kind has.  Raises StoreError for a file that is none of ours or is held."""
+    """Return the number of flights in a table of either kind.  Raises StoreError for a foreign or a locked file."""
     with _opened(path) as connection:
         return int(connection.execute("SELECT COUNT(*) FROM flights").fetchone()[0])
 

@@ -26,7 +26,7 @@ class SchedulerError(PlanflyError):
 
 @dataclass(frozen=True)
 class Workers:
-    """Where a campaign is flown.
+    """Place where a campaign is flown.
 
     count: processes on this machine; None for as many as it has cores.
     scheduler: address of a running dask scheduler; None for processes of this machine.

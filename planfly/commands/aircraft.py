@@ -203,7 +203,7 @@ def _identify(args: argparse.Namespace) -> int:
 
 
 def _print_unknown(found: "planfly.IdentifiedAircraft") -> None:
-    """What the logs do not tell, and what would."""
+    """Print what the logs leave unknown, and the flight that would show it."""
     if not found.estimate.dynamics:
         print("  performance only: under 10 rows of inertial sensors or outputs a second tell nothing of the moments")
     for log in found.slow:
@@ -217,7 +217,7 @@ def _print_unknown(found: "planfly.IdentifiedAircraft") -> None:
 
 
 def _print_sheet(made: "Aircraft") -> None:
-    """What the model of a data sheet can do, and how sure that is."""
+    """Print the performance of a data sheet's model, and its uncertainty."""
     from aircraft.uncertainty import read_uncertainty
     from flight.dynamics.envelope_tables import load_envelope
 

@@ -149,7 +149,7 @@ def winds(args: argparse.Namespace) -> int:
 
 
 def _folder(args: argparse.Namespace, kind: str) -> Path:
-    """Where the files go: as named, or ``runs/<name>-<kind>``."""
+    """Return the folder of the files: as named, or ``runs/<name>-<kind>``."""
     return Path(args.out) if args.out else RESULTS / f"{Path(args.target).stem}-{kind}"
 
 

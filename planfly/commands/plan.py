@@ -1,4 +1,4 @@
-"""``planfly plan``: a path alone, within a budget or until Ctrl-C, anew or again in flight."""
+"""``planfly plan``: a path alone, within a budget or until Ctrl-C, from the start or in flight."""
 
 import argparse
 import signal

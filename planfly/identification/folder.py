@@ -73,7 +73,7 @@ class Identified:
     cruise: float
 
     def performance(self) -> tuple[Performance, Performance]:
-        """Return of the estimate (1,), and of all draws (512,)."""
+        """Return the values of the estimate (1,), and of all draws (512,)."""
         return (
             performance(self.numbers, self.estimate.values, self.cruise, DENSITY),
             performance(self.numbers, self.draws, self.cruise, DENSITY),

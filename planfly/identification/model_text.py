@@ -1,7 +1,7 @@
 """The identified aircraft's JSBSim model: the base's text with what was estimated as properties ``ident/NAME``.
 
 The base's own coefficients stay.  Beside each function of forces and moments stands another, of what the estimate adds
-to them; motor and propeller are written anew, in the form that the base has them in.  The properties' defaults are the
+to them; motor and propeller are written again, in the form that the base has them in.  The properties' defaults are the
 estimate: a draw of the aircraft is another set of them.
 """
 

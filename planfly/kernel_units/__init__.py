@@ -1,1 +1,1 @@
-"""What a command's kernels are compiled by beforehand: small work in units, so that two processes can share them."""
+"""Small units of work that compile a command's kernels beforehand, shared by two processes."""

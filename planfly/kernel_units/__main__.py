@@ -1,7 +1,7 @@
 """``python -m planfly.kernel_units``: do the units named on standard input, and report which kernels are compiled.
 
 Lines out: ``ready KERNEL`` for each kernel of a unit that is compiled or loaded, then ``done UNIT`` or ``failed UNIT``.
-The process ends at once when its standard input does, since nobody waits for it any more.
+The process ends at once when its standard input does, since no process waits for it any more.
 """
 
 import functools

@@ -1,4 +1,4 @@
-"""How a process of planfly's own is set up: what collects garbage, threads of linear algebra, stack, address space."""
+"""Set up planfly's own processes: garbage collection, threads of linear algebra, stack, address space."""
 
 import gc
 import os
@@ -37,7 +37,7 @@ def prepare_child() -> None:
 
 
 def watch_address_space() -> None:
-    """Where this process's address space is limited, import only modules that fit."""
+    """Import only modules that fit if the address space of this process is limited."""
     limit = limit_of_address_space()
     if limit is None:
         return

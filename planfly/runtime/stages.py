@@ -16,7 +16,7 @@ Advance = Callable[[float, float, str], None]
 
 
 class Receiver(NamedTuple):
-    """Where progress goes.
+    """Receiver of progress.
 
     stage: begins a stage by its title and its kind, and gives what takes how far it is.
     say: takes a line that stands for itself.
@@ -71,7 +71,7 @@ def say_replaced(*files: Path) -> None:
 
 
 def is_received() -> bool:
-    """Return True if stages are shown to anybody.
+    """Return True if stages are shown.
 
     >>> is_received()
     False

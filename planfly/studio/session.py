@@ -78,8 +78,8 @@ class Session:
         """Open another document; an undo before its first edit brings back the previous one."""
         named = document.path is not None and document.path.resolve() == self.named
         made = Session.of(document if named else replace(document, path=None), self.options)
-        self.left, self.undone = [*self.left, self._place()][-_MAX_LEFT_DOCUMENTS:], []
-        self._go_to((made.document, made.desk, made.history))
+        self.left, self.undone = [*self.left, self._state()][-_MAX_LEFT_DOCUMENTS:], []
+        self._restore_state((made.document, made.desk, made.history))
 
     def _state(self) -> _OpenedState:
         return self.document, self.desk, self.history

@@ -129,7 +129,7 @@ def _worst_margins(verdict: Verdict) -> dict[str, float]:
 
 
 def _count_usable(verdict: Verdict) -> tuple[int, int]:
-    """Return count the photo lines that a verdict finds usable, and all photo lines."""
+    """Count the photo lines that a verdict finds usable, and all photo lines."""
     lines = [item.ok for item in verdict.findings if item.rule == "survey" and not item.check]
     return sum(ok is True for ok in lines), len(lines)
 

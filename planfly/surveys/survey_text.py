@@ -20,7 +20,7 @@ def usable(measure: LineMeasure | None) -> bool:
 
 
 def lines_headline(measures: list[LineMeasure | None]) -> str:
-    """Return count the lines that can be used, and name the worst.
+    """Count the lines that can be used, and name the worst.
 
     >>> lines_headline([None, None])
     '0 of 2 photo lines can be used; line 1 is the worst: not flown'

@@ -1,1 +1,1 @@
-"""What a person at a terminal meets: the parser, progress, results, exit codes."""
+"""Terminal interface: parser, progress, results, exit codes."""

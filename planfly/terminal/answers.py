@@ -1,4 +1,4 @@
-"""What each command answers with ``--json``.  Paths are as the command names them; numbers carry their unit."""
+"""Answers of the commands with ``--json``.  Paths are as the command names them; numbers carry their unit."""
 
 import math
 from typing import Any, Literal
@@ -39,7 +39,7 @@ class ModeEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class AircraftDetail:
-    """What is worked out of one aircraft."""
+    """Facts computed for one aircraft."""
 
     model_sha256: str
     level_speed_min_mps: float
@@ -157,7 +157,7 @@ class FailedRule:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class SensitivityEntry:
-    """How much of the deciding margin's spread a quantity makes."""
+    """Share of the deciding margin's variance that a quantity explains."""
 
     quantity: str
     first_order: float | None

@@ -54,7 +54,7 @@ def _answer(verdict: Verdict) -> str:
 
 
 def _state(rule: RuleFindings | None) -> str:
-    """Return count the findings of a rule that failed, or that pass."""
+    """Count the findings of a rule that failed, or that pass."""
     if rule is None or not rule.judged:
         return "not judged" if rule else ""
     return f"{len(rule.failed)} of {rule.judged} failed" if rule.failed else f"{rule.judged} ok"

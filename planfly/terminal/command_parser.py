@@ -20,7 +20,7 @@ _STYLES: dict[Style, int] = {"good": 32, "bad": 31, "warning": 33, "hint": 36}
 
 
 def wants_colour(stream: TextIO) -> bool:
-    """Whether a stream's reader wants colour.  NO_COLOR counts before FORCE_COLOR, and both only where they hold text.
+    """Return True if a stream is shown in colour.  NO_COLOR precedes FORCE_COLOR; empty ones are ignored.
 
     >>> import io
     >>> wants_colour(io.StringIO())

@@ -1,4 +1,4 @@
-"""What an exit code means."""
+"""Exit codes and their meaning."""
 
 from typing import TYPE_CHECKING
 

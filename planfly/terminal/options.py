@@ -48,7 +48,7 @@ def call(function: Callable[..., Returned], args: argparse.Namespace, **more: An
 def result_options(
     parser: CommandParser, out: str = "", what: str = "DIR", *, json: bool = True, junit: bool = False
 ) -> None:
-    """Where results go, and how much is printed.
+    """Add the options for output files and for the amount of printed text.
 
     out: what --out names, "" for a command without it.  what: its placeholder.  junit: whether its answer is a verdict.
     """
@@ -247,7 +247,7 @@ def log_rate_option(group: OptionTaker) -> None:
 
 
 def imported_log_options(parser: CommandParser) -> None:
-    """What another program's log does not say."""
+    """Add the options for facts that a log of another program does not state."""
     group = parser.group("an autopilot's log")
     found = group.add_argument(
         "--plan", metavar="MISSION", help="the mission that was to be flown, in place of the log's own"
@@ -278,7 +278,7 @@ def scenario_argument(parser: CommandParser, **settings: object) -> None:
 
 
 def own_link_options(parser: CommandParser, *, bind: str) -> None:
-    """Where and with whom a vehicle speaks MAVLink."""
+    """Add the options for a vehicle's MAVLink connection."""
     group = parser.group("the link")
     group.add_argument("--bind", metavar="IP:PORT", default=bind, help=f"where the vehicle listens (default: {bind})")
     group.add_argument("--allow", metavar="IP,IP", help="stations beyond this machine that may talk to the vehicle")

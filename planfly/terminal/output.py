@@ -1,4 +1,4 @@
-"""What a command prints: standard output that outlives its reader, progress on standard error, and the answer."""
+"""Output of a command: standard output that survives a closed pipe, progress on standard error, and the answer."""
 
 import argparse
 import contextlib
@@ -110,7 +110,7 @@ def printable(text: str) -> str:
 
 @contextlib.contextmanager
 def tolerate_closed_output() -> Iterator[None]:
-    """Let standard output be closed by whoever reads it."""
+    """Let the reader of standard output close it."""
     tolerant = _TolerantStream(sys.stdout)
     with contextlib.redirect_stdout(tolerant):
         try:
@@ -127,7 +127,7 @@ _MAX_BYTES = 20_000
 
 
 class _LastTime(NamedTuple):
-    """What a stage of a kind took.
+    """Duration of a stage of a kind.
 
     each: s for each unit that it counts, 0 where it counts none.  whole: s of all of it.
     """
@@ -182,7 +182,7 @@ _begun = itertools.count()
 
 
 class _TimeLeft:
-    """How long a stage of work will still take: once it has reported twice, if it goes on as since its first report.
+    """Time left for a stage, extrapolated from its first report on; known from its second report on.
 
     Until then there is what such a stage took the last time.
     What comes before the first report is not the work: kernels may have been compiled.
@@ -204,7 +204,7 @@ class _TimeLeft:
         return f"{_duration(self._passed() * (total - done) / more)} left"
 
     def at_first(self, to_do: float) -> str:
-        """In words, before anything is measured.  to_do: units that are to be done, 0 where nobody knows."""
+        """In words, before anything is measured.  to_do: units that are to be done, 0 if unknown."""
         last = _last_times().get(self._kind)
         if last is not None and to_do > 0.0 and last.each > 0.0:
             return f"about {_duration(last.each * to_do)}, at the pace of the last time here"
@@ -251,7 +251,7 @@ def progress(title: str, kind: str = "") -> Iterator[Advance]:
 
     kind: see `planfly.runtime.stages.stage`.
     Beside the remark stands how long it will still take, where the remark does not say; at first, what such a stage
-    took the last time on this machine, or that there is no estimate.  A total of 0 is one that nobody knows.
+    took the last time on this machine, or that there is no estimate.  A total of 0 is unknown.
     """
     left = _TimeLeft(kind or title)
     shown = _Bar(title, left) if sys.stderr.isatty() else _Lines(title, left)

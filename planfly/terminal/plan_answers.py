@@ -1,4 +1,4 @@
-"""What ``planfly plan`` answers with ``--json``, and how it prints a front."""
+"""Answer of ``planfly plan`` with ``--json``, and the text of a front."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What commands print of results: verdicts and warnings."""
+"""Verdicts and warnings that commands print."""
 
 import sys
 from collections.abc import Iterable
@@ -20,7 +20,7 @@ def print_verdict(verdict: "Verdict", notes: Iterable[str]) -> None:
 
 
 def print_returns(line: str) -> None:
-    """How its returns to launch go, in a line; nothing for ""."""
+    """Print the line on returns to launch, unless it is empty."""
     if line:
         print(f"returns   {line} (more: planfly returns)")
 
@@ -32,7 +32,7 @@ def print_warnings(warnings: Iterable[str]) -> None:
 
 
 def warn_of_loss(log: "FlightLog") -> None:
-    """What is missing in a log that is not complete, on standard error."""
+    """Print what an incomplete log lacks, on standard error."""
     from planfly.flight_logs import loss_text
 
     print_warnings([loss_text(log)])

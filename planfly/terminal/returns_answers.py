@@ -1,4 +1,4 @@
-"""What ``planfly returns`` answers with ``--json``."""
+"""Answer of ``planfly returns`` with ``--json``."""
 
 import math
 from typing import Literal
@@ -17,7 +17,7 @@ from world.frames import to_geo
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class CauseEntry:
-    """What can take the aircraft off its mission."""
+    """A trigger that takes the aircraft off its mission."""
 
     name: str
     does: str
@@ -64,7 +64,7 @@ class RallyEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ReturnSuggestion:
-    """What would help."""
+    """A remedy."""
 
     parameters: dict[str, float]
     rally: list[RallyEntry] | None
@@ -77,7 +77,7 @@ class ReturnSuggestion:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class MeasuredReturn:
-    """What one return comes to."""
+    """Outcome of one return."""
 
     kind: str
     target: str
@@ -155,7 +155,7 @@ class GlideSiteEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class GlidesEntry:
-    """What can be reached without the engine."""
+    """Reach of the aircraft without its engine."""
 
     headline: str
     not_judged: str

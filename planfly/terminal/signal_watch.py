@@ -77,7 +77,7 @@ def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
 
 
 def _called_by_compiled_code(frame: FrameType | None) -> bool:
-    """Whether Python runs here for Numba: it compiles, reads a kernel from its cache, or makes a kernel's results.
+    """Return True if Numba runs here: it compiles, reads a kernel from its cache, or boxes a kernel's results.
 
     Compiled code goes on with a null pointer where an exception ends that, and the process dies.  A result that is a
     named tuple is made by a module named after its class.
@@ -119,7 +119,7 @@ def _watch(read: Callable[[int], bytes], heard: list[int], grace: float) -> None
 
 
 def _waited_for_processor() -> float:
-    """How long the main thread has waited for a processor in all, s; 0 where the system does not say (not Linux)."""
+    """Return the total time that the main thread has waited for a processor, s; 0 on systems other than Linux."""
     try:
         return int(Path("/proc/self/schedstat").read_text(encoding="ascii").split()[1]) * 1e-9
     except (OSError, IndexError, ValueError):

@@ -1,4 +1,4 @@
-"""What ``planfly survey`` answers with ``--json``."""
+"""Answer of ``planfly survey`` with ``--json``."""
 
 import math
 from typing import Literal
@@ -69,7 +69,7 @@ class OverlapEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class NearMissEntry:
-    """What was tried, came nearest, and does not pass."""
+    """The trial that came nearest to passing."""
 
     what: str
     usable: int

@@ -1,4 +1,4 @@
-"""What `planfly check` answers with ``--json``: `VerdictDocument`, or one for each of several autopilots."""
+"""Answer of `planfly check` with ``--json``: `VerdictDocument`, or one for each of several autopilots."""
 
 from typing import Literal
 

@@ -54,7 +54,7 @@ def _place_and_value(finding: Finding) -> str:
 
 
 def _state(rule: RuleFindings) -> str:
-    """Return count the findings of a rule that pass, and describe the finding closest to its limit."""
+    """Count the findings of a rule that pass, and describe the finding closest to its limit."""
     if not rule.judged:
         return f"{'warning' if rule.words.warns else 'not judged'}: {rule.findings[0].reason}"
     closest, margin = rule.closest, rule.words.margin

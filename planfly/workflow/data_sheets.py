@@ -351,7 +351,7 @@ def _make_files(made: SizedAircraft, name: str, place: Path, stated: Mapping[str
 
 
 def performance_of(fdm: Simulator, aircraft: Aircraft) -> Performance:
-    """Return trim the aircraft in all its flight conditions.  Raises FlightError if one of them does not exist."""
+    """Trim the aircraft in all its flight conditions.  Raises FlightError if one of them does not exist."""
     cruise = aircraft.airspeed
     level = straight(fdm, cruise, AMSL)
     if level is None:

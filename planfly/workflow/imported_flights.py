@@ -237,7 +237,7 @@ def _sha256(path: Path) -> str:
 
 
 def _edges(flight: LoggedFlight) -> tuple[str, ...]:
-    """What the log does not hold of the flight by its nature, in words: before it, after it, between its rows."""
+    """Describe the parts of the flight that the log lacks: before it, after it, between its rows."""
     notes = []
     if flight.begins:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")

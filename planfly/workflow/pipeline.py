@@ -39,7 +39,7 @@ _USUAL_LIMITS = FlightLimits()
 
 @dataclass(frozen=True, slots=True, repr=False)
 class PlanThenFly:
-    """What `plan_then_fly` returns.
+    """Result of `plan_then_fly`.
 
     plan: the path, with its certificate.
     mission: the plan as mission items.
@@ -67,7 +67,7 @@ class PlanThenFly:
 
 @dataclass(frozen=True, slots=True)
 class OffNominal:
-    """How the flight itself differs from what the plan and its guidance know.
+    """Differences between the flight and what the plan and its guidance know.
 
     variation: of the aircraft from its model.
     start_offset: east, north and up from the first waypoint to where the flight begins, m.
@@ -161,7 +161,7 @@ def fly_and_judge(
 
 @dataclass(frozen=True, slots=True)
 class _Task:
-    """What `fly_and_judge` is asked to do with a flight; the fields are its arguments."""
+    """Requests to `fly_and_judge` about a flight; the fields are its arguments."""
 
     airframe: Airframe
     log: Path | None
@@ -217,7 +217,7 @@ def _record_and_judge(task: _Task, requirements: RouteRequirements, flight: Airb
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
         beside = return_summary(flight.setup, judged.track) if task.returns else None
-        drawn = None if beside is None else beside.plainly_drawn()
+        drawn = None if beside is None else beside.draw_returns_without_glides()
         recorder.finish(judged.ended, judged.verdict, judged.reference, drawn)
     return replace(judged, returns=beside)
 

@@ -170,7 +170,7 @@ def _count_any(rows: Floats, width: int, begin: int, end: int, order: Ints, belo
 
 @inner
 def _at_most(values: Floats, limit: float) -> int:
-    """Return count the values not above the limit, without branches, so that the loop is vectorised."""
+    """Count the values not above the limit, without branches, so that the loop is vectorised."""
     count = 0
     for k in range(values.size):
         count += 1 if values[k] <= limit else 0
@@ -186,7 +186,7 @@ def _and_at_most(values: Floats, limit: float, marks: Ints) -> None:
 
 @inner
 def _count_marks(marks: Ints) -> int:
-    """Return count the marks that are 1; the others are 0."""
+    """Count the marks that are 1; the others are 0."""
     count = 0
     for k in range(marks.size):
         count += marks[k]

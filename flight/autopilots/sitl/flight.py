@@ -275,7 +275,7 @@ class SitlFlight(ProgramFlight):
             raise kind.from_error(error, "" if named else self._binary) from error
 
     def _make_rail(self, setup: FlightSetup) -> RailEnd:
-        """Return trim the aircraft at its release: before the first waypoint, straight and level, without ground.
+        """Trim the aircraft at its release: before the first waypoint, straight and level, without ground.
 
         For a take-off the rail is the launch's rail.
         """

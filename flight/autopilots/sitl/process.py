@@ -32,10 +32,10 @@ def check_binary(binary: Path, kind: str) -> str:
     Raise FlightError, in one line, for a file that cannot be run.  kind: expected autopilot.
 
     >>> try:
-    ...     check_binary(Path("nobody/arduplane"), "ArduPlane")
+    ...     check_binary(Path("missing/arduplane"), "ArduPlane")
     ... except FlightError as error:
     ...     print(error)
-    nobody/arduplane: no such file; the program of ArduPlane for software in the loop is expected
+    missing/arduplane: no such file; the program of ArduPlane for software in the loop is expected
     """
     if not binary.exists():
         raise FlightError(

@@ -118,7 +118,7 @@ def _by_circle(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:
 
 
 def waypoint_name(route: Route, index: int) -> str:
-    """Return name a waypoint by its number and, where it has one, its mission item."""
+    """Name a waypoint by its number and, where it has one, its mission item."""
     item = int(route.items[index])
     number = int(route.stops[index])
     return f"waypoint {number}" if item < 0 else f"waypoint {number} (item {item})"

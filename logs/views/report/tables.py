@@ -229,7 +229,7 @@ def notes_of(setup: FlightSetup) -> list[str]:
 
 
 def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
-    """Return sum up what the flight took from the battery."""
+    """Sum up what the flight took from the battery."""
     if track is None or len(track) == 0:
         return []
     used = float(track.energy[-1])

@@ -69,7 +69,7 @@ def would_pass(finding: Finding, deciding: DecidingParameter | None) -> WouldPas
 
 
 def _bound(finding: Finding) -> Literal["at most", "at least"] | None:
-    """Which side of its limit passes: that to which the margin counts; of a slope down, its steepness is bounded."""
+    """Return the side of the limit that passes: the side of positive margins; a descent is bounded in steepness."""
     if finding.limit is None or finding.margin is None:
         return None
     values = [value for value in (finding.flown, finding.planned) if value is not None]
@@ -191,7 +191,7 @@ def in_unit(value: float | None, unit: str) -> tuple[float | None, str]:
 
 
 def state_of(ok: bool | None) -> str:
-    """Return name a finding's state, from its answer."""
+    """Name a finding's state, from its answer."""
     return "unjudged" if ok is None else "pass" if ok else "fail"
 
 
@@ -336,7 +336,7 @@ def _sentence(finding: Finding) -> str:
 
 
 def rule_rows(findings: Sequence[Finding]) -> list[RuleRow]:
-    """Return count the findings by rule, in the order of `RULE_WORDS`; a rule without findings is left out."""
+    """Count the findings by rule, in the order of `RULE_WORDS`; a rule without findings is left out."""
     return [_rule_row(rule) for rule in findings_by_rule(findings)]
 
 

@@ -272,7 +272,7 @@ class Estimator:
         return reached or bound.excludes(tally.flyable + tally.lost, tally.failed, target, above=False)
 
     def estimate(self, tally: Tally) -> Estimate:
-        """Return estimate the probability from a tally."""
+        """Estimate the probability from a tally."""
         confidence = self._goal.confidence
         if self._bound is not None:
             interval = self._bound.bounds(tally)

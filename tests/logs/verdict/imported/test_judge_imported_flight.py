@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flight.simulation.setup import Damage, ImportedLog, RowFaults
+from flight.simulation.setup import Damage, Heights, ImportedLog, RowFaults
 from logs.importers.raw_log import LogSeries, ModeChange, RawLog, example_raw_log
 from logs.verdict.imported.judge_imported_flight import damage_text, heights_text, rows_text
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import verdict_json
 from planfly.flight_options import LogOptions
 from tests.logs.importers.judged_flights import judged, outcome, reasons
-from world.arrays import Heights
 
 AEROSONDE = LogOptions(aircraft="aerosonde")
 
