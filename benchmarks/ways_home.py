@@ -21,7 +21,7 @@ from logs.verdict.returns.judge_returns import ReturnWorld, judge_returns, retur
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts
 from logs.verdict.returns.returns_text import headline
 from logs.verdict.returns.suggest_returns import suggest_rally
-from planfly.returns.jsbsim_returns import fly_return
+from planfly.rtl.jsbsim_returns import fly_return
 
 Result = TypeVar("Result")
 # Seed of the fresh places.

@@ -161,6 +161,7 @@ _Given = TypeVar("_Given")
 def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
     """Show the options of ``**options: Unpack[...]`` in a function's signature, fill in defaults, refuse other names.
 
+    >>> from typing import Unpack
     >>> @takes_options
     ... def fly(mission: str, **options: Unpack[MissionOptions]) -> object:
     ...     return options["fence"], options["wind"]

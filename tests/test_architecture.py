@@ -24,7 +24,7 @@ CODE = sorted(
     file for folder in (*PACKAGES, "benchmarks", "tests", "examples") for file in (ROOT / folder).rglob("*.py")
 )
 OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
-LONGEST = 60
+MOST_STATEMENTS = 60
 KERNELS = set(DECORATORS)
 INNER = {"inner", "inlined"}
 # Phrases that lean on a text the reader does not have; taken apart, so that this file may hold them.
@@ -202,13 +202,14 @@ def test_package_inits_hold_a_docstring_only() -> None:
         assert "import" not in text.split('"""')[2]
 
 
-def test_no_function_is_longer_than_60_lines() -> None:
-    lengths = {
-        f"{name_of(file)}:{function.name}": (function.end_lineno or 0) - function.lineno + 1
+def test_no_function_has_more_than_60_statements() -> None:
+    """Statements, not lines: a signature or a table may have a line for each of its entries."""
+    statements = {
+        f"{name_of(file)}:{function.name}": sum(isinstance(node, ast.stmt) for node in ast.walk(function)) - 1
         for file in CODE
         for function in functions(file)
     }
-    assert {function: length for function, length in lengths.items() if length > LONGEST} == {}
+    assert {function: count for function, count in statements.items() if count > MOST_STATEMENTS} == {}
 
 
 def kernels_by_place() -> dict[tuple[str, str], str]:
@@ -395,7 +396,7 @@ def test_names_in_backquotes_lead_to_what_they_name() -> None:
     assert lost == []
 
 
-def test_optimisers_import_nothing_of_ours_but_kernels() -> None:
+def test_optimisers_import_nothing_of_ours_but_kernels_and_array_types() -> None:
     """As a list of what is allowed: a contract names what is forbidden, and a new module would slip through."""
     files = [file for file in OURS if file.parent == ROOT / "planner" / "optimisers"]
     assert len(files) > 5
@@ -405,7 +406,10 @@ def test_optimisers_import_nothing_of_ours_but_kernels() -> None:
         for node in nodes_of(file)
         if isinstance(node, ast.ImportFrom) and node.module and node.module.partition(".")[0] in PACKAGES
     }
-    assert {module for module in imported if not module.startswith("planner.optimisers")} <= {"world.kernels"}
+    assert {module for module in imported if not module.startswith("planner.optimisers")} <= {
+        "world.arrays",
+        "world.kernels",
+    }
 
 
 def error_kinds() -> set[str]:

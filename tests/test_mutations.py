@@ -43,12 +43,14 @@ def test_two_hundred_of_them_are_the_same_each_time_and_of_all_rooms() -> None:
 
 
 def test_a_modules_own_tests_come_first_and_its_limits_are_found_where_they_are_used() -> None:
-    mutant = replacing("rules", "logs/verdict/rules/bounds_rule.py", "planned >= -ROUNDING", "planned >= -9.0")
+    mutant = replacing("rules", "logs/verdict/rules/bounds_rule.py", "planned >= -ROUNDING_M", "planned >= -9.0")
     own = "tests/logs/verdict/rules/test_bounds_rule.py", "tests/logs/verdict/rules/limits/test_bounds_rule_limits.py"
     assert set(own) == set(covering_tests(mutant)[0])
     # The pages state what rules rank by.
     assert covering_tests(mutant)[1:] == [["tests/logs/verdict", "tests/docs/test_pages_hold.py"]]
-    reserve = replacing("limits", "logs/verdict/tolerances.py", "RESERVE = 0.2", "RESERVE = 0.1")
+    reserve = replacing(
+        "limits", "logs/verdict/tolerances.py", "ENERGY_RESERVE_FRACTION = 0.2", "ENERGY_RESERVE_FRACTION = 0.1"
+    )
     assert "tests/logs/verdict/rules/limits/test_energy_rule_limits.py" in covering_tests(reserve)[0]
     stages = [stage for one in some(chosen_mutants(200), 66) for stage in covering_tests(one)]
     assert all((ROOT / test).exists() for stage in stages for test in stage)
@@ -57,7 +59,7 @@ def test_a_modules_own_tests_come_first_and_its_limits_are_found_where_they_are_
 def test_compiled_code_that_rests_on_what_changes_is_known() -> None:
     gusts = replacing("physics", "flight/simulation/turbulence.py", "sigma_w = 0.1 * w20", "sigma_w = 0.2 * w20")
     assert "flight/simulation/tick.py" in kernels_on(gusts)
-    far = replacing("limits", "logs/verdict/tolerances.py", "FAR = 30.0", "FAR = 3.0")
+    far = replacing("limits", "logs/verdict/tolerances.py", "SPHERE_FAR_DIAGONALS = 30.0", "SPHERE_FAR_DIAGONALS = 3.0")
     assert "logs/verdict/measures/path_sweeps.py" in kernels_on(far)
     assert "planner/evaluation/certify_kernels.py" not in kernels_on(far)
     # With those, what Python calls inner kernels by; without any, nothing.

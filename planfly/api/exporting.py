@@ -29,7 +29,7 @@ from planfly.flight_logs import is_log, loss_text
 from planfly.flight_options import FencePaths, MissionOptions
 from planfly.named_fences import read_named_fences
 from planfly.plan_fence import fence_of_plan
-from planfly.returns.return_summary import return_summary
+from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight

@@ -29,7 +29,7 @@ from planfly.flight_options import (
 )
 from planfly.kernel_units.unit_kernels import BOTH, FLYING
 from planfly.named_fences import NamedFences, read_named_fences
-from planfly.returns.return_summary import ReturnSummary, returns_line
+from planfly.rtl.return_summary import ReturnSummary, returns_line
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import say_replaced, stage
 from planfly.workflow import pipeline

@@ -13,7 +13,7 @@ from logs.verdict.verdict import Verdict
 from logs.views.report.compare import Comparison, compare_logs, write_comparison
 from planfly.api.flying import FlownMission
 from planfly.flight_logs import judge_log
-from planfly.returns.return_summary import return_summary
+from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight

@@ -33,9 +33,9 @@ from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log
 from planfly.flight_options import LogOptions, mission_options, options_of_log, takes_options
 from planfly.kernel_units.unit_kernels import FLYING, GLIDING
-from planfly.returns.jsbsim_returns import fly_return
-from planfly.returns.return_summary import return_starts
-from planfly.returns.sitl_returns import ProgramReturns, fly_by_program, refuse_program
+from planfly.rtl.jsbsim_returns import fly_return
+from planfly.rtl.return_summary import return_starts
+from planfly.rtl.sitl_returns import ProgramReturns, fly_by_program, refuse_program
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import airframe_of

@@ -17,7 +17,7 @@ from planfly.api.flying import named_program
 from planfly.arguments import check_arguments
 from planfly.flight_options import RunOptions, named_scenario, option_defaults, takes_options
 from planfly.kernel_units.unit_kernels import BOTH, GLIDING
-from planfly.returns.return_summary import return_summary
+from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import say_replaced, stage
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, tightened_airframe

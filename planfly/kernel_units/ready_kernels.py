@@ -18,7 +18,7 @@ from flight.mission_files.formats import parse_mission
 from flight.simulation.setup import make_limits
 from logs.recording.recorder import Recorder
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
-from planfly.returns.return_summary import return_summary, returns_line
+from planfly.rtl.return_summary import return_summary, returns_line
 from planfly.workflow.airframe import Airframe, find_airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge

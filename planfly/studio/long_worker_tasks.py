@@ -10,7 +10,7 @@ from logs.verdict.returns.returns_text import headline, no_return_text, range_te
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.flight_row import fly_one
-from planfly.returns.return_summary import return_starts
+from planfly.rtl.return_summary import return_starts
 from planfly.studio.edit_context import EditContext
 from planfly.studio.pilot import Advance
 from planfly.workflow.pipeline import fly_and_judge

@@ -95,6 +95,7 @@ def _mission_names(folder: Path) -> list[str]:
 def for_fixed_wing(mission: Mission) -> Mission:
     """Return the mission if a fixed wing can fly it.  Raises MissionError for an item of other vehicles.
 
+    >>> from flight.mission.items import MissionItem
     >>> spline = MissionItem(3, 82, 3, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> for_fixed_wing(Mission(None, (spline,), source="a.waypoints"))
     Traceback (most recent call last):

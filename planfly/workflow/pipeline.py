@@ -20,7 +20,7 @@ from logs.verdict.measures.energy import predicted_energy
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.verdict import Verdict
-from planfly.returns.return_summary import ReturnSummary, return_summary
+from planfly.rtl.return_summary import ReturnSummary, return_summary
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
 from planfly.workflow.crash_safe_log import CrashSafeLog, FlightLimits
 from planfly.workflow.make_plan import Advance, make_plan, planned_for

@@ -32,12 +32,14 @@ def test_named_lines_of_a_docstring_are_a_list() -> None:
 
 def test_angles_are_degrees_and_nothing_else_is() -> None:
     shown = {one.name: one for one in tolerance_list()}
-    assert (shown["BANK_TOLERANCE"].value, shown["OVERSHOOT"].value) == ("5°", "5")
-    assert [shown[f"BUFFER_{what}"].value for what in ("ANGLE", "LENGTH", "SPEED")] == ["0.1°", "1", "0.03"]
-    assert shown["GUST_OFFSET"].value == "none 0, light 0.5, moderate 1"
-    assert not shown["BANK_TOLERANCE"].text.startswith("rad")
+    assert (shown["BANK_TOLERANCE_RAD"].value, shown["OVERSHOOT_TOLERANCE_M"].value) == ("5°", "5")
+    assert [
+        shown[f"SUGGESTION_{what}"].value for what in ("ANGLE_MARGIN_RAD", "LENGTH_MARGIN_M", "SPEED_MARGIN_FRACTION")
+    ] == ["0.1°", "1", "0.03"]
+    assert shown["GUST_OFFSET_M"].value == "none 0, light 0.5, moderate 1"
+    assert not shown["BANK_TOLERANCE_RAD"].text.startswith("rad")
     # One that stands below another without words of its own has the other's.
-    assert shown["CLOSER"].text == shown["CLOSER_SHARE"].text
+    assert shown["CORNER_CUT_TOLERANCE_M"].text == shown["CORNER_CUT_FRACTION"].text
 
 
 def test_every_command_with_an_answer_has_a_row() -> None:

@@ -14,7 +14,7 @@ STEP = 1.3
 ORDERS = 1000.0
 BY_ORDERS = ("FARTHEST", "FASTEST", "MAX_PLAUSIBLE", "SINGULAR", "TOUCH", "U_TURN", "CHORD_TIME", "FAR")
 # Numbers that decide how much is computed, where more costs nothing but time: how each is changed.
-EFFORTS = {"CHORD_TIME": "*", "FAR": "/", "TRIES": ""}
+EFFORTS = {"CHORD_TIME_S": "*", "SPHERE_FAR_DIAGONALS": "/", "SUGGESTION_TRIAL_COUNT": ""}
 
 _COMPARISONS = {ast.Lt: ">=", ast.LtE: ">", ast.Gt: "<=", ast.GtE: "<", ast.Eq: "!=", ast.NotEq: "=="}
 _SIGNS: dict[type[ast.operator], tuple[str, str]] = {

@@ -182,8 +182,8 @@ class ArduPlane(Autopilot):
         field that is lower than home the flare would climb (`flight.autopilots.arduplane.ground_law`): there
         TECS_LAND_PMAX holds the nose down unless a file states it.
 
-        >>> made = ArduPlane(ArduPilotParameters.defaults()).with_scenario_rtl_settings(180.0, None, lands=True,
-        lower=50.0)
+        >>> default = ArduPlane(ArduPilotParameters.defaults())
+        >>> made = default.with_scenario_rtl_settings(180.0, None, lands=True, lower=50.0)
         >>> made.parameters.rtl_altitude, made.parameters.rtl_autoland, round(made.parameters.landing_pitch_max, 4)
         (180.0, 1.0, -0.0175)
         """

@@ -102,5 +102,5 @@ def test_a_file_without_a_known_name_is_refused_unless_it_is_the_autopilots_own(
 
 
 def test_every_parameter_of_a_law_is_recognised_as_its_own() -> None:
-    for autopilot, names in (("ardupilot", arduplane._BY_NAME), ("px4", px4._BY_NAME)):
+    for autopilot, names in (("ardupilot", arduplane.TABLE.by_name), ("px4", px4.TABLE.by_name)):
         assert {name for name in names if origin(f"{name} 1").autopilot != autopilot} == set()

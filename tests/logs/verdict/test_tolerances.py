@@ -32,7 +32,7 @@ def test_it_is_used_positive_and_finite(name: str) -> None:
     assert name in USED, f"{name} is used nowhere"
     value = getattr(tolerances, name)
     # Calm air adds nothing to where a gust may carry the aircraft.
-    smallest = 0.0 if name == "GUST_OFFSET" else math.ulp(0.0)
+    smallest = 0.0 if name == "GUST_OFFSET_M" else math.ulp(0.0)
     assert all(smallest <= number < math.inf for number in numbers(value))
 
 

@@ -74,8 +74,8 @@ def repeated_options(args: argparse.Namespace) -> dict[str, object]:
     """What the API repeats, of the options given."""
     base = SimpleNamespace(seed=args.seed)
     flown = {name: getattr(args, name) for name in FLOWN}
-    asked = campaigns._asked(args.target, args.scenario, args.terrain, args.fence, args.seed, **flown)
-    return asked.options(base, args.spread)  # type: ignore[arg-type]
+    options = {"scenario": args.scenario, "terrain": args.terrain, "fence": args.fence, "seed": args.seed, **flown}
+    return campaigns._repeated(base, options, args.spread)  # type: ignore[arg-type]
 
 
 def test_every_option_that_decides_what_is_flown_is_repeated() -> None:

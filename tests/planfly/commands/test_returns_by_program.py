@@ -11,9 +11,9 @@ import planfly
 from logs.verdict.returns.judge_returns import badness, judge_returns, return_world
 from logs.verdict.returns.return_starts import planned_starts
 from planfly.cli import main
-from planfly.returns import jsbsim_returns as return_flights
-from planfly.returns import sitl_returns as program_returns
-from planfly.returns.sitl_returns import ProgramReturn, ProgramReturns, worst_apart
+from planfly.rtl import jsbsim_returns as return_flights
+from planfly.rtl import sitl_returns as program_returns
+from planfly.rtl.sitl_returns import ProgramReturn, ProgramReturns, worst_apart
 from tests.autopilots import need_arduplane, shorten_run_in, write_fake, write_fake_px4
 from tests.logs.verdict.returns.hill import SCENARIO, hill_setup, mission_text
 from tests.soak import SOAK

@@ -17,7 +17,7 @@ from planfly.terminal.output import ON_STANDARD_ERROR, SILENT
 from tests.soak import some
 from world.compile_events import kernel_is_compiled
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 CODE = """
 import sys
 from planfly.runtime.first_start import warm_up

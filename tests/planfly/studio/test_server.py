@@ -294,7 +294,9 @@ def test_a_long_work_is_stopped(studio: Served, monkeypatch: pytest.MonkeyPatch)
     if not SOAK:
         # Of a campaign nothing counts here but that it takes long.
         count = "tests.planfly.studio.light_works.count"
-        monkeypatch.setattr(Jobs, "ask", lambda self, kind, session: self._ask(LONG, kind, count, 10**6, session.rev))
+        monkeypatch.setattr(
+            Jobs, "ask", lambda self, kind, session: self._send_work(LONG, kind, count, 10**6, session.rev)
+        )
     with studio.page() as page:
         page.until("sheet")
         page.send(kind="campaign")

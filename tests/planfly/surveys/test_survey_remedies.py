@@ -22,7 +22,7 @@ from planfly.surveys.survey_text import remedy_text
 from planfly.workflow.airframe import airframe_of
 from planfly.workflow.open_flight import open_flight
 
-FIELD = Path(__file__).with_name("commands") / "field.waypoints"
+FIELD = Path(__file__).parents[1] / "commands" / "field.waypoints"
 # Whether lines can be used, and what else fails with what margin, of a flight with these turn-arounds, m.
 Answer = Callable[[float], tuple[bool, dict[str, float]]]
 

@@ -28,7 +28,7 @@ from world.scenario import load_scenario
 TRUTH: dict[str, Any] = json.loads((FLIGHTS / "truth.json").read_text())
 SCENARIOS = {"tight": "tight", "steep": "steep", "ridge-10mps": str(FLIGHTS / "ridge-10mps.toml")}
 # The folder of the whole logs, of which the thinned ones here were made.
-WHOLE = Path(os.environ.get("PLANFLY_FLIGHTS", Path(__file__).parents[3] / "shared" / "flights"))
+WHOLE = Path(os.environ.get("PLANFLY_FLIGHTS", Path(__file__).parents[4] / "shared" / "flights"))
 # The axes of WGS 84.
 A, E2 = 6_378_137.0, 6.69437999014e-3
 

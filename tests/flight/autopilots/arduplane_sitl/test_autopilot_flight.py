@@ -17,6 +17,7 @@ from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane_sitl import physics
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight, fly_autopilot
 from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import simulate
 from tests.autopilots import arduplane_program, shorten_run_in
 from tests.flight.autopilots.arduplane_sitl.conftest import MakeFake
 from tests.mission_lines import setup_of, wp
@@ -168,14 +169,18 @@ def test_a_file_that_is_no_program_is_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("short_run_in")
-def test_an_exception_ends_the_program_and_removes_its_folder(fake_autopilot: MakeFake) -> None:
+def test_an_exception_ends_the_program_and_removes_its_folder(
+    fake_autopilot: MakeFake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     before, folders = children(), left_behind()
 
-    def stop(_done: float, _whole: float) -> None:
+    def interrupt(flight: AutopilotFlight) -> None:
+        next(simulate(flight))
         raise KeyboardInterrupt
 
+    monkeypatch.setattr("flight.autopilots.arduplane_sitl.flight.fly_to_end", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        fly_autopilot(make_setup(), AEROSONDE, arduplane_program(fake_autopilot()), {}, progress=stop)
+        fly_autopilot(make_setup(), AEROSONDE, arduplane_program(fake_autopilot()), {})
     assert (children(), left_behind()) == (before, folders)
 
 

@@ -1,6 +1,6 @@
 """Worst returns to launch, flown again by the ArduPlane program to check planfly's control law.
 
-Each is a separate flight, on the mission by which `planfly.returns.jsbsim_returns` flies a return by the control law.
+Each is a separate flight, on the mission by which `planfly.rtl.jsbsim_returns` flies a return by the control law.
 The result of the program replaces the result of the law only if it is worse; it never improves a judgement.
 """
 
@@ -36,7 +36,7 @@ from logs.verdict.returns.judge_returns import (
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.returns_text import measured_text
-from planfly.returns.jsbsim_returns import LEAD, from_start, met_on_way, return_setup
+from planfly.rtl.jsbsim_returns import LEAD, from_start, met_on_way, return_setup
 from planfly.runtime.stages import stage
 from planfly.workflow.pipeline import fly_and_judge
 from world.arrays import Floats
