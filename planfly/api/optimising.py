@@ -1,4 +1,4 @@
-"""Ask-and-tell interface to the planner's estimation of distribution algorithms, for any bounded black box."""
+"""Ask/tell interface to the planner's estimation of distribution algorithms, for any bounded black box."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -151,7 +151,7 @@ def optimise(
     seed: int | np.random.Generator = 1,
     initial: ArrayLike | None = None,
 ) -> Optimiser:
-    """Return an ask-and-tell optimiser with the planner's algorithms, for any black box within bounds.
+    """Return an ask/tell optimiser with the planner's algorithms, for any black box within bounds.
 
     lower, upper: (d,) box.
     model: "umda", the paper's univariate Gaussians; "emna", one Gaussian of full covariance; "multistart", Gaussians of

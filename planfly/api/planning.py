@@ -48,8 +48,8 @@ def plan(
 
     seed: of the search; None takes the seed of the scenario, or 1.
     algorithm: a name of ``planfly plan --help``; None for the default.
-    budget: largest number of evaluations.  seconds: time limit, after which the best path so far is returned.
-    stop: called between generations; once it returns True, the best path so far is returned.
+    budget: largest number of evaluations.  seconds: time limit, after which the best path found is returned.
+    stop: called between generations; once it returns True, the best path found is returned.
     terrain to nav: the flight to plan for, as of `planfly.fly`.
 
     If no feasible path is found, the returned plan says so (`Plan.feasible`, `Plan.safe`); bad input raises a
