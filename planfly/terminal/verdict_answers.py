@@ -12,7 +12,7 @@ STRICT = ConfigDict(extra="forbid", use_attribute_docstrings=True, json_schema_s
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class VerdictsDocument:
-    """planfly check --for: whether a mission really flies, by each autopilot."""
+    """planfly check --for: the verdict on the mission for each autopilot."""
 
     schema: Literal["planfly.verdicts/1"] = "planfly.verdicts/1"
     exit_code: int
