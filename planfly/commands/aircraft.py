@@ -33,7 +33,7 @@ _WIND = 10.0
 
 
 def aircraft_options(line: LineParser) -> None:
-    """The parser of ``planfly aircraft``."""
+    """Add the parser of ``planfly aircraft``."""
     parser = line.command(
         "aircraft",
         "show an aircraft: mass, trims, modes, envelope and step responses; without a name, list them",

@@ -21,7 +21,7 @@ _EXITS = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "none as
 
 
 def campaign_options(line: LineParser) -> None:
-    """The parser of ``planfly campaign``."""
+    """Add the parser of ``planfly campaign``."""
     parser = line.command(
         "campaign",
         "fly a mission many times in varied weather and with varied aircraft: how likely is it to fly",
@@ -53,7 +53,7 @@ def campaign_options(line: LineParser) -> None:
 
 
 def winds_options(line: LineParser) -> None:
-    """The parser of ``planfly winds``."""
+    """Add the parser of ``planfly winds``."""
     parser = line.command(
         "winds",
         "find the largest wind from each direction in which a mission flies",

@@ -29,7 +29,7 @@ LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
 
 
 def check_options(line: LineParser) -> None:
-    """The parser of ``planfly check``."""
+    """Add the parser of ``planfly check``."""
     parser = line.command(
         "check",
         "judge a flight by its log (planfly's or an autopilot's), or a mission by flying it; write nothing",

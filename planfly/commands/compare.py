@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def compare_options(line: LineParser) -> None:
-    """The parser of ``planfly compare``."""
+    """Add the parser of ``planfly compare``."""
     parser = line.command(
         "compare",
         "compare two flights: a table of differences, and pictures",

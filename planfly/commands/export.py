@@ -12,7 +12,7 @@ from planfly.terminal.results import print_warnings
 
 
 def export_options(line: LineParser) -> None:
-    """The parser of ``planfly export``."""
+    """Add the parser of ``planfly export``."""
     parser = line.command(
         "export",
         "write a plan, mission or log in the format that a suffix names",

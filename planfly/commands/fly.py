@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def fly_options(line: LineParser) -> None:
-    """The parser of ``planfly fly``."""
+    """Add the parser of ``planfly fly``."""
     parser = line.command(
         "fly",
         "fly a plan or any mission file, write the log, and judge the flight",

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def import_log_options(line: LineParser) -> None:
-    """The parser of ``planfly import``."""
+    """Add the parser of ``planfly import``."""
     parser = line.command(
         "import",
         "convert an autopilot's log into a flight log, and judge the flight against its plan",
@@ -66,7 +66,7 @@ def _import_answer(target: Path, flight: "ImportedFlight", code: int) -> object:
 
 
 def refly_options(line: LineParser) -> None:
-    """The parser of ``planfly refly``."""
+    """Add the parser of ``planfly refly``."""
     parser = line.command(
         "refly",
         "fly the mission of an imported flight again in JSBSim, in the wind of its log, and compare the two",

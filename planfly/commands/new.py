@@ -13,7 +13,7 @@ from planfly.terminal.output import give_answer
 
 
 def new_options(line: LineParser) -> None:
-    """The parser of ``planfly new``."""
+    """Add the parser of ``planfly new``."""
     parser = line.command(
         "new",
         "write a commented scenario from one place to another, and plan it once",

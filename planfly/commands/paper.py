@@ -15,7 +15,7 @@ from planfly.workflow.output_paths import RESULTS
 
 
 def paper_options(line: LineParser) -> None:
-    """The parser of ``planfly paper``."""
+    """Add the parser of ``planfly paper``."""
     parser = line.command(
         "paper",
         "plan the paper's section V again: tables and figures of seeded plans in three encodings",

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def plan_options(line: LineParser) -> None:
-    """The parser of ``planfly plan``."""
+    """Add the parser of ``planfly plan``."""
     parser = line.command(
         "plan",
         "plan a path, or plan again in flight, without flying it",

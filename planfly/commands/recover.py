@@ -12,7 +12,7 @@ from planfly.terminal.results import warn_of_loss
 
 
 def recover_options(line: LineParser) -> None:
-    """The parser of ``planfly recover``."""
+    """Add the parser of ``planfly recover``."""
     parser = line.command(
         "recover",
         "write what can be read of an unfinished or damaged log as a new, complete one",

@@ -37,7 +37,7 @@ _TO_END = "\x1b[J"
 
 
 def replay_options(line: LineParser) -> None:
-    """The parser of ``planfly replay``."""
+    """Add the parser of ``planfly replay``."""
     parser = line.command(
         "replay",
         "replay a flight from its log alone: as instruments on a terminal, as a timeline elsewhere",

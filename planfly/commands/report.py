@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def report_options(line: LineParser) -> None:
-    """The parser of ``planfly report``."""
+    """Add the parser of ``planfly report``."""
     parser = line.command(
         "report",
         "draw the figures and write report.html from a log alone, or write the layout for Foxglove",

@@ -28,7 +28,7 @@ _LISTED = 20
 
 
 def returns_options(line: LineParser) -> None:
-    """The parser of ``planfly returns``."""
+    """Add the parser of ``planfly returns``."""
     parser = line.command(
         "returns",
         "fly the return to launch from everywhere on the way: say whether each is safe, where it goes and why; and"

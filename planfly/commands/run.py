@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def run_options(line: LineParser) -> None:
-    """The parser of ``planfly run``."""
+    """Add the parser of ``planfly run``."""
     parser = line.command(
         "run",
         "plan, export, fly, log, judge and report",

@@ -23,7 +23,7 @@ which at 1 has a mission that is judged not flyable armed and flown all the same
 
 
 def serve_options(line: LineParser) -> None:
-    """The parser of ``planfly serve``."""
+    """Add the parser of ``planfly serve``."""
     parser = line.command(
         "serve",
         "simulate a MAVLink vehicle that a ground station uploads to, arms, starts and watches",

@@ -22,7 +22,7 @@ to complete in this shell, and in those to come:
 
 
 def completion_options(line: LineParser) -> None:
-    """The parser of ``planfly completion``."""
+    """Add the parser of ``planfly completion``."""
     parser = line.command(
         "completion",
         "print the script with which a shell completes planfly's commands, options and names",
@@ -43,7 +43,7 @@ def completion(args: argparse.Namespace) -> int:
 
 
 def show_help_options(line: LineParser) -> None:
-    """The parser of ``planfly help``."""
+    """Add the parser of ``planfly help``."""
     parser = line.command(
         "help", "show the help of a command, or list the commands", "planfly help fly", "planfly help fly --schema"
     )
@@ -86,7 +86,7 @@ def _refuse(why: str) -> int:
 
 
 def scenarios_options(line: LineParser) -> None:
-    """The parser of ``planfly scenarios``."""
+    """Add the parser of ``planfly scenarios``."""
     parser = line.command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
     json_option(parser.group("results"), "scenarios")
 

@@ -24,7 +24,7 @@ Only this machine reaches the page, by the address that is printed."""
 
 
 def studio_options(line: LineParser) -> None:
-    """The parser of ``planfly studio``."""
+    """Add the parser of ``planfly studio``."""
     parser = line.command(
         "studio",
         "a page on which a mission is dragged, judged while it is dragged, flown, and saved",

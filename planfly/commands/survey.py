@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def survey_options(line: LineParser) -> None:
-    """The parser of ``planfly survey``."""
+    """Add the parser of ``planfly survey``."""
     parser = line.command(
         "survey",
         "fly a survey: say how much of each photo line can be used, and what would help those that are lost",

@@ -16,7 +16,7 @@ _NAMED = 4
 
 
 def terrain_options(line: LineParser) -> None:
-    """The parser of ``planfly terrain``."""
+    """Add the parser of ``planfly terrain``."""
     parser = line.command(
         "terrain",
         "get the ground of an area as a GeoTIFF, from a folder of tiles or the Copernicus DEM's server",

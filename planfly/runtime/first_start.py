@@ -1,4 +1,4 @@
-"""The first start after an install: kernels are compiled in two processes before the work begins, and counted."""
+"""Compile kernels at the first start after an install: in two processes, with progress, before the work begins."""
 
 import contextlib
 import functools
@@ -19,20 +19,20 @@ from world.compile_events import tell_before_compiling
 from world.kernel_cache import VARIABLE, can_write
 
 # ----------------------------------------------------------------------
-# Units of kernels compiled by processes of their own, which leave them in the cache.
+# Units of kernels are compiled by separate processes, which store them in the cache.
 
-# More would wait for each other: the longest unit is nearly half of all.
+# Number of processes; more would wait for each other, because the longest unit takes nearly half of the total time.
 PROCESSES = 2
-# Without the current folder, whose modules may have our names.
+# Arguments of Python; -P leaves out the current folder, whose modules may have the names of ours.
 PROGRAM = ("-P", "-m", "planfly.kernel_units")
 _OVER = ""
 
 
 def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None]) -> None:
-    """Have units compiled into a cache folder; return when all are done, or given up.
+    """Compile units into a cache folder; return when all are compiled or given up.
 
-    units: longest first.  on_ready: called with how many of their kernels are ready.
-    The processes end with this call, however it ends, and with this process.
+    units: longest first.  on_ready: called with the number of kernels that are ready.
+    The processes end with this call, also if it raises, and with this process.
     """
     waiting, lines = deque(units), queue.SimpleQueue[str]()
     count = min(PROCESSES, len(units), os.cpu_count() or 1)
@@ -73,9 +73,9 @@ def _start(folder: Path) -> "subprocess.Popen[str]":
 
 
 def _lead(helper: "subprocess.Popen[str]", waiting: "deque[str]", lines: "queue.SimpleQueue[str]") -> None:
-    """Give a process one unit after another, and pass its lines on; an empty one at its end."""
+    """Give a process one unit after another, and pass its lines on; an empty line marks its end."""
     requests, answers = helper.stdin, helper.stdout
-    # It may have died, or the other one was quicker.
+    # The process may have died, or the other process may have taken the last unit.
     with contextlib.suppress(OSError, IndexError):
         while requests is not None and answers is not None:
             requests.write(f"{waiting.popleft()}\n")
@@ -93,25 +93,25 @@ def _lead(helper: "subprocess.Popen[str]", waiting: "deque[str]", lines: "queue.
 
 
 # ----------------------------------------------------------------------
-# Warm-up: when the first kernel has to be compiled, all that the work needs are compiled side by side.
+# Warm-up: when the first kernel has to be compiled, all kernels that the work needs are compiled in parallel.
 
 _Taken = ParamSpec("_Taken")
 _Given = TypeVar("_Given")
 
-# Each group is compiled at its first use: a command may do so more than once.
+# Title of the stage; a command may show it more than once, because each group is compiled at its first use.
 TITLE = "compiling numeric kernels"
 KEPT = ", which later runs load"
 _WAY_OUT = f"{VARIABLE}=FOLDER names one that can"
-# Units that this process has had compiled, or tried to.
+# Units that this process has compiled or tried to compile.
 _shared: set[str] = set()
 
 
 @contextmanager
 def warm_up(*units: str) -> Iterator[None]:
-    """Compile the kernels of units when the work inside first needs one that is not in the cache, and report it once.
+    """Compile the kernels of units when the work inside first needs one that is not cached, and report it once.
 
-    units: of `planfly.kernel_units`, longest first: what the work will call.  They are compiled in two processes before
-    the work goes on; where the cache cannot be written they are compiled as they are called.
+    units: units of `planfly.kernel_units` that the work will call, longest first.  They are compiled in two processes
+    before the work continues; if the cache cannot be written, each kernel is compiled when it is called.
     """
     reported = False
 
@@ -127,7 +127,7 @@ def warm_up(*units: str) -> Iterator[None]:
 
 
 def with_warm_up(*units: str) -> Callable[[Callable[_Taken, _Given]], Callable[_Taken, _Given]]:
-    """Run a function of the public API under `warm_up`."""
+    """Return a decorator that runs a function of the public API under `warm_up`."""
 
     def decorate(verb: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
         @functools.wraps(verb)
@@ -141,7 +141,7 @@ def with_warm_up(*units: str) -> Callable[[Callable[_Taken, _Given]], Callable[_
 
 
 def _report_and_compile(units: list[str]) -> None:
-    # Whoever compiles has imported it.
+    # Imported here: code that compiles kernels has already imported it.
     from world.kernels import TEMPORARY, WANTED, cache_folder
 
     folder = cache_folder()

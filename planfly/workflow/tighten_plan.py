@@ -1,4 +1,4 @@
-"""Tighten the limits of a scenario by what a flight could not do, for the next round of planning.
+"""Tighten the limits of a scenario by the failures of a flight, for the next round of planning.
 
 Only the planning is tightened: every round is judged against the scenario as it was given.
 """
@@ -82,7 +82,7 @@ def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list
     failed = [item for item in verdict.findings if item.ok is False]
     changes = _slopes(spec, failed) + _turns(spec, scenario, failed)
     if not changes:
-        # A flight that cannot follow its plan also flies lower and closer: that is no separate cause.
+        # A flight that cannot follow its plan also flies lower and closer: this is not a separate cause.
         changes = _clearance(spec, scenario, failed) + _missiles(spec, failed)
         changes += _height(spec, scenario, failed) + _zones(spec, scenario, failed)
     if not changes:
