@@ -20,9 +20,9 @@ from world.scenario_tables import Guidance, Navigation
 Wind = tuple[float, float]
 FencePaths = str | Path | Sequence[str | Path]
 
-# Default limit of a simulated flight, h: longer than the endurance of planfly's aircraft.  A log of 60 rows per second
-# grows by some 20 MB per hour.
+# Default limit of a simulated flight, h: longer than the endurance of planfly's aircraft.
 MAX_HOURS = 6.0
+# Default limit of the size of a log, MB; a log of 60 rows per second grows by some 20 MB per hour.
 MAX_MEGABYTES = 256.0
 
 # ----------------------------------------------------------------------
@@ -209,7 +209,7 @@ def options_of_log(options: LogOptions) -> dict[str, object]:
 
 
 def mission_options(options: MissionOptions) -> MissionOptions:
-    """Return the options that belong to the mission, without those of a log or a campaign."""
+    """Return the options that belong to the mission, without the options of a log or a campaign."""
     return cast(
         MissionOptions, {name: value for name, value in options.items() if name in MissionOptions.__annotations__}
     )

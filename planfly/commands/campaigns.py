@@ -1,4 +1,4 @@
-"""``planfly campaign`` and ``planfly winds``: how likely a mission is to fly, and the largest wind it flies in."""
+"""``planfly campaign`` and ``planfly winds``: probability that a mission flies, and its largest wind."""
 
 import argparse
 import signal
@@ -117,7 +117,7 @@ def _shared_options(parser: CommandParser) -> None:
 
 
 def campaign(args: argparse.Namespace) -> int:
-    """Fly a campaign, go on with one, or fly one of its flights again."""
+    """Fly a campaign, resume one, or fly one of its flights again."""
     folder = _folder(args, "campaign")
     if args.refly is not None:
         return _refly(args, folder)
@@ -134,7 +134,7 @@ def campaign(args: argparse.Namespace) -> int:
 
 
 def winds(args: argparse.Namespace) -> int:
-    """Find the boundary of each direction, or go on with that, and draw the chart."""
+    """Find the boundary of each direction, or resume the search, and draw the chart."""
     folder = _folder(args, "winds")
     with _kept_flights(folder, "winds.sqlite") as interrupted:
         found = call(planfly.winds, args, out=folder)
@@ -149,7 +149,7 @@ def winds(args: argparse.Namespace) -> int:
 
 
 def _folder(args: argparse.Namespace, kind: str) -> Path:
-    """Return the folder of the files: as named, or ``runs/<name>-<kind>``."""
+    """Return the folder of the files: the named one, or ``runs/<name>-<kind>``."""
     return Path(args.out) if args.out else RESULTS / f"{Path(args.target).stem}-{kind}"
 
 
@@ -168,9 +168,9 @@ def _refly(args: argparse.Namespace, folder: Path) -> int:
 
 @contextmanager
 def _kept_flights(folder: Path, table: str) -> Iterator[Callable[[], int]]:
-    """Say which flights an interruption leaves, and how to go on; gives the exit code afterwards, 0 without one.
+    """Report the flights kept after an interruption; yield a function that returns the exit code, 0 without one.
 
-    An interruption before there is a table is passed on.
+    An interruption before the table exists is raised again.
     """
     code = 0
     try:

@@ -1,8 +1,8 @@
-"""The commands: one list, of which the parser, the help, the schemas and the dispatch are made.
+"""List of the commands, from which the parser, the help, the schemas and the dispatch are made.
 
-A command is a module here with two functions: ``NAME_options`` adds its parser to the line, and ``NAME`` takes the
-parsed arguments, calls the API, prints, and returns the exit code.  The API compiles the kernels that it needs.
-All modules are light: what a command works with is imported when it is given.
+A command is a module of this package with two functions: ``NAME_options`` adds its parser to the line, and ``NAME`` takes
+the parsed arguments, calls the API, prints, and returns the exit code.  The API compiles the kernels that it needs.
+All modules are light: the code that a command needs is imported when the command runs.
 """
 
 import argparse
@@ -18,12 +18,12 @@ CommandFunction = Callable[[argparse.Namespace], int]
 
 
 class Command(NamedTuple):
-    """A command of the line.
+    """A command of planfly.
 
-    section: the heading that it stands below in ``planfly --help``.
-    answer: what it answers with --json, a class of `planfly.terminal.answers`, or "MODULE.CLASS" of one beside it; ""
-        for a command without it.
-    module, function: in this package; "" where they have the command's name.
+    section: the heading above it in ``planfly --help``.
+    answer: class of its answer with --json, in `planfly.terminal.answers`, or "MODULE.CLASS" in `planfly.terminal`; ""
+        for a command without --json.
+    module, function: names in this package; "" if they equal the name of the command.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Command(NamedTuple):
     function: str = ""
 
     def load(self, ending: str = "") -> Any:
-        """Return the command's function; with the ending "_options" the one that adds its parser."""
+        """Return the function of the command; with the ending "_options", the function that adds its parser."""
         module = import_module(f"planfly.commands.{self.module or self.name}")
         return getattr(module, (self.function or self.name) + ending)
 
@@ -94,9 +94,9 @@ def build_parser() -> LineParser:
 
 
 def find_command(name: str) -> CommandFunction:
-    """Return the function that carries a command out: parsed arguments to exit code.
+    """Return the function that executes a command: from parsed arguments to exit code.
 
-    Its results go to standard output, its progress to standard error.  Raises KeyError for a name that is none.
+    Its results go to standard output, its progress to standard error.  Raises KeyError for an unknown name.
 
     >>> find_command("scenarios").__module__
     'planfly.commands.shell'
@@ -109,7 +109,7 @@ def _named(name: str) -> Command:
 
 
 # ----------------------------------------------------------------------
-# The JSON schemas of what the commands answer.
+# JSON schemas of the answers of commands.
 
 _DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -120,12 +120,12 @@ def answering_commands() -> list[str]:
 
 
 def answer_schema(name: str) -> dict[str, Any]:
-    """Return the JSON schema, draft 2020-12, of a command's answer.  Raises KeyError for a command without one.
+    """Return the JSON schema, draft 2020-12, of the answer of a command.  Raises KeyError for a command without one.
 
     >>> sorted(answer_schema("scenarios")["properties"])
     ['exit_code', 'scenarios', 'schema']
     """
-    # Imported here: nobody else needs schemas.
+    # Imported here: only this function needs schemas.
     from pydantic import TypeAdapter
 
     if name not in answering_commands():
@@ -137,7 +137,7 @@ def answer_schema(name: str) -> dict[str, Any]:
 
 
 def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the object that an answer is, by its schema; each of them, where options choose one.
+    """Return the object schema of an answer, or all of them if options choose between several.
 
     >>> [one["properties"]["schema"]["const"] for one in answer_objects(answer_schema("check"))]
     ['planfly.verdict/3', 'planfly.verdicts/1']

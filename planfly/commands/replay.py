@@ -1,4 +1,4 @@
-"""``planfly replay``: a flight from its log, on the terminal, as a film, or to other programs."""
+"""``planfly replay``: replay a flight from its log on the terminal, as a film, or to other programs."""
 
 import argparse
 import shutil
@@ -27,7 +27,7 @@ from world.running_clock import RunningClock
 if TYPE_CHECKING:
     from planfly import FlightLog
 
-# Frames a second on a terminal.
+# Frame rate on a terminal, Hz.
 _RATE = 10.0
 _ENTER = "\x1b[?1049h\x1b[?25l"
 _LEAVE = "\x1b[?25h\x1b[?1049l"
@@ -91,7 +91,7 @@ def replay_options(line: LineParser) -> None:
 
 
 def replay(args: argparse.Namespace) -> int:
-    """Instruments on a terminal, the timeline elsewhere, or what the options name; 3 for a log that is cut short."""
+    """Show instruments on a terminal, else the timeline, or as the options say; return 3 for an incomplete log."""
     stations = isinstance(args.to, str)
     if bool(args.foxglove) + bool(args.movie) + stations > 1:
         options = "--foxglove, --movie, --to IP:PORT"
@@ -118,7 +118,7 @@ def replay(args: argparse.Namespace) -> int:
 
 
 def _answer(args: argparse.Namespace, log: "FlightLog", code: int) -> object:
-    """Return the timeline of the part that is replayed, all of it where it goes to ground stations."""
+    """Return the timeline of the replayed part, or of the whole flight if it is sent to ground stations."""
     from planfly.terminal.answers import ReplayAnswer, TimelineEvent
 
     entries = planfly.timeline(log) if isinstance(args.to, str) else call(planfly.timeline, args, log=log)

@@ -1,4 +1,4 @@
-"""``planfly serve``: a vehicle that ground stations find, upload to, arm, start and follow."""
+"""``planfly serve``: simulate a vehicle that ground stations find, upload to, arm, start and follow."""
 
 import argparse
 

@@ -18,7 +18,7 @@ to complete in this shell, and in those to come:
   fish   planfly completion fish > ~/.config/fish/completions/planfly.fish"""
 
 # ----------------------------------------------------------------------
-# ``planfly completion``: the script by which a shell completes.
+# ``planfly completion``: the completion script of a shell.
 
 
 def completion_options(line: LineParser) -> None:
@@ -33,13 +33,13 @@ def completion_options(line: LineParser) -> None:
 
 
 def completion(args: argparse.Namespace) -> int:
-    """Print the script of a shell."""
+    """Print the completion script of a shell."""
     print(shell_script(args.shell))
     return FLYABLE
 
 
 # ----------------------------------------------------------------------
-# ``planfly help``: what a command does, or the JSON schema of its answer.
+# ``planfly help``: the help of a command, or the JSON schema of its answer.
 
 
 def show_help_options(line: LineParser) -> None:
@@ -55,7 +55,7 @@ def show_help_options(line: LineParser) -> None:
 
 
 def show_help(args: argparse.Namespace) -> int:
-    """Print the help of a command, of all, or a schema; 2 for a command that there is not."""
+    """Print the help of one command or all, or a schema; return 2 for an unknown command."""
     # Imported here: the registry lists this module.
     from planfly.commands.registry import answering_commands, build_parser, schema_text
 
@@ -92,7 +92,7 @@ def scenarios_options(line: LineParser) -> None:
 
 
 def scenarios(args: argparse.Namespace) -> int:
-    """Return name and description of each embedded scenario, on standard output."""
+    """Print the name and description of each embedded scenario."""
     known = planfly.scenarios()
     for name, description in known.items():
         print(f"{name:<12} {description}")

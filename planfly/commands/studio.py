@@ -1,4 +1,4 @@
-"""``planfly studio``: a page of this machine on which a mission is dragged, judged while it is dragged, and flown."""
+"""``planfly studio``: serve a local page to drag a mission, judge it while dragging, and fly it."""
 
 import argparse
 

@@ -306,7 +306,7 @@ def fly_again(
     turbulence: replaces the turbulence of the scenario.
     most: largest number of stretches, of which the longest are flown.
 
-    Raises LogError for a flight that followed none of its mission, and StartError where the model cannot begin.
+    Raises LogError for a flight that followed no part of its mission, and StartError if the model cannot begin.
     """
     return tuple(_one_again(setup, legs, aircraft, turbulence, advance) for legs in _stretches(setup, track)[:most])
 

@@ -130,7 +130,7 @@ def airframe_answer(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry = _neve
 def find_deciding_parameter(
     setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, hurry: Hurry = _never
 ) -> DecidingParameter | None:
-    """Find a parameter with which, at another value, a flight that failed passes; None if there is none.
+    """Find a parameter that lets a failed flight pass with another value, or return None.
 
     verdict: on the flight with the setup's own parameters.  hurry: see `judge_with_reference_flights`.
     Takes about ten flights by the law of the autopilot; they explain the flight of a program only if the flight of the
