@@ -37,9 +37,13 @@ class Range(NamedTuple):
         return inside and not (self.above and number == self.low) and not (self.below and number == self.high)
 
 
-_SECONDS = Range(0.0, 1e7, "seconds, from 0 to 10,000,000, are expected")
-_POSITIVE = Range(0.0, 1e6, "a number above 0, up to 1,000,000, is expected", above=True)
-_COUNT = Range(1, 1000, "a whole number from 1 to 1,000 is expected", integer=True)
+# Range of times, s.
+_TIME_RANGE_S = Range(0.0, 1e7, "seconds, from 0 to 10,000,000, are expected")
+# Range of positive numbers.
+_POSITIVE_RANGE = Range(0.0, 1e6, "a number above 0, up to 1,000,000, is expected", above=True)
+# Range of numbers of items.
+_COUNT_RANGE = Range(1, 1000, "a whole number from 1 to 1,000 is expected", integer=True)
+# Range of probabilities to prove.
 _SHARE = Range(0.5, 1.0, "at least 0.5 and below 1 is expected", below=True)
 
 # Ranges by keyword.  Values that a scenario file also bounds (wind, turbulence, airspeed, laws) are checked there.
@@ -50,19 +54,19 @@ RANGES: Mapping[str, Range] = {
     "seconds": Range(0.0, 1e6, "a number of seconds above 0, up to 1,000,000, is expected", above=True),
     "front": Range(2, 100, "a whole number of plans, 2 to 100, is expected", integer=True),
     "at_leg": Range(0, 10_000, "a leg's number is expected, from 0", integer=True),
-    "airspeed": _POSITIVE,
-    "max_hours": _POSITIVE,
-    "max_log": _POSITIVE,
-    "speed": _POSITIVE,
+    "airspeed": _POSITIVE_RANGE,
+    "max_hours": _POSITIVE_RANGE,
+    "max_log": _POSITIVE_RANGE,
+    "speed": _POSITIVE_RANGE,
     "served_speed": Range(0.1, 100.0, "a number from 0.1 to 100 is expected"),
-    "wait": _POSITIVE,
-    "start": _SECONDS,
-    "end": _SECONDS,
+    "wait": _POSITIVE_RANGE,
+    "start": _TIME_RANGE_S,
+    "end": _TIME_RANGE_S,
     "port": Range(0, 65535, "a port, 0..65535, is expected", integer=True),
-    "flight": _COUNT,
-    "runs": _COUNT,
-    "jobs": _COUNT,
-    "workers": _COUNT,
+    "flight": _COUNT_RANGE,
+    "runs": _COUNT_RANGE,
+    "jobs": _COUNT_RANGE,
+    "workers": _COUNT_RANGE,
     "prove": _SHARE,
     "at_least": _SHARE,
     "confidence": _SHARE,
@@ -75,6 +79,7 @@ RANGES: Mapping[str, Range] = {
     "margin": Range(0.0, 100.0, "km, from 0 to 100, are expected"),
     "height": Range(1.0, 5000.0, "m above ground, from 1 to 5,000, are expected"),
 }
+# Allowed words by keyword.
 CHOICES: Mapping[str, tuple[Any, ...]] = {
     "turbulence": ("none", "light", "moderate"),
     "guidance": ("path", "l1", "vector-field"),

@@ -18,6 +18,7 @@ from world.scenario_tables import Guidance, Navigation
 
 # Wind speed, m/s, and the direction it comes from, degrees.
 Wind = tuple[float, float]
+# One file of fences, or several.
 FencePaths = str | Path | Sequence[str | Path]
 
 # Default limit of a simulated flight, h: longer than the endurance of planfly's aircraft.
@@ -95,6 +96,7 @@ class LogOptions(MissionOptions, total=False):
     datum: VerticalDatum | None
 
 
+# Options that apply only to the log of another program.
 LOG_OPTIONS = ("plan", "flight", "datum")
 
 

@@ -41,12 +41,15 @@ from world.files import temporary_folder, write_whole
 from world.scenario import Scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT
 
+# Writer of the text of a map, by suffix.
 MAPS = {".kml": kml_text, ".gpx": gpx_text}
 # Suffixes of the autopilot parameters a mission was judged with: for returns, rally points, take-off and landing.
 PARAMETERS = (".parm",)
+# Beginnings of the names of these parameters.
 _JUDGED = ("RTL_", "RALLY_", "LAND_", "TECS_LAND_", "TKOFF_", "FW_LND_", "FW_TKO_", "NAV_DLL_ACT")
 # Suffixes of formats that only a flight log can be written in.
 LOGS = (".csv", ".parquet", ".tlog", ".ulg")
+# Names of the contents in messages, by suffix.
 _CONTENTS = {"fence": "fence items", "rally": "rally points"}
 
 

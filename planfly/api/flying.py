@@ -341,6 +341,7 @@ def refuse(source: str, given: Mapping[str, Any], allowed: str) -> None:
 
 # Reason why a log cannot be judged in another world, in messages.
 _AS_FLOWN = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
+# Reason why a log cannot be judged in another scenario, in messages.
 _WHERE_FLOWN = "a log is judged in the scenario it carries; only `terrain` replaces its ground"
 
 

@@ -24,10 +24,15 @@ from world.scenario import Scenario
 
 # Default folder of a front.
 FRONT_FOLDER = f"{RUN_FOLDER}-front"
+# Name and version of the format of front.json.
 TABLE_SCHEMA = "planfly.front/1"
+# Energy of one watt hour, J.
 WATT_HOUR = 3600.0
+# Columns of the table of a front.
 COLUMNS = ("plan", "length_m", "exposure_s", "clearance_m", "energy_wh", "time_s")
+# Files of the pictures of a front.
 PICTURES = ("front-map.png", "front-values.png")
+# All files of a front that planfly may write.
 FRONT_FILES = (
     *(f"plan-{number}.json" for number in range(1, int(RANGES["front"].high) + 1)),
     *("front.csv", "front.json", *PICTURES),

@@ -245,6 +245,7 @@ def _wide(found: Identified) -> tuple[WideNumber, ...]:
     return wide_numbers(sink, power, with_current=found.estimate.with_current)
 
 
+# Lower end, estimate and upper end (95 %).
 Interval = tuple[float, float, float]
 
 

@@ -18,6 +18,7 @@ from world.arrays import Floats
 # full covariance from many starts; "differential": differential evolution, which is not an EDA and is included for
 # comparison.
 Model = Literal["umda", "emna", "multistart", "differential"]
+# Optimiser class of each model.
 _MODELS = {"umda": Umda, "emna": Emna, "multistart": Multistart, "differential": DifferentialEvolution}
 
 

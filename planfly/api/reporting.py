@@ -25,6 +25,7 @@ from world.html_table import html_table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# Flight or plan to report.
 Source = FlightLog | FlownMission | Plan | str | Path
 
 

@@ -22,9 +22,12 @@ if TYPE_CHECKING:
     from flight.dynamics.characteristics import Mode, TrimRow
     from planfly import AircraftNumbers
 
+# Bank angles of the printed turn radii, degrees.
 _BANKS_DEG = (15.0, 20.0, 30.0, 40.0)
+# Course changes of the printed turns, degrees.
 _TURNS_DEG = (30.0, 45.0, 60.0, 90.0, 120.0)
-_SHEET = (
+# Keywords of the numbers of a data sheet.
+_DATA_SHEET_KEYWORDS = (
     *("mass", "span", "area", "cruise", "stall", "top", "bank", "climb"),
     *("battery", "motor", "prop", "layout", "fuel"),
 )
@@ -113,7 +116,7 @@ def aircraft(args: argparse.Namespace) -> int:
             raise PlanflyError.of_argument(name, getattr(args, name), "goes with `logs` LOG", shown="")
     if args.folder is not None:
         return _make_folder(args)
-    for name in _SHEET:
+    for name in _DATA_SHEET_KEYWORDS:
         if getattr(args, name) is not None:
             raise PlanflyError.of_argument(name, getattr(args, name), "goes with `folder` FOLDER", shown="")
     if args.source is not None:
@@ -152,7 +155,7 @@ def _make_folder(args: argparse.Namespace) -> int:
     made = call(planfly.new_aircraft, args)
     files = sorted(file.name for file in made.folder.iterdir())
     shown = folder if folder.is_absolute() else f"./{folder}"
-    sheet = any(getattr(args, name) is not None for name in (*_SHEET, "params"))
+    sheet = any(getattr(args, name) is not None for name in (*_DATA_SHEET_KEYWORDS, "params"))
     whose = "from a data sheet" if sheet else f"as {Path(args.source or 'aerosonde').name}"
     print(f"aircraft  {shown}/ ({', '.join(files)}), {whose}")
     if sheet:
@@ -169,7 +172,9 @@ def _identify(args: argparse.Namespace) -> int:
             said = "the folder to make" if name == "out" else "of the aircraft as it flew"
             raise PlanflyError(f"--identify needs --{name}, {said}", field=f"--{name}")
     given = [
-        name for name in _SHEET if name not in ("mass", "span", "area", "battery") and getattr(args, name) is not None
+        name
+        for name in _DATA_SHEET_KEYWORDS
+        if name not in ("mass", "span", "area", "battery") and getattr(args, name) is not None
     ]
     if given or args.name is not None or args.folder is not None:
         field = "name" if args.name is not None else f"--{given[0]}" if given else "--new"

@@ -17,7 +17,8 @@ from planfly.workflow.output_paths import RESULTS
 from world.errors import PlanflyError
 from world.interruption import Interrupted
 
-_EXITS = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "none asked": FLYABLE}
+# Exit code for each answer of a campaign.
+_EXIT_CODES = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "none asked": FLYABLE}
 
 
 def campaign_options(line: LineParser) -> None:
@@ -130,7 +131,7 @@ def campaign(args: argparse.Namespace) -> int:
     print("\n".join(campaign_lines(result.summary)))
     print(f"results   {folder}/ (report.html, summary.json, campaign.sqlite, worst/)")
     give_answer(args, lambda: (folder / "summary.json").read_text(encoding="utf-8"))
-    return _EXITS[result.answer]
+    return _EXIT_CODES[result.answer]
 
 
 def winds(args: argparse.Namespace) -> int:

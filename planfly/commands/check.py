@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from planfly import Judged, Verdict
     from planfly.terminal.verdict_answers import VerdictsDocument
 
+# Logs of other programs, as shown in the help.
 LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
 
 

@@ -1,7 +1,8 @@
 """List of the commands, from which the parser, the help, the schemas and the dispatch are made.
 
-A command is a module of this package with two functions: ``NAME_options`` adds its parser to the line, and ``NAME`` takes
-the parsed arguments, calls the API, prints, and returns the exit code.  The API compiles the kernels that it needs.
+A command is a module of this package with two functions: ``NAME_options`` adds its parser to the line, and ``NAME``
+takes the parsed arguments, calls the API, prints, and returns the exit code.  The API compiles the kernels that it
+needs.
 All modules are light: the code that a command needs is imported when the command runs.
 """
 
@@ -14,6 +15,7 @@ from typing import Any, NamedTuple
 from planfly._version import __version__
 from planfly.terminal.command_parser import LineParser
 
+# Function of a command: from parsed arguments to exit code.
 CommandFunction = Callable[[argparse.Namespace], int]
 
 
@@ -38,13 +40,15 @@ class Command(NamedTuple):
         return getattr(module, (self.function or self.name) + ending)
 
 
+# Section titles of the help.
 _FLY = "plan and fly"
 _LOOK = "judge and show"
-_OTHERS = "logs of autopilots"
-_MANY = "many flights"
+_AUTOPILOT_LOGS = "logs of autopilots"
+_MANY_FLIGHTS = "many flights"
 _AIRCRAFT = "aircraft, scenarios and terrain"
 _HELP = "help"
 
+# All commands, in the order of the help.
 COMMANDS = (
     Command("run", _FLY, "RunAnswer"),
     Command("plan", _FLY, "plan_answers.PlanDocument"),
@@ -59,11 +63,11 @@ COMMANDS = (
     Command("compare", _LOOK, "CompareAnswer"),
     Command("replay", _LOOK, "ReplayAnswer"),
     Command("recover", _LOOK, "RecoverAnswer"),
-    Command("import", _OTHERS, "ImportAnswer", "imported_logs", "import_log"),
-    Command("refly", _OTHERS, "ReflyAnswer", "imported_logs"),
-    Command("campaign", _MANY, "CampaignDocument", "campaigns"),
-    Command("winds", _MANY, "WindsDocument", "campaigns"),
-    Command("paper", _MANY, "PaperAnswer"),
+    Command("import", _AUTOPILOT_LOGS, "ImportAnswer", "imported_logs", "import_log"),
+    Command("refly", _AUTOPILOT_LOGS, "ReflyAnswer", "imported_logs"),
+    Command("campaign", _MANY_FLIGHTS, "CampaignDocument", "campaigns"),
+    Command("winds", _MANY_FLIGHTS, "WindsDocument", "campaigns"),
+    Command("paper", _MANY_FLIGHTS, "PaperAnswer"),
     Command("aircraft", _AIRCRAFT, "AircraftAnswer"),
     Command("scenarios", _AIRCRAFT, "ScenariosAnswer", "shell"),
     Command("new", _AIRCRAFT, "NewAnswer"),
@@ -111,7 +115,8 @@ def _named(name: str) -> Command:
 # ----------------------------------------------------------------------
 # JSON schemas of the answers of commands.
 
-_DRAFT = "https://json-schema.org/draft/2020-12/schema"
+# Identifier of JSON Schema, draft 2020-12.
+_JSON_SCHEMA_DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def answering_commands() -> list[str]:
@@ -133,7 +138,7 @@ def answer_schema(name: str) -> dict[str, Any]:
     module, _, answer = _named(name).answer.rpartition(".")
     beside = import_module(f"planfly.terminal.{module or 'answers'}")
     made = TypeAdapter(getattr(beside, answer)).json_schema(mode="serialization")
-    return {"$schema": _DRAFT, **made, "title": f"planfly {name} --json"}
+    return {"$schema": _JSON_SCHEMA_DRAFT, **made, "title": f"planfly {name} --json"}
 
 
 def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:

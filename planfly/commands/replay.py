@@ -29,11 +29,16 @@ if TYPE_CHECKING:
 
 # Frame rate on a terminal, Hz.
 _RATE = 10.0
-_ENTER = "\x1b[?1049h\x1b[?25l"
-_LEAVE = "\x1b[?25h\x1b[?1049l"
+# Terminal sequence: switch to the alternate screen and hide the cursor.
+_ENTER_SCREEN = "\x1b[?1049h\x1b[?25l"
+# Terminal sequence: show the cursor and leave the alternate screen.
+_LEAVE_SCREEN = "\x1b[?25h\x1b[?1049l"
+# Terminal sequence: move the cursor to the top left corner.
 _HOME = "\x1b[H"
-_TO_LINE_END = "\x1b[K"
-_TO_END = "\x1b[J"
+# Terminal sequence: erase to the end of the line.
+_ERASE_LINE_END = "\x1b[K"
+# Terminal sequence: erase to the end of the screen.
+_ERASE_SCREEN_END = "\x1b[J"
 
 
 def replay_options(line: LineParser) -> None:
@@ -143,12 +148,12 @@ def _show_instruments(log: "FlightLog", args: argparse.Namespace) -> None:
     """Show frames until the end or an interruption; the last one stays on the terminal."""
     speed, lines = args.speed or 1.0, list[str]()
     frames = call(planfly.replay, args, log=log, width=lambda: shutil.get_terminal_size().columns)
-    print(_ENTER, end="")
+    print(_ENTER_SCREEN, end="")
     try:
         for _, lines in frames:
             fitting = [*lines[: max(1, shutil.get_terminal_size().lines - 2)], f"x {speed:g}, Ctrl-C stops"]
-            text = "".join(line + _TO_LINE_END + "\n" for line in fitting)
-            print(_HOME + text + _TO_END, end="", flush=True)
+            text = "".join(line + _ERASE_LINE_END + "\n" for line in fitting)
+            print(_HOME + text + _ERASE_SCREEN_END, end="", flush=True)
     finally:
-        print(_LEAVE, end="", flush=True)
+        print(_LEAVE_SCREEN, end="", flush=True)
     print("\n".join(lines))

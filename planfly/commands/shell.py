@@ -11,7 +11,8 @@ from planfly.terminal.options import json_option
 from planfly.terminal.output import give_answer
 from world.files import did_you_mean
 
-_COMPLETION = """\
+# Help text on the installation of the completion.
+_COMPLETION_HELP = """\
 to complete in this shell, and in those to come:
   bash   eval "$(planfly completion bash)", in ~/.bashrc
   zsh    eval "$(planfly completion zsh)", in ~/.zshrc after compinit
@@ -28,7 +29,7 @@ def completion_options(line: LineParser) -> None:
         "print the script with which a shell completes planfly's commands, options and names",
         "planfly completion bash",
     )
-    parser.more = lambda: _COMPLETION
+    parser.more = lambda: _COMPLETION_HELP
     parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help="bash, zsh or fish")
 
 

@@ -25,7 +25,8 @@ from world.kernel_cache import VARIABLE, can_write
 PROCESSES = 2
 # Arguments of Python; -P leaves out the current folder, whose modules may have the names of ours.
 PROGRAM = ("-P", "-m", "planfly.kernel_units")
-_OVER = ""
+# Line that marks the end of the output of a process.
+_END_OF_OUTPUT = ""
 
 
 def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None]) -> None:
@@ -45,7 +46,7 @@ def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None
         over = 0
         while over < count:
             line = lines.get()
-            over += line == _OVER
+            over += line == _END_OF_OUTPUT
             word, _, name = line.partition(" ")
             if word == "ready" and name not in ready:
                 ready.add(name)
@@ -89,7 +90,7 @@ def _lead(helper: "subprocess.Popen[str]", waiting: "deque[str]", lines: "queue.
         with contextlib.suppress(OSError):
             if pipe is not None:
                 pipe.close()
-    lines.put(_OVER)
+    lines.put(_END_OF_OUTPUT)
 
 
 # ----------------------------------------------------------------------
@@ -100,8 +101,10 @@ _Given = TypeVar("_Given")
 
 # Title of the stage; a command may show it more than once, because each group is compiled at its first use.
 TITLE = "compiling numeric kernels"
+# End of the message on compiled kernels.
 KEPT = ", which later runs load"
-_WAY_OUT = f"{VARIABLE}=FOLDER names one that can"
+# Hint at the variable that names another cache folder.
+_CACHE_DIR_HINT = f"{VARIABLE}=FOLDER names one that can"
 # Units that this process has compiled or tried to compile.
 _shared: set[str] = set()
 
@@ -146,10 +149,10 @@ def _report_and_compile(units: list[str]) -> None:
 
     folder = cache_folder()
     if not can_write(folder):
-        say(f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them; {_WAY_OUT}")
+        say(f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them; {_CACHE_DIR_HINT}")
         return
     if TEMPORARY:
-        say(f"compiling the numeric kernels for this command alone: {WANTED} cannot be written; {_WAY_OUT}")
+        say(f"compiling the numeric kernels for this command alone: {WANTED} cannot be written; {_CACHE_DIR_HINT}")
     title = TITLE if TEMPORARY else TITLE + KEPT
     if not (units and sys.executable and is_received()):
         say(f"{title} ...")

@@ -26,6 +26,7 @@ class Receiver(NamedTuple):
     say: Callable[[str], None]
 
 
+# Receiver of the progress of the running work.
 _receiver: ContextVar[Receiver | None] = ContextVar("receiver", default=None)
 
 

@@ -142,13 +142,17 @@ def problems(text: str) -> tuple[int, ...]:
 # ----------------------------------------------------------------------
 # Completion of arguments by a shell; `argcomplete` asks for it, in a process that then ends.
 
+# Function that proposes values for the beginning of a word.
 Completer = Callable[..., Iterable[str]]
 # Environment variable that the script of a shell sets to ask for completions.
 ASKS_COMPLETION = "_ARGCOMPLETE"
+# Supported shells.
 SHELLS = ("bash", "zsh", "fish")
 # Root of the embedded files; importing their modules instead would load NumPy.
 _ROOT = Path(__file__).parents[2]
+# Suffixes of plans and mission files.
 MISSIONS = ("json", "waypoints", "plan", "txt")
+# Suffixes of the logs of other programs.
 IMPORTED_LOGS = ("BIN", "log", *(suffix[1:] for suffix in SUFFIXES))
 
 

@@ -8,6 +8,7 @@ from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
 from planfly.terminal.command_parser import coloured
 
+# Space between two columns.
 _GAP = "  "
 
 

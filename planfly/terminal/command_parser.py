@@ -14,6 +14,7 @@ from world.files import did_you_mean
 # ----------------------------------------------------------------------
 # Colour for terminals: off if the stream is not a terminal, with NO_COLOR and with TERM=dumb; on with FORCE_COLOR.
 
+# Meaning of a colour.
 Style = Literal["good", "bad", "warning", "hint"]
 # Colours of ECMA-48, "select graphic rendition": green, red, yellow and cyan.
 _STYLES: dict[Style, int] = {"good": 32, "bad": 31, "warning": 33, "hint": 36}
@@ -61,6 +62,7 @@ def coloured_help(text: str) -> str:
     return text
 
 
+# Long option as one word.
 _OPTION = re.compile(r"--[a-z][a-z-]*")
 
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from planfly import Verdict
 
+# Text on the exit codes for the help.
 EXIT_CODES = """\
 exit codes: 0 flyable, or flown as planned
             1 internal or system error

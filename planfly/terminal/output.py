@@ -396,7 +396,9 @@ def _ignore(*_: object) -> None:
     pass
 
 
+# Receiver that shows progress on standard error.
 ON_STANDARD_ERROR = Receiver(progress, _say)
+# Receiver that shows nothing.
 SILENT = Receiver(lambda *_: contextlib.nullcontext(_ignore), _ignore)
 
 
@@ -412,6 +414,7 @@ def answer_text(answer: object) -> str:
     return TypeAdapter(type(answer)).dump_json(answer, indent=1).decode() + "\n"
 
 
+# File name that stands for standard output.
 STANDARD_OUTPUT = "-"
 # Standard output of the running command while its printed lines are redirected.
 _output: ContextVar[TextIO | None] = ContextVar("output", default=None)

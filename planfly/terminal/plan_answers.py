@@ -72,6 +72,7 @@ class FrontAnswer:
     """What they are for."""
 
 
+# Answer of ``planfly plan``, without or with --front.
 PlanDocument = PlanAnswer | FrontAnswer
 
 

@@ -15,6 +15,7 @@ from typing import NoReturn
 from world.files import remove_temporary_folders
 from world.interruption import Interrupted, interrupt, remove_unfinished
 
+# Signals that end a command.
 ENDING = (signal.SIGINT, signal.SIGTERM)
 # Time from a signal to the forced end of the process if its command has not ended by itself, s, without the time that
 # the command waited for a processor.

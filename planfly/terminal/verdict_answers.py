@@ -7,6 +7,7 @@ from pydantic.dataclasses import dataclass
 
 from logs.verdict.document import VerdictDocument
 
+# Configuration of answers for pydantic.
 STRICT = ConfigDict(extra="forbid", use_attribute_docstrings=True, json_schema_serialization_defaults_required=True)
 
 
@@ -21,4 +22,5 @@ class VerdictsDocument:
     """By the name of the autopilot's law."""
 
 
+# Answer of ``planfly check``, without or with --for.
 CheckDocument = VerdictDocument | VerdictsDocument

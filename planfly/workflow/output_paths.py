@@ -10,6 +10,7 @@ RESULTS = Path("runs")
 # Default folder of a run as a pattern: {name} is the name of the scenario or mission, {seed} is the seed.
 RUN_FOLDER = "runs/{name}-seed{seed}"
 
+# Files of `planfly.run`.
 RUN_FILES = (
     "plan.json",
     "mission.waypoints",
@@ -27,9 +28,11 @@ RUN_FILES = (
     "envelope.png",
     "report.html",
 )
+# Names of the figures of a report.
 _FIGURES = ("map", "profile", "scene", "turns", "envelope")
 # Files of a report and a comparison, including figures as SVG.
 LOG_FIGURES = ("report.html", *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")))
+# Files of `planfly.compare`.
 COMPARE_FILES = (
     *(f"compare-{name}.{kind}" for kind in ("png", "svg") for name in ("map", "profile")),
     "compare.html",

@@ -27,6 +27,7 @@ from world.errors import StartError
 # Rules that are broken by an altitude error rather than by a cross-track error.
 _VERTICAL_RULES = ("clearance", "height", "bounds", "slope", "energy", "stall", "speed")
 
+# Function that flies with an autopilot and returns True if the flight passes.
 Passes = Callable[[Autopilot], bool]
 
 
@@ -101,6 +102,7 @@ class _ReferenceFlightsAborted(Exception):
     """Reference flights are aborted in a hurry."""
 
 
+# Function that returns True if reference flights should be aborted.
 Hurry = Callable[[], bool]
 
 

@@ -16,6 +16,7 @@ from logs.verdict.wording import threat_text
 from planner.evaluation.problem import CERTIFIED_ZONE_MARGIN
 from world.scenario import Scenario, from_spec
 
+# Content of a scenario file.
 Spec = dict[str, Any]
 
 # Added to the clearance by which a flight fell short, m.
@@ -31,6 +32,7 @@ MIN_BANK_DEG = 5.0
 # Remark on a round that is followed by another.
 GO_ON = "tightened and planned again"
 
+# Keys of the numbers that can be tightened.
 Tightened = Literal[
     "max_climb_deg",
     "max_dive_deg",
@@ -184,7 +186,9 @@ def _distances(item: Finding) -> list[Change]:
     return [change for suggestion in item.suggestions for change in suggestion if change.what == "distance"]
 
 
+# Changes and results of each round.
 Rounds = list[dict[str, Any]]
+# Function that plans and flies one round.
 OneRound = Callable[[Scenario], tuple[Verdict, bool]]
 
 
