@@ -163,7 +163,7 @@ _Given = TypeVar("_Given")
 
 
 def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
-    """Show the options of ``**options: Unpack[...]`` in a function's signature, fill in defaults, refuse other names.
+    """Show options of ``Unpack[...]`` in a function's signature, fill in defaults, refuse other names.
 
     >>> @takes_options
     ... def fly(mission: str, **options: Unpack[MissionOptions]) -> object:

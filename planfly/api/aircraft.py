@@ -66,7 +66,7 @@ def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
 
 
 class DataSheetOptions(TypedDict, total=False):
-    """The numbers of an aircraft's data sheet, and a file of its autopilot's parameters; see `new_aircraft`."""
+    """Numbers of the data sheet of an aircraft, and a file of autopilot parameters; see `new_aircraft`."""
 
     mass: float | None
     span: float | None

@@ -1,4 +1,4 @@
-"""Probability that a mission flies, and its largest wind from each direction, from many varied flights."""
+"""Probability that a mission flies, and its largest wind from each direction, by many flights."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -72,7 +72,7 @@ def _open(
 
 
 def _line_of(target: Plan | str | Path, folder: Path) -> str:
-    """Return the target for the command line that repeats a campaign; a plan is in the folder of the campaign."""
+    """Return the target for the command line that repeats a campaign; a plan is in the campaign's folder."""
     return str(folder / "plan.json") if isinstance(target, Plan) else str(target)
 
 
@@ -82,7 +82,10 @@ def _repeated(base: CampaignBase, options: MissionOptions, spread: str | Path | 
 
 
 def _workers(count: int | None, scheduler: str | None, seed: int | None) -> Workers:
-    """Return the workers.  Raises PlanflyError, before anything is planned, for a scheduler that may not be used."""
+    """Return the workers.
+
+    Raises PlanflyError, before anything is planned, for a scheduler that may not be used.
+    """
     check_arguments(workers=count, seed=seed)
     if scheduler is not None:
         checked_address(scheduler)
@@ -122,7 +125,7 @@ def campaign(
     overwrite: bool = False,
     **options: Unpack[CampaignOptions],
 ) -> CampaignResult:
-    """Fly a mission many times as `planfly.fly` does, each time with another wind, aircraft, terrain and start.
+    """Fly a mission many times as `planfly.fly` does, with varied wind, aircraft, terrain and start.
 
     target: an embedded scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
     spread: a TOML file of what varies; None takes planfly's default.

@@ -88,7 +88,7 @@ def _box(given: Sequence[float]) -> Box:
 
 
 def _around(file: Path) -> Box:
-    """Return the box of all places of a mission: its items, home, fences and rally points.  Raises PlanflyError."""
+    """Return the box of all items, home, fences and rally points of a mission.  Raises PlanflyError."""
     mission = read_mission(file)
     places = [
         (one.lat_deg, one.lon_deg) for one in (*mission.items, *mission.fences, *mission.rally) if one.has_position

@@ -201,7 +201,7 @@ def _read_log(path: Path, *, coloured: bool) -> _Source:
 
 
 def _read_mission(path: Path, options: MissionOptions, *, placed: bool, coloured: bool) -> _Source:
-    """Read a plan or a mission file; place it in its world if maps, parameters, zones or a plan's fence need it."""
+    """Read a plan or a mission file, and place it in its world if the targets or a plan's fence need it."""
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
@@ -270,7 +270,10 @@ def judged_parameters(mission: str, autopilot: Autopilot) -> tuple[str, str]:
 
 
 def _flown_text(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
-    """Return the rows of a flight in the format of another program, and a description; import libraries on use."""
+    """Return the rows of a flight in the format of another program, and a description.
+
+    Each format imports only the libraries that it needs.
+    """
     content = f"{len(log.track):,} rows, {log.end_time:.0f} s"
     if suffix == ".tlog":
         need_extra("live", ".tlog needs")

@@ -224,7 +224,7 @@ def fly(
 def fly_by_each(
     mission: Plan | str | Path, autopilots: Sequence[str], **options: Unpack[MissionOptions]
 ) -> dict[str, FlownMission]:
-    """Fly a mission by the laws of several autopilots, each with its default parameters, and judge each flight.
+    """Fly a mission by the laws of several autopilots with default parameters, and judge each flight.
 
     autopilots: names, as `autopilot_law` of `planfly.fly` takes them.
     options: as of `planfly.fly`, except `autopilot_law`, `params` and `guidance`.
@@ -270,7 +270,7 @@ def _log_target(
 def judge(
     what: FlightLog | FlownMission | Plan | str | Path, *, geometry: bool = False, **options: Unpack[LogOptions]
 ) -> Judged:
-    """Judge a flight by its log, or fly a plan or a mission and judge it; return the verdict and the flight.
+    """Judge a flight log, or fly and judge a plan or a mission; return the verdict and the flight.
 
     what: a flight log or its path, an autopilot's log, a result of `planfly.fly`, a `Plan`, or the path of a plan.json,
     .waypoints or .plan.

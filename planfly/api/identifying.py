@@ -155,7 +155,7 @@ def _base(base: str | Path) -> Aircraft:
 
 
 def _check_stated(stated: dict[str, float], prior: Aircraft) -> None:
-    """Refuse numbers outside the range of small aircraft, and a base of another class.  Raises FlightError."""
+    """Raise FlightError for numbers outside the range of small aircraft, and for a base of another class."""
     for name, value in stated.items():
         low, high, unit = _RANGES[name]
         if isinstance(value, bool) or not low <= value <= high:

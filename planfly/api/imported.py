@@ -1,4 +1,4 @@
-"""Import and judge the flight logs of other programs, fly their missions again, and recover damaged logs."""
+"""Import and judge flight logs of other programs, fly their missions again, recover damaged logs."""
 
 import tempfile
 from dataclasses import dataclass, replace
@@ -58,7 +58,7 @@ def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFli
 def import_log(
     log: str | Path, target: str | Path | None = None, *, overwrite: bool = False, **options: Unpack[LogOptions]
 ) -> ImportedFlight:
-    """Read a flight from the log of another program, judge it against its plan, and write it as a flight log.
+    """Read a flight from another program's log, judge it against its plan, and write it as a flight log.
 
     log: of ArduPilot (.BIN, .log), a ground station (.tlog), PX4 (.ulg), or a track (.gpx, .igc, .kml, .kmz).
     target: the flight log to write, as MCAP; None writes none.  overwrite: True replaces an existing log.

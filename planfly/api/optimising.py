@@ -1,4 +1,4 @@
-"""Ask/tell interface to the planner's estimation of distribution algorithms, for any bounded black box."""
+"""Ask/tell interface to the planner's estimation of distribution algorithms, for any black box."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

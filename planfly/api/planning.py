@@ -122,7 +122,10 @@ def _planned(
     out: str | Path | None,
     overwrite: bool,
 ) -> Plan:
-    """Search, and write the plan.  flown: the plan being flown and the leg to plan from; None for a new plan."""
+    """Search, and write the plan.
+
+    flown: the plan being flown and the leg to plan from; None for a new plan.
+    """
     number, target = choose_seed(world, options["seed"]), None
     if out is not None:
         read = None if isinstance(source, Scenario) else Path(source)

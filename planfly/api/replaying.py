@@ -1,4 +1,4 @@
-"""Replay a recorded flight: as a timeline, as instruments, as a film, in Foxglove and in ground stations."""
+"""Replay a recorded flight as a timeline, instruments or a film, in Foxglove or in ground stations."""
 
 import math
 import re
@@ -87,7 +87,7 @@ def replay(
     speed: float | None = None,
     width: int | Callable[[], int] = 80,
 ) -> Iterator[tuple[float, list[str]]]:
-    """Play a flight in real time, as the command does on a terminal: ten times a second, and once at its end.
+    """Play a flight in real time, as the command does: ten times a second, and once at its end.
 
     start, end: of the part that is played, s of the flight; None for all of it.  speed: times real time, 1 if None.
     width: of the lines, in characters, at least 60, or a function that returns it for each frame.
@@ -218,7 +218,7 @@ def play_to_stations(
     stop: Callable[[], bool] = _never,
     on_message: Callable[[str], None] = _ignore,
 ) -> None:
-    """Play a flight into MAVLink ground stations, as if it were flown now; needs the extra ``planfly[live]``.
+    """Play a flight into MAVLink ground stations as if it were flown now; needs ``planfly[live]``.
 
     to: addresses of the stations, IP:PORT, one or several.  bind, allow, sign_key: as of `planfly.serve`.
     speed: times real time, 1 if None.  wait: time to wait for the first station, s; 10 if None.

@@ -47,7 +47,7 @@ class WrittenReport:
 
 
 class _Shown(NamedTuple):
-    """Content of pictures and pages; versions of the packages that flew it, None for the installed packages."""
+    """Content of pictures and pages, and package versions of the flight, None for the installed ones."""
 
     setup: FlightSetup
     verdict: Verdict

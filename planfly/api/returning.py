@@ -1,4 +1,4 @@
-"""Judge the returns to launch from every place on a mission, a plan or a flight, with and without engine."""
+"""Judge returns to launch from every place on a mission, plan or flight, with and without engine."""
 
 import shutil
 from dataclasses import dataclass, replace
@@ -105,7 +105,7 @@ class ReturnsFound:
 
     @property
     def lines_of_program(self) -> tuple[str, ...]:
-        """Outcomes of the worst returns by the ArduPlane program and by the control law; empty if it flew none."""
+        """Outcomes of the worst returns by the ArduPlane program and by the law; empty if it flew none."""
         if self.by_program is None:
             return ()
         return (self.by_program.headline(), *self.by_program.lines(self.returns, self.setup.scenario))
@@ -177,7 +177,7 @@ def returns(
     overwrite: bool = True,
     **options: Unpack[LogOptions],
 ) -> ReturnsFound:
-    """Fly and judge the return to launch from every place on a flight, and find the places in gliding range.
+    """Fly and judge returns to launch from every place on a flight, and find places in gliding range.
 
     what: a `Plan`, the path of a plan.json, .waypoints or .plan, which is flown first; or a flight: a result of
     `planfly.fly`, a flight log or its path, or an autopilot's log.
@@ -235,7 +235,10 @@ class _Asked(NamedTuple):
 def _asked(
     every: float, suggest: bool, out: str | Path | None, autopilot: str | Path | None, points: int, *, overwrite: bool
 ) -> _Asked:
-    """Check a request.  Raises PlanflyError for a folder that is a file or is not empty, and for a wrong program."""
+    """Check a request.
+
+    Raises PlanflyError for a folder that is a file or is not empty, and for a wrong program.
+    """
     program = named_program(autopilot)
     if program is not None:
         refuse_program(program)

@@ -177,7 +177,10 @@ def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
 def _rounds(
     task: _Task, refine: int, held: contextlib.ExitStack, on_round: Callable[[Round], None] | None
 ) -> RunResult:
-    """Plan and fly until a round flies or no round is left.  held: keeps the folder from the first plan on."""
+    """Plan and fly until a round flies or no round is left.
+
+    held: keeps the folder from the first plan on.
+    """
     scenario, airframe, folder = task.scenario, task.airframe, task.folder
     flown: list[Round] = []
 

@@ -179,7 +179,10 @@ def _camera(numbers: tuple[float, ...] | None) -> Camera | None:
 
 
 def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
-    """Return a setup with a camera for its surveys; overlaps not given with the camera are taken from the mission."""
+    """Return a setup with a camera for its surveys.
+
+    Overlaps that are not given with the camera are taken from the mission.
+    """
     if camera is None:
         return setup
     plans = []

@@ -169,7 +169,7 @@ def _refly(args: argparse.Namespace, folder: Path) -> int:
 
 @contextmanager
 def _kept_flights(folder: Path, table: str) -> Iterator[Callable[[], int]]:
-    """Report the flights kept after an interruption; yield a function that returns the exit code, 0 without one.
+    """Report the flights kept after an interruption; yield a function that returns the exit code.
 
     An interruption before the table exists is raised again.
     """

@@ -1,4 +1,4 @@
-"""``planfly import`` and ``planfly refly``: import the log of another program, and fly its mission in JSBSim."""
+"""``planfly import`` and ``planfly refly``: import another program's log, and fly its mission again."""
 
 import argparse
 from pathlib import Path

@@ -125,7 +125,7 @@ def answering_commands() -> list[str]:
 
 
 def answer_schema(name: str) -> dict[str, Any]:
-    """Return the JSON schema, draft 2020-12, of the answer of a command.  Raises KeyError for a command without one.
+    """Return the JSON schema, draft 2020-12, of a command's answer; raise KeyError without an answer.
 
     >>> sorted(answer_schema("scenarios")["properties"])
     ['exit_code', 'scenarios', 'schema']

@@ -96,7 +96,7 @@ def replay_options(line: LineParser) -> None:
 
 
 def replay(args: argparse.Namespace) -> int:
-    """Show instruments on a terminal, else the timeline, or as the options say; return 3 for an incomplete log."""
+    """Show instruments, the timeline or the output of the options; return 3 for an incomplete log."""
     stations = isinstance(args.to, str)
     if bool(args.foxglove) + bool(args.movie) + stations > 1:
         options = "--foxglove, --movie, --to IP:PORT"

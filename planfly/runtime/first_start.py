@@ -1,4 +1,4 @@
-"""Compile kernels at the first start after an install: in two processes, with progress, before the work begins."""
+"""Compile kernels at the first start after an install, in two processes, before the work begins."""
 
 import contextlib
 import functools
@@ -111,7 +111,7 @@ _shared: set[str] = set()
 
 @contextmanager
 def warm_up(*units: str) -> Iterator[None]:
-    """Compile the kernels of units when the work inside first needs one that is not cached, and report it once.
+    """Compile all kernels of units when the work inside first needs one that is not cached.
 
     units: units of `planfly.kernel_units` that the work will call, longest first.  They are compiled in two processes
     before the work continues; if the cache cannot be written, each kernel is compiled when it is called.

@@ -1,4 +1,7 @@
-"""Answers of the commands with ``--json``.  Paths are as the command names them; numbers carry their unit."""
+"""Answers of the commands with ``--json``.
+
+Paths are as the command names them; numbers carry their unit.
+"""
 
 import math
 from typing import Any, Literal

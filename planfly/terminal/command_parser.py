@@ -21,7 +21,7 @@ _STYLES: dict[Style, int] = {"good": 32, "bad": 31, "warning": 33, "hint": 36}
 
 
 def wants_colour(stream: TextIO) -> bool:
-    """Return True if a stream is shown in colour.  NO_COLOR overrides FORCE_COLOR; empty values are ignored.
+    """Return True if a stream is shown in colour; NO_COLOR overrides FORCE_COLOR; empty ones are ignored.
 
     >>> import io
     >>> wants_colour(io.StringIO())

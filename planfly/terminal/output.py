@@ -1,4 +1,4 @@
-"""Output of a command: standard output that survives a closed pipe, progress on standard error, and the answer."""
+"""Output of a command: standard output, which survives a closed pipe, progress and the answer."""
 
 import argparse
 import contextlib
@@ -293,7 +293,10 @@ def _states_time_left(remark: str) -> bool:
 
 
 class _Bar:
-    """Progress bar of a stage on a terminal, with the estimate from the previous run until this run is measured."""
+    """Progress bar of a stage on a terminal.
+
+    It shows the estimate from the previous run until this run is measured.
+    """
 
     def __init__(self, title: str, left: _TimeLeft) -> None:
         from tqdm import tqdm
@@ -336,7 +339,7 @@ class _Bar:
 
 
 class _Lines:
-    """Progress lines of a stage without a terminal: one at its begin, some at intervals, and one at its end.
+    """Progress lines of a stage without a terminal: one at the start, some at intervals, one at the end.
 
     Input that is refused within the first second gets no line.
     """
@@ -422,7 +425,7 @@ _output: ContextVar[TextIO | None] = ContextVar("output", default=None)
 
 @contextlib.contextmanager
 def asked_output(args: argparse.Namespace) -> Iterator[None]:
-    """Print the lines of a command as its options say: nowhere, or not on standard output if the answer goes there.
+    """Redirect printed lines: to nowhere with --quiet, to standard error if stdout gets the answer.
 
     Raises PlanflyError if the file for the answer exists, or is one that the command reads.
     """

@@ -29,7 +29,7 @@ class CauseEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ReturnEntry:
-    """A range of seconds whose returns have the same target and outcome; the numbers are of the worst return."""
+    """Range of seconds whose returns have the same target and outcome; numbers are of the worst return."""
 
     first_s: float
     last_s: float
@@ -116,7 +116,7 @@ class ByProgram:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class GlideEntry:
-    """A range of seconds with the same reachable place without the engine; the numbers are of the least margin."""
+    """Range of seconds with the same reachable place without engine; numbers are of the least margin."""
 
     first_s: float
     last_s: float

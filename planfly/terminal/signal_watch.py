@@ -80,7 +80,7 @@ def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
 
 
 def _called_by_compiled_code(frame: FrameType | None) -> bool:
-    """Return True if Numba runs here: it compiles, reads a kernel from its cache, or boxes a kernel's results.
+    """Return True if Numba runs here: it compiles, reads a cached kernel, or boxes a kernel's results.
 
     If an exception interrupts one of these, compiled code continues with a null pointer, and the process crashes.  A
     result that is a named tuple is made by a module named after its class.
@@ -122,7 +122,7 @@ def _watch(read: Callable[[int], bytes], heard: list[int], grace: float) -> None
 
 
 def _waited_for_processor() -> float:
-    """Return the total time that the main thread has waited for a processor, s; 0 on systems other than Linux."""
+    """Return the total time the main thread has waited for a processor, s; 0 on systems but Linux."""
     try:
         return int(Path("/proc/self/schedstat").read_text(encoding="ascii").split()[1]) * 1e-9
     except (OSError, IndexError, ValueError):

@@ -43,7 +43,7 @@ class Airframe:
 
 
 def laid_from_the_ground(plan: Plan, airframe: Airframe, flown: Plan | None = None) -> Plan:
-    """Return a plan with the departure and approach that its scenario requires, or the plan itself without any.
+    """Return a plan with the departure and approach that its scenario requires, if any.
 
     flown: the plan being flown, whose departure stays.
 
@@ -123,7 +123,7 @@ def with_tracking(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> L
 
 
 def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
-    """Return the aircraft of a scenario, and the energy it carries, Wh.  Raises ScenarioError for an unknown aircraft.
+    """Return the aircraft of a scenario and its energy, Wh; raise ScenarioError for an unknown aircraft.
 
     >>> from world.scenario import load_scenario
     >>> find_airframe(load_scenario("tight"))[0].name
@@ -139,7 +139,7 @@ def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
 
 
 def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot) -> float:
-    """Return the initial cruise airspeed, m/s, stated by (in this order) scenario, parameter file, or aircraft.
+    """Return the initial cruise airspeed, m/s, from (in order) scenario, parameter file, aircraft.
 
     Raises ScenarioError for an airspeed that the aircraft cannot fly.
     """

@@ -1,4 +1,4 @@
-"""Import the logs of other programs: judge them in their scenario, mission and wind, and fly them again."""
+"""Import logs of other programs, judge them in their scenario, mission and wind, fly them again."""
 
 import hashlib
 import math

@@ -77,7 +77,7 @@ def _terrain(options: MissionOptions) -> str | None:
 
 
 def existing_mission(path: Path) -> Path:
-    """Return the path of a file that exists.  Raises MissionError, with the most similar name in the folder."""
+    """Return the path of an existing file, or raise MissionError with the most similar name."""
     if not path.is_file():
         near = did_you_mean(path.name, _mission_names(path.parent))
         raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected{near}", file=path)

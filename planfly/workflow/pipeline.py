@@ -175,7 +175,10 @@ class _Task:
 
 
 def _predicted_energy_ratio(requirements: RouteRequirements) -> float:
-    """Return the predicted ratio of energy needed to energy carried; 0 if full power throughout needs less than 2."""
+    """Return the predicted ratio of energy needed to energy carried.
+
+    0 if full power throughout needs less than `MAX_ENERGY_RATIO` times the energy carried.
+    """
     setup = requirements.setup
     seconds, full = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full
     full_energy = float(np.nanmax(full, initial=0.0)) * seconds / 3600.0
@@ -225,7 +228,7 @@ def _record_and_judge(task: _Task, requirements: RouteRequirements, flight: Airb
 
 
 def _fly(task: _Task, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
-    """Fly to the end or until the log is full; record and report each block.  Return the track and how it ended."""
+    """Fly to the end or until the log is full, record each block, and return the track and the end."""
     blocks, ended, length = list[FlightBlock](), "", flight.path.length
     for block in simulate(flight):
         blocks.append(block)

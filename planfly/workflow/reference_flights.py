@@ -32,7 +32,7 @@ Passes = Callable[[Autopilot], bool]
 
 
 def deciding_parameter(autopilot: Autopilot, findings: tuple[Finding, ...], passes: Passes) -> DecidingParameter | None:
-    """Return the first candidate parameter with a passing value, and the nearest such value; None without any.
+    """Return the first candidate parameter with a passing value, and the nearest such value, or None.
 
     findings: of the flight that failed.
     passes: flies the law with other parameters and returns True if that flight passes; called about ten times.
@@ -195,7 +195,7 @@ def judge_with_reference_flights(
     fly: FlyReference = "failed",
     hurry: Hurry = _never,
 ) -> tuple[Verdict, ReferenceFlights | None]:
-    """Judge a flight, and fly reference flights that explain its verdict; they do not decide whether it is flyable.
+    """Judge a flight, with reference flights that explain the verdict but do not decide it.
 
     requirements: the route requirements of the setup that was flown.  track, ended: the flight and its end.
     fly: cases in which reference flights are flown: "failed" if a finding of the flight fails, "always" also if all
