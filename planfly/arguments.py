@@ -147,8 +147,8 @@ def is_place(lat: float, lon: float) -> bool:
 def is_camera(numbers: Sequence[float]) -> bool:
     """Return True if numbers are valid for a camera: sensor size, focal length and overlaps.
 
-    The sensor size is across and along the track, mm; the focal length in mm; the overlaps, with the next photo and with
-    the next line, in percent.
+    The sensor size is across and along the track, mm; the focal length in mm; the overlaps, with the next photo and
+    with the next line, in percent.
 
     >>> is_camera((23.5, 15.6, 16.0)), is_camera((23.5, 15.6, 16.0, 75.0, 60.0)), is_camera((23.5, 15.6, 0.0))
     (True, True, False)

@@ -180,9 +180,10 @@ def _refuse_equal(logs: Sequence[MotionLog]) -> None:
 
 
 def _stretches(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
-    """Return the stretches and outputs of a log; outputs that match the base are rigged as in the base.
+    """Return the flight records of a log, and the servo outputs of the aircraft.
 
-    Outputs of PX4, and elevons, which are mixed within the model, keep the outputs of the base.
+    The outputs are the base's own if they all match the outputs of the log, otherwise the outputs of the log.  With
+    PX4, and with elevons, which are mixed within the model, they are the base's own.
     """
     file = prior.folder / "ardupilot.toml"
     own = read_servos(file) if file.is_file() else {}

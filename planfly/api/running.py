@@ -239,7 +239,7 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
             limits=task.limits,
         )
     write_whole(folder / "verdict.json", verdict_json(flown.verdict))
-    beside = flown.returns or return_summary(flown.setup, flown.track)
+    summary = flown.returns or return_summary(flown.setup, flown.track)
     with stage("drawing", "drawing a report"):
         write_report(
             folder,
@@ -250,12 +250,12 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
             versions=package_versions(),
             command=task.command,
             events=flown.events,
-            returns=beside.drawn(),
+            returns=summary.drawn(),
         )
     notes = (*setup.scenario.notes, *setup.notes)
     has_log = len(flown.track) > 0
     return Round(
-        number, (), flown.verdict, flown=True, folder=folder, notes=notes, has_log=has_log, returns_line=beside.line
+        number, (), flown.verdict, flown=True, folder=folder, notes=notes, has_log=has_log, returns_line=summary.line
     )
 
 

@@ -136,8 +136,8 @@ def answer_schema(name: str) -> dict[str, Any]:
     if name not in answering_commands():
         raise KeyError(name)
     module, _, answer = _named(name).answer.rpartition(".")
-    beside = import_module(f"planfly.terminal.{module or 'answers'}")
-    made = TypeAdapter(getattr(beside, answer)).json_schema(mode="serialization")
+    answers = import_module(f"planfly.terminal.{module or 'answers'}")
+    made = TypeAdapter(getattr(answers, answer)).json_schema(mode="serialization")
     return {"$schema": _JSON_SCHEMA_DRAFT, **made, "title": f"planfly {name} --json"}
 
 

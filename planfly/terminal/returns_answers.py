@@ -116,7 +116,7 @@ class ByProgram:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class GlideEntry:
-    """Range of seconds with the same reachable place without engine; numbers are of the least margin."""
+    """Range of seconds with the same reachable place without engine; numbers are of the least height."""
 
     first_s: float
     last_s: float

@@ -92,9 +92,9 @@ def _with_ground_phases(plan: Plan, airframe: Airframe, old: Plan | None = None,
     if onward or not airframe.autopilot.loiter_rules.ends_in_circle:
         return plan
     setup = make_setup(plan.scenario, airframe, mission_of_plan(plan, airframe), plan.seed, plan=plan)
-    beside = end_loiter_hazards(route_requirements(setup))
-    if beside is None or not beside[1]:
+    hazards = end_loiter_hazards(route_requirements(setup))
+    if hazards is None or not hazards[1]:
         return plan
-    circles = f"{airframe.autopilot.title} circles about the destination, up to {beside[0]:.0f} m from it"
-    problems = (*plan.certificate.problems, f"{circles}: {', '.join(beside[1])}")
+    circles = f"{airframe.autopilot.title} circles about the destination, up to {hazards[0]:.0f} m from it"
+    problems = (*plan.certificate.problems, f"{circles}: {', '.join(hazards[1])}")
     return replace(plan, certificate=replace(plan.certificate, problems=problems))

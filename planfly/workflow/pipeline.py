@@ -221,10 +221,10 @@ def _record_and_judge(task: _Task, requirements: RouteRequirements, flight: Airb
         judged = _judged(task, requirements, thin_track(track, task.every), recorder.ended)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
-        beside = return_summary(flight.setup, judged.track) if task.returns else None
-        drawn = None if beside is None else beside.draw_returns_without_glides()
+        summary = return_summary(flight.setup, judged.track) if task.returns else None
+        drawn = None if summary is None else summary.draw_returns_without_glides()
         recorder.finish(judged.ended, judged.verdict, judged.reference, drawn)
-    return replace(judged, returns=beside)
+    return replace(judged, returns=summary)
 
 
 def _fly(task: _Task, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:

@@ -93,8 +93,8 @@ def _deviation_at_failure(failed: Finding, findings: tuple[Finding, ...]) -> flo
         return failed.flown
     if failed.place.kind != "leg" or failed.rule not in ("clearance", "height"):
         return None
-    beside = [item for item in findings if item.rule == "slope" and item.place == failed.place]
-    errors = [fact.value for item in beside for fact in item.facts if fact.what == "height error"]
+    slopes = [item for item in findings if item.rule == "slope" and item.place == failed.place]
+    errors = [fact.value for item in slopes for fact in item.facts if fact.what == "height error"]
     return errors[0] if errors else None
 
 
