@@ -1,4 +1,4 @@
-"""The numbers and words that a call may be given: one table for the API's keywords and the command line's options."""
+"""Allowed numbers and words of arguments: one table for keywords of the API and command-line options."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -8,10 +8,10 @@ from world.errors import ArgumentError
 
 
 class Range(NamedTuple):
-    """The values of a number.
+    """Range of allowed values of a number.
 
     low, high: both allowed, unless `above` excludes low or `below` excludes high.
-    expected: what the error says.  integer: whether only whole numbers are allowed.
+    expected: text of the error.  integer: True if only whole numbers are allowed.
     """
 
     low: float
@@ -22,7 +22,7 @@ class Range(NamedTuple):
     below: bool = False
 
     def allows(self, value: Any) -> bool:
-        """Return True if a value is a number in the range; a truth value is none.
+        """Return True if a value is a number in the range; True and False are not numbers.
 
         >>> Range(0, 20, "a whole number", integer=True).allows(3), Range(0, 1, "a share").allows(float("nan"))
         (True, False)
@@ -37,12 +37,16 @@ class Range(NamedTuple):
         return inside and not (self.above and number == self.low) and not (self.below and number == self.high)
 
 
-_SECONDS = Range(0.0, 1e7, "seconds, from 0 to 10,000,000, are expected")
-_POSITIVE = Range(0.0, 1e6, "a number above 0, up to 1,000,000, is expected", above=True)
-_COUNT = Range(1, 1000, "a whole number from 1 to 1,000 is expected", integer=True)
+# Range of times, s.
+_TIME_RANGE_S = Range(0.0, 1e7, "seconds, from 0 to 10,000,000, are expected")
+# Range of positive numbers.
+_POSITIVE_RANGE = Range(0.0, 1e6, "a number above 0, up to 1,000,000, is expected", above=True)
+# Range of numbers of items.
+_COUNT_RANGE = Range(1, 1000, "a whole number from 1 to 1,000 is expected", integer=True)
+# Range of probabilities to prove.
 _SHARE = Range(0.5, 1.0, "at least 0.5 and below 1 is expected", below=True)
 
-# By keyword.  What a scenario file bounds, too (wind, turbulence, airspeed, laws), is refused as there.
+# Ranges by keyword.  Values that a scenario file also bounds (wind, turbulence, airspeed, laws) are checked there.
 RANGES: Mapping[str, Range] = {
     "seed": Range(0, 2**63 - 1, "a whole number from 0 to 2^63 - 1 is expected", integer=True),
     "refine": Range(0, 20, "a whole number from 0 to 20 is expected", integer=True),
@@ -50,19 +54,19 @@ RANGES: Mapping[str, Range] = {
     "seconds": Range(0.0, 1e6, "a number of seconds above 0, up to 1,000,000, is expected", above=True),
     "front": Range(2, 100, "a whole number of plans, 2 to 100, is expected", integer=True),
     "at_leg": Range(0, 10_000, "a leg's number is expected, from 0", integer=True),
-    "airspeed": _POSITIVE,
-    "max_hours": _POSITIVE,
-    "max_log": _POSITIVE,
-    "speed": _POSITIVE,
+    "airspeed": _POSITIVE_RANGE,
+    "max_hours": _POSITIVE_RANGE,
+    "max_log": _POSITIVE_RANGE,
+    "speed": _POSITIVE_RANGE,
     "served_speed": Range(0.1, 100.0, "a number from 0.1 to 100 is expected"),
-    "wait": _POSITIVE,
-    "start": _SECONDS,
-    "end": _SECONDS,
+    "wait": _POSITIVE_RANGE,
+    "start": _TIME_RANGE_S,
+    "end": _TIME_RANGE_S,
     "port": Range(0, 65535, "a port, 0..65535, is expected", integer=True),
-    "flight": _COUNT,
-    "runs": _COUNT,
-    "jobs": _COUNT,
-    "workers": _COUNT,
+    "flight": _COUNT_RANGE,
+    "runs": _COUNT_RANGE,
+    "jobs": _COUNT_RANGE,
+    "workers": _COUNT_RANGE,
     "prove": _SHARE,
     "at_least": _SHARE,
     "confidence": _SHARE,
@@ -75,6 +79,7 @@ RANGES: Mapping[str, Range] = {
     "margin": Range(0.0, 100.0, "km, from 0 to 100, are expected"),
     "height": Range(1.0, 5000.0, "m above ground, from 1 to 5,000, are expected"),
 }
+# Allowed words by keyword.
 CHOICES: Mapping[str, tuple[Any, ...]] = {
     "turbulence": ("none", "light", "moderate"),
     "guidance": ("path", "l1", "vector-field"),
@@ -87,7 +92,7 @@ CHOICES: Mapping[str, tuple[Any, ...]] = {
 
 
 def check_arguments(**given: Any) -> None:
-    """Refuse the first number or word that is not in its range; None is not given.
+    """Refuse the first number or word that is outside its range; None means not given.
 
     given: by the name in `RANGES` or `CHOICES`.  Raises ArgumentError.
 
@@ -108,21 +113,21 @@ def check_arguments(**given: Any) -> None:
             continue
         else:
             allowed = RANGES[name].expected
-        raise ArgumentError.of_argument(_KEYWORDS.get(name, name), value, allowed)
+        raise ArgumentError.of_argument(_SHARED_KEYWORDS.get(name, name), value, allowed)
 
 
-# Where one keyword has another range in another call.
-_KEYWORDS = {"served_speed": "speed", "front": "count"}
+# Keywords of entries in `RANGES` for calls in which the same keyword has another range.
+_SHARED_KEYWORDS = {"served_speed": "speed", "front": "count"}
 
 
-# mm.  The largest side of a sensor, across the way and along it, and the longest focal length.
-_MILLIMETRES = (1000.0, 1000.0, 10_000.0)
-# What a camera is, in messages.
+# Largest sensor size across and along the track, and longest focal length, mm.
+_MAX_CAMERA_SIZES_MM = (1000.0, 1000.0, 10_000.0)
+# Description of the numbers of a camera, in messages.
 CAMERA = "the sensor across the way and along it and the focal length, mm, and maybe overlaps along and across, %"
 
 
 def is_wind(speed: float, from_deg: float) -> bool:
-    """Return True if a steady wind can be flown in: m/s, and degrees that it blows from.
+    """Return True if a steady wind is allowed: speed, m/s, and the direction it comes from, degrees.
 
     >>> is_wind(8.0, 270.0), is_wind(float("nan"), 0.0)
     (True, False)
@@ -131,7 +136,7 @@ def is_wind(speed: float, from_deg: float) -> bool:
 
 
 def is_place(lat: float, lon: float) -> bool:
-    """Return True if there is such a latitude and longitude, degrees, where planfly draws maps.
+    """Return True if a latitude and longitude, degrees, are valid and within the area of planfly's maps.
 
     >>> is_place(-33.9, 18.4), is_place(91.0, 0.0)
     (True, False)
@@ -140,15 +145,16 @@ def is_place(lat: float, lon: float) -> bool:
 
 
 def is_camera(numbers: Sequence[float]) -> bool:
-    """Return True if numbers are a camera's sensor size across and along the track, its focal length (mm) and overlaps.
+    """Return True if numbers are valid for a camera: sensor size, focal length and overlaps.
 
-    The overlaps, with the next photo and with those of the next line, are percent.
+    The sensor size is across and along the track, mm; the focal length in mm; the overlaps, with the next photo and
+    with the next line, in percent.
 
     >>> is_camera((23.5, 15.6, 16.0)), is_camera((23.5, 15.6, 16.0, 75.0, 60.0)), is_camera((23.5, 15.6, 0.0))
     (True, True, False)
     """
     if len(numbers) not in (3, 5) or not all(
-        0.0 < one <= most for one, most in zip(numbers, _MILLIMETRES, strict=False)
+        0.0 < one <= most for one, most in zip(numbers, _MAX_CAMERA_SIZES_MM, strict=False)
     ):
         return False
     return all(0.0 <= one < 100.0 for one in numbers[3:])

@@ -1,4 +1,4 @@
-"""The options of a flight: what keywords, the command line and a scenario state in the same words, as one object."""
+"""Options of a flight, named alike in keywords, the command line and a scenario, as one object."""
 
 import functools
 import inspect
@@ -16,28 +16,29 @@ from world.files import did_you_mean, whole_path
 from world.scenario import Scenario, at_time, load_scenario, over_terrain, with_flight, with_wind
 from world.scenario_tables import Guidance, Navigation
 
-# Speed, m/s, and the direction it comes from, degrees.
+# Wind speed, m/s, and the direction it comes from, degrees.
 Wind = tuple[float, float]
+# One file of fences, or several.
 FencePaths = str | Path | Sequence[str | Path]
 
-# Limits of a simulated flight: longer than planfly's aircraft can stay up; a log of 60 rows a second grows by some
-# 20 MB an hour.
+# Default limit of a simulated flight, h: longer than the endurance of planfly's aircraft.
 MAX_HOURS = 6.0
+# Default limit of the size of a log, MB; a log of 60 rows per second grows by some 20 MB per hour.
 MAX_MEGABYTES = 256.0
 
 # ----------------------------------------------------------------------
-# The options by group.  `Annotated` states the default of an option; without it the default is None.
+# Options by group.  `Annotated` states the default of an option; without it the default is None.
 
 
 class FlightOptions(TypedDict, total=False):
     """Options of a flight.  A missing option, or None, keeps the value of the scenario.
 
-    terrain: an elevation file in place of the scenario's.
-    wind: speed, m/s, and where it comes from, degrees.  turbulence: "none", "light" or "moderate".
-    at: when it is flown, "START" or "START/END" by ISO 8601 with offsets from UTC: zones that are inactive then are
+    terrain: an elevation file that replaces the terrain of the scenario.
+    wind: speed, m/s, and the direction it comes from, degrees.  turbulence: "none", "light" or "moderate".
+    at: time of the flight, "START" or "START/END" by ISO 8601 with offsets from UTC; zones that are inactive then are
     left out; None leaves none out.
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
-    guidance: planfly's own law ("path", "l1", "vector-field") in place of ArduPlane's.
+    guidance: planfly's own law ("path", "l1", "vector-field") instead of the law of ArduPlane.
     autopilot_law: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16", "px4-1.17" or "ideal".
     nav: "perfect", "rtk" or "gnss".
     """
@@ -57,9 +58,9 @@ class FlightOptions(TypedDict, total=False):
 class MissionOptions(FlightOptions, total=False):
     """Options of the flight of a mission file or a plan, and of its world.
 
-    scenario: a name or a TOML file; None for the plan's own scenario, or for one made around the mission.
+    scenario: a name or a TOML file; None for the plan's own scenario, or one made around the mission.
     fence: files of fences and zones in addition to the mission's own.
-    seed: of the turbulence; None takes the plan's, the scenario's, or 1.
+    seed: of the turbulence; None takes the seed of the plan or of the scenario, or 1.
     """
 
     scenario: str | Path | None
@@ -68,12 +69,12 @@ class MissionOptions(FlightOptions, total=False):
 
 
 class PlanOptions(FlightOptions, total=False):
-    """Options of the search for a path, and of the flight that it is for.
+    """Options of the search for a path, and of the flight to plan for.
 
-    seed: of the search; None takes the scenario's, or 1.
+    seed: of the search; None takes the seed of the scenario, or 1.
     algorithm: a name of ``planfly plan --help``; None for the default.
-    budget: evaluations at most.  seconds: time at most; the best path so far is given then.
-    stop: called between generations; once it returns True, the best path so far is given.
+    budget: largest number of evaluations.  seconds: time limit; the best path found is returned then.
+    stop: called between generations; once it returns True, the best path found is returned.
     """
 
     seed: int | None
@@ -86,8 +87,8 @@ class PlanOptions(FlightOptions, total=False):
 class LogOptions(MissionOptions, total=False):
     """Facts that a log of another program does not state.
 
-    plan: the mission that was to be flown, in place of the log's own.  flight: which of the log's flights, from 1.
-    datum: what the log's heights are above.
+    plan: the mission that was to be flown, in place of the log's own mission.
+    flight: number of the flight in the log, from 1.  datum: datum of the log's altitudes.
     """
 
     plan: str | Path | None
@@ -95,16 +96,18 @@ class LogOptions(MissionOptions, total=False):
     datum: VerticalDatum | None
 
 
+# Options that apply only to the log of another program.
 LOG_OPTIONS = ("plan", "flight", "datum")
 
 
 class SimulationOptions(TypedDict, total=False):
     """Autopilot of a simulated flight, its recording, and its limits.
 
-    autopilot: the program of ArduPlane or PX4, which then flies.
-    log_hz: rows a second in the log.
+    autopilot: the program of ArduPlane or PX4, which then flies the mission.
+    log_hz: rows per second in the log.
     max_hours: simulated hours after which the flight is stopped.  max_log: size of the log at which it is stopped, MB.
-    levels: True flies a mission that passes by planfly's guidance, too, as one that fails: both flights are compared.
+    levels: True also flies a mission that passes with planfly's guidance, as is done for one that fails, and compares
+    the two flights.
     """
 
     autopilot: str | Path | None
@@ -115,10 +118,11 @@ class SimulationOptions(TypedDict, total=False):
 
 
 class CampaignOptions(MissionOptions, total=False):
-    """Flights of a campaign, and when it ends.
+    """Options of the flights of a campaign, and of its end.
 
     spread: a TOML file of what varies; None takes planfly's default.
-    flights: how many.  prove: a probability to reach or miss.  at_least: one to answer after all flights.
+    flights: number of flights.  prove: a probability to reach or miss.  at_least: a probability to judge after all
+    flights.
     confidence: of each bound.
     """
 
@@ -130,10 +134,10 @@ class CampaignOptions(MissionOptions, total=False):
 
 
 class WindsOptions(MissionOptions, total=False):
-    """Flights of a search for the largest winds, and when it ends.
+    """Options of the flights of a search for the largest winds, and of its end.
 
-    spread: a TOML file of what varies.  flights: at most, of all directions.  confidence: of each interval.
-    workers: processes on this machine; None for one a core.  scheduler: the address of a running dask scheduler.
+    spread: a TOML file of what varies.  flights: largest number, for all directions.  confidence: of each interval.
+    workers: processes on this machine; None for one per core.  scheduler: the address of a running dask scheduler.
     """
 
     spread: str | Path | None
@@ -144,11 +148,11 @@ class WindsOptions(MissionOptions, total=False):
 
 
 class FlyOptions(MissionOptions, SimulationOptions, total=False):
-    """The options of `planfly.fly`."""
+    """Options of `planfly.fly`."""
 
 
 class RunOptions(FlightOptions, SimulationOptions, total=False):
-    """The options of `planfly.run`."""
+    """Options of `planfly.run`."""
 
 
 # ----------------------------------------------------------------------
@@ -159,7 +163,7 @@ _Given = TypeVar("_Given")
 
 
 def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
-    """Show the options of ``**options: Unpack[...]`` in a function's signature, fill in defaults, refuse other names.
+    """Show options of ``Unpack[...]`` in a function's signature, fill in defaults, refuse other names.
 
     >>> from typing import Unpack
     >>> @takes_options
@@ -203,12 +207,12 @@ def option_defaults(options: type) -> dict[str, object]:
 
 
 def options_of_log(options: LogOptions) -> dict[str, object]:
-    """Return those of the options that belong to another program's log."""
+    """Return the options that apply to the log of another program."""
     return {name: value for name, value in options.items() if name in LOG_OPTIONS}
 
 
 def mission_options(options: MissionOptions) -> MissionOptions:
-    """Return the options that belong to the mission, without those of a log or a campaign."""
+    """Return the options that belong to the mission, without the options of a log or a campaign."""
     return cast(
         MissionOptions, {name: value for name, value in options.items() if name in MissionOptions.__annotations__}
     )
@@ -221,11 +225,11 @@ def named_fences(options: MissionOptions) -> list[str]:
 
 
 # ----------------------------------------------------------------------
-# The scenario that options make of another.
+# Scenarios changed by options.
 
 
 def named_scenario(scenario: Scenario | str | Path, options: FlightOptions, program: Path | None = None) -> Scenario:
-    """Load an embedded name or a TOML file, or take a scenario as it is, and apply options to it.
+    """Return a scenario, from an embedded name, a TOML file or as given, with options applied.
 
     program: the autopilot's program that flies.  Raises ScenarioError, TerrainError or ParameterError.
     """
@@ -239,11 +243,12 @@ def named_scenario(scenario: Scenario | str | Path, options: FlightOptions, prog
 
 
 def apply_options(scenario: Scenario, options: FlightOptions, program: Path | None = None) -> Scenario:
-    """Return a scenario in the weather and flown as the options state; its terrain stays.
+    """Return a scenario with the weather and the flight options applied; its terrain stays.
 
     program: the autopilot's program that flies.
-    If no autopilot is named, it is the one that the file of parameters was written for.
-    Raises ScenarioError for what a scenario file may not have either, and ParameterError for another autopilot's file.
+    If no autopilot is named, the file of parameters decides the autopilot.
+    Raises ScenarioError for values that a scenario file must not have, and ParameterError for the file of another
+    autopilot.
 
     >>> changed = apply_options(load_scenario("tight"), {"wind": (8.0, 270.0), "airspeed": 28.0})
     >>> changed.wind.speed, changed.flight.airspeed_mps
@@ -259,9 +264,9 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
 
 
 def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[str, str | float | None]:
-    """Return the entries of a scenario's [flight] that options state; None for those that are not given.
+    """Return the [flight] entries of a scenario for options; None for entries that are not given.
 
-    Raises ArgumentError for a law that planfly does not know, and for one in addition to a program.
+    Raises ArgumentError for an unknown law, and for a law in addition to a program.
 
     >>> entries = flight_entries({"autopilot_law": "px4-1.16"})
     >>> entries["autopilot"], entries["px4_version"]
@@ -274,14 +279,14 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
         raise ArgumentError.of_argument("autopilot_law", named, allowed)
     law, _, version = (named or "").partition("-")
     return {
-        # A `Path` is a folder, and is passed on so that it is known for one.
+        # A `Path` is a folder; its absolute path marks it as a folder instead of a name.
         "aircraft": str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft,
         "airspeed_mps": options.get("airspeed"),
         "autopilot": law or None if program is None else program_autopilot(program).name,
         "px4_version": version or None,
         "guidance": options.get("guidance"),
         "nav": options.get("nav"),
-        # Whatever folder the scenario is in.
+        # Absolute, so that it does not depend on the folder of the scenario.
         "params": None if params is None else whole_path(Path(params)),
     }
 

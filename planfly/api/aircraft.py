@@ -1,4 +1,4 @@
-"""The aircraft that planfly knows, and one's own: data, trims and modes, and a folder to begin with."""
+"""Data, trims and modes of embedded aircraft and the user's own, and folders for new aircraft."""
 
 import shlex
 from collections.abc import Mapping
@@ -25,12 +25,12 @@ from world.scenario_tables import names_folder
 class AircraftNumbers:
     """Result of `planfly.describe_aircraft`.
 
-    aircraft: its metadata.  model_sha256: of its JSBSim model.
+    aircraft: its metadata.  model_sha256: SHA-256 of its JSBSim model.
     envelope: climb and descent by airspeed and height.
     trims: level flight by airspeed.  modes: by airspeed, m/s.  cruise: modes in cruise.
     steps: responses to steps of the controls.
-    lacking: what is missing in its folder for a flight, a line each.
-    files: the pictures that were written.
+    lacking: files missing in its folder for a flight, a line each.
+    files: pictures written.
     """
 
     aircraft: Aircraft
@@ -49,10 +49,10 @@ def aircraft() -> dict[str, Aircraft]: ...
 @overload
 def aircraft(name: str | Path) -> Aircraft: ...
 def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
-    """An aircraft by its name, or by the folder of one's own: masses, speeds and limits, in SI units and radians.
+    """Return an aircraft by name or folder: masses, speeds and limits, in SI units and radians.
 
     name: None for all embedded ones by name.
-    Raises a `planfly.PlanflyError` for a name that is none and a folder that holds no aircraft.
+    Raises a `planfly.PlanflyError` for an unknown name, and for a folder without an aircraft.
 
     >>> import planfly
     >>> planfly.aircraft("aerosonde").airspeed
@@ -66,7 +66,7 @@ def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
 
 
 class DataSheetOptions(TypedDict, total=False):
-    """The numbers of an aircraft's data sheet, and a file of its autopilot's parameters; see `new_aircraft`."""
+    """Numbers of the data sheet of an aircraft, and a file of autopilot parameters; see `new_aircraft`."""
 
     mass: float | None
     span: float | None
@@ -91,16 +91,16 @@ def new_aircraft(
     source: str | Path | None = None,
     **given: Unpack[DataSheetOptions],
 ) -> Aircraft:
-    """Make the folder of an aircraft of one's own, which must not be there yet.
+    """Make the folder of a new aircraft, which must not exist.
 
     Without numbers it holds copies of another aircraft's files: source is that aircraft, a name or a folder (the
-    Aerosonde if not given).  With numbers it holds a model that does what they say, scaled from published aircraft of
-    its class, and what is not known of it; mass, span, cruise and stall are needed, the others guessed if not given.
+    Aerosonde if not given).  With numbers it holds a model that matches them, scaled from published aircraft of its
+    class, and a list of what is unknown; mass, span, cruise and stall are needed, the others are estimated if missing.
 
     mass: kg.  span: of the wing, m.  area: of the wing, m^2.
     cruise, stall, top: airspeeds, m/s: usual, slowest and fastest level flight.
     bank: steepest in turns, degrees.  climb: steepest at cruise, degrees.
-    battery: volts and capacity, "14.8V,5Ah" or "14.8V,74Wh".  motor: rpm a volt.  prop: inches, "12x6".
+    battery: volts and capacity, "14.8V,5Ah" or "14.8V,74Wh".  motor: rpm per volt.  prop: inches, "12x6".
     layout: "tail" (if not given), "wing" for a flying wing with elevons, "vtail" for a V-tail.
     fuel: kg, for an aircraft that burns it.
     params: a file of ArduPlane's parameters; cruise, stall, bank, climb and drag are taken from it if not given and if
@@ -138,11 +138,12 @@ def new_aircraft(
 def describe_aircraft(
     name: str | Path, *, motor_braking: bool = False, out: str | Path | None = None, overwrite: bool = False
 ) -> AircraftNumbers:
-    """Work out trims, modes, envelope and step responses of an aircraft, and draw them.
+    """Compute trims, modes, envelope and step responses of an aircraft, and draw them.
 
-    name: embedded, or a folder.  motor_braking: whether the motor may brake in descents.
-    out: a folder for ``envelope.png``, ``trims.png`` and ``steps.png``; {name} in it is the aircraft's; None for none.
-    overwrite: whether pictures that lie there are replaced.
+    name: name of an embedded aircraft, or a folder.  motor_braking: True lets the motor brake in descents.
+    out: a folder for ``envelope.png``, ``trims.png`` and ``steps.png``; {name} in it stands for the aircraft's name;
+    None writes none.
+    overwrite: True replaces existing pictures.
     Raises a `planfly.PlanflyError` for bad input; nothing is written then.
 
     >>> import planfly
@@ -152,12 +153,12 @@ def describe_aircraft(
     """
     chosen = _opened(name)
     identity = model_hash(chosen)
-    # Settings that are there and broken are refused here.
+    # Invalid settings files are refused here.
     lacking = tuple(missing for kind in AUTOPILOTS for missing in kind.missing_files(chosen))
     folder = None if out is None else expand_path_pattern(out, chosen.name, 0)
     if folder is not None:
         refuse_folder(folder, overwrite)
-    # Everything is worked out before anything is written.
+    # Everything is computed before anything is written.
     with stage(f"trimming {chosen.name}", "trimming"):
         envelope = load_envelope(chosen, motor_braking=motor_braking)
         trims = trim_table(chosen)
@@ -174,7 +175,7 @@ def describe_aircraft(
 
 
 def _opened(name: str | Path) -> Aircraft:
-    """Return the aircraft of a name or in a folder.  Raises PlanflyError."""
+    """Return the aircraft with a name or in a folder.  Raises PlanflyError."""
     text = str(name.absolute()) if isinstance(name, Path) else name
     if not names_folder(text):
         return find_aircraft(text)
@@ -191,7 +192,7 @@ def _draw(
     modes: Mapping[float, tuple[Mode, ...]],
     steps: tuple[StepResponse, ...],
 ) -> dict[str, bytes]:
-    # matplotlib loads for pictures alone.
+    # Imported here: only pictures need matplotlib.
     from logs.views.aircraft import draw_envelope, draw_steps, draw_trims
     from logs.views.drawing import png_bytes
 

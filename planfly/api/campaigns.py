@@ -1,4 +1,4 @@
-"""Probability that a mission flies, and the largest wind from each direction, from many flights that differ."""
+"""Probability that a mission flies, and its largest wind from each direction, by many flights."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -44,7 +44,7 @@ from world.extras import need_extra, needs_extra
 class CampaignFlight:
     """Result of `planfly.campaign_flight`: a flight of a campaign, flown again as in its table.
 
-    row: outcome, how it ended, and the rules that it failed.  log: the file that it is recorded in.
+    row: outcome, reason for the end, and failed rules.  log: the file of its flight log.
     """
 
     row: FlightRow
@@ -56,7 +56,7 @@ def _open(
 ) -> CampaignBase:
     """Open the mission of a campaign, and its folder for the campaign.
 
-    A scenario is planned, if the folder holds no plan of it.  Raises PlanflyError; the folder is left as it was then.
+    A scenario is planned if the folder holds no plan for it.  Raises PlanflyError; the folder then stays unchanged.
     """
     named, flown = target if isinstance(target, Plan) else str(target), mission_options(options)
     is_planned = isinstance(named, Plan) or is_mission_file(named)
@@ -72,7 +72,7 @@ def _open(
 
 
 def _line_of(target: Plan | str | Path, folder: Path) -> str:
-    """Return what the command line that repeats a campaign names: a plan lies in the campaign's folder."""
+    """Return the target for the command line that repeats a campaign; a plan is in the campaign's folder."""
     return str(folder / "plan.json") if isinstance(target, Plan) else str(target)
 
 
@@ -82,7 +82,10 @@ def _repeated(base: CampaignBase, options: MissionOptions, spread: str | Path | 
 
 
 def _workers(count: int | None, scheduler: str | None, seed: int | None) -> Workers:
-    """Return where to fly.  Raises PlanflyError, before anything is planned, for a scheduler that may not be used."""
+    """Return the workers.
+
+    Raises PlanflyError, before anything is planned, for a scheduler that may not be used.
+    """
     check_arguments(workers=count, seed=seed)
     if scheduler is not None:
         checked_address(scheduler)
@@ -95,13 +98,13 @@ def _dispersions(file: str | Path | None) -> Dispersions:
 
 
 # ----------------------------------------------------------------------
-# How likely a mission is to fly.
+# Probability that a mission flies.
 
 
 def continued_goal(
     folder: Path, flights: int | None, prove: float | None, at_least: float | None, confidence: float | None
 ) -> Goal:
-    """Return the goal of a campaign that goes on: what is asked for now, or, where nothing is, its own.
+    """Return the goal of a resumed campaign: the requested goal, or its earlier goal if none is requested.
 
     Raises PlanflyError for numbers out of their ranges, and for a folder without a campaign.
     """
@@ -122,21 +125,21 @@ def campaign(
     overwrite: bool = False,
     **options: Unpack[CampaignOptions],
 ) -> CampaignResult:
-    """Fly a mission many times, each time as `planfly.fly` would in its own wind, aircraft, terrain and start.
+    """Fly a mission many times as `planfly.fly` does, with varied wind, aircraft, terrain and start.
 
     target: an embedded scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
     spread: a TOML file of what varies; None takes planfly's default.
-    flights: how many; None takes 300, or, with ``prove``, 5,000 at most.  Without flights, ``prove`` and ``at_least`` a
-    campaign that is resumed goes on with its own.
-    prove: a probability: fly until it is reached or missed, whichever comes first.  at_least: one to answer after all
-    flights.  Not both.
-    confidence: of each bound; None takes 0.95, or what it was of a campaign that is resumed.
+    flights: number of flights; None takes 300, or, with ``prove``, at most 5,000.  Without flights, ``prove`` and
+    ``at_least``, a resumed campaign keeps its earlier goal.
+    prove: a probability; flights are flown until it is shown to be reached or missed.  at_least: a probability to judge
+    after all flights.  Only one of the two may be given.
+    confidence: of each bound; None takes 0.95, or the earlier value of a resumed campaign.
     The other options are as of `planfly.fly`; seed: of plan and draws.
-    workers: processes on this machine; None for one a core.  scheduler: a running dask scheduler's address instead.
-    out: folder of the campaign's files; None keeps none.  resume: go on with the campaign that is there.
-    overwrite: replace it.
-    A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
-    Raises a `planfly.PlanflyError` for bad input; for a number out of its range it is a ValueError, too.
+    workers: processes on this machine; None for one per core.  scheduler: address of a running dask scheduler instead.
+    out: folder of the campaign's files; None keeps none.  resume: True continues the campaign in the folder.
+    overwrite: True replaces it.
+    A script must call it under ``if __name__ == "__main__":``, because workers import the script.
+    Raises a `planfly.PlanflyError` for bad input, which is also a ValueError for a number out of its range.
 
     >>> campaign("paper-07", prove=1.5)
     Traceback (most recent call last):
@@ -157,13 +160,13 @@ def campaign(
 def _flown(
     base: CampaignBase, goal: Goal, workers: Workers, place: OutputDirectory, line: str, *, keep: bool
 ) -> CampaignResult:
-    """Fly a campaign, or the rest of it, and sum it up.  keep: whether its folder stays, and gets its files."""
+    """Fly a campaign or the rest of it, and sum it up.  keep: True keeps its folder and writes its files."""
     table = place.folder / DATABASE
     with open_store(base, goal, place.folder, resume=place.resume) as store:
         with stage("flying", "flying a campaign") as advance:
             estimate = fly_campaign(base, goal, workers, store, advance)
         brief = None if keep else summarise(base, goal, estimate, store)
-    # The store holds its table as long as it is open.
+    # The store locks its table while it is open.
     if brief is not None:
         return CampaignResult(brief, read_table(table))
     with stage("reporting") as advance:
@@ -182,8 +185,8 @@ def campaign_flight(
 ) -> CampaignFlight:
     """Fly one flight of a campaign again, into a log in the campaign's folder.
 
-    target: as of the campaign, and so are all other keywords.  index: of the flight, from 0.  out: the folder.
-    Raises a `planfly.PlanflyError` for bad input, and where the flight does not come out as the table has it.
+    target: as of the campaign, as are all other keywords.  index: of the flight, from 0.  out: the folder.
+    Raises a `planfly.PlanflyError` for bad input, and if the result of the flight differs from the table.
     """
     check_arguments(index=index, seed=options["seed"])
     folder = Path(out)
@@ -206,7 +209,7 @@ def _row_of(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightR
 
 
 # ----------------------------------------------------------------------
-# The largest wind from each direction in which a mission flies.
+# Largest wind from each direction in which a mission flies.
 
 
 @needs_extra("campaigns")
@@ -223,17 +226,17 @@ def winds(
     overwrite: bool = False,
     **options: Unpack[WindsOptions],
 ) -> WindsFound:
-    """Find the largest wind from each direction in which a mission flies with a probability.
+    """Find the largest wind from each direction in which a mission flies with a given probability.
 
     target: an embedded scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
-    prove: the probability.  directions: 4 to 72.  most: wind to look up to, m/s.  flights: at most, of all
-    directions; None takes 5,000, or those that a search which is resumed was to have.
+    prove: the probability.  directions: 4 to 72.  most: largest wind to search, m/s.  flights: largest number, for
+    all directions together; None takes 5,000, or the earlier number of a resumed search.
     confidence: of each interval.  spread, seed, workers, scheduler: as of `planfly.campaign`.
     The other options are as of `planfly.fly`.
     out: a folder for ``winds.html``, ``winds.png``, ``winds.json`` and the flights; None keeps none.
-    resume: go on with the search that is there.  overwrite: replace it.
-    A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
-    Raises a `planfly.PlanflyError` for bad input; for a number out of its range it is a ValueError, too.
+    resume: True continues the search in the folder.  overwrite: True replaces it.
+    A script must call it under ``if __name__ == "__main__":``, because workers import the script.
+    Raises a `planfly.PlanflyError` for bad input, which is also a ValueError for a number out of its range.
 
     >>> winds("paper-07", directions=3)
     Traceback (most recent call last):

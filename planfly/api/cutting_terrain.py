@@ -1,4 +1,4 @@
-"""Get the ground of an area."""
+"""Write the terrain of an area to a file."""
 
 import math
 import tempfile
@@ -15,9 +15,10 @@ from world.errors import ArgumentError, PlanflyError
 from world.remote_files import is_address
 from world.terrain_cut import COPERNICUS, Box, CutTerrain, cut_from_files, cut_from_server
 
-# km on a degree of latitude, and the furthest from the equator that areas reach, degrees.
+# Length of a degree of latitude, km.
 _DEGREE = 111.2
-_FURTHEST = 84.0
+# Largest absolute latitude of an area, degrees.
+_MAX_LATITUDE_DEG = 84.0
 
 
 def terrain(
@@ -30,17 +31,17 @@ def terrain(
     sea: bool = False,
     overwrite: bool = False,
 ) -> CutTerrain:
-    """Write the ground of an area as a GeoTIFF that all else of planfly reads as terrain.
+    """Write the terrain of an area as a GeoTIFF, which the other functions of planfly read as terrain.
 
-    out: the file.  overwrite: whether one that is there is replaced.
-    around: a mission file, all places of which lie in the area; or box: its south, west, north and east edge, degrees.
-    margin: ground beside them, km.
-    source: a folder of tiles or an elevation file; or the address (http or https) of a server that has GLO-30 tiles of
-    the Copernicus DEM as the registry of open data of AWS has them, which is the default: what is fetched of it is kept
-    in the user's cache.
-    sea: whether degrees of which such a server has no tile are sea, at 0 m.  They are left without data otherwise: some
-    countries' tiles are not published.
-    Raises a `planfly.PlanflyError` for bad input, and where the server cannot be reached; nothing is written then.
+    out: the file.  overwrite: True replaces an existing file.
+    around: a mission file, all places of which are in the area; or box: its south, west, north and east edge, degrees.
+    margin: width of the ground added around them, km.
+    source: a folder of tiles or an elevation file; or the address (http or https) of a server with GLO-30 tiles of the
+    Copernicus DEM, laid out as in the AWS registry of open data, which is the default; fetched parts are kept in the
+    user's cache.
+    sea: True treats degree cells for which the server has no tile as sea, at 0 m.  Otherwise they have no data: the
+    tiles of some countries are not published.
+    Raises a `planfly.PlanflyError` for bad input, and if the server cannot be reached; nothing is written then.
 
     >>> import planfly
     >>> planfly.terrain("dem.tif", box=(47.0, 8.0, 46.0, 9.0))
@@ -69,21 +70,25 @@ def terrain(
 
 
 def _box(given: Sequence[float]) -> Box:
-    """Raise ArgumentError."""
+    """Return the box of an area.  Raises ArgumentError for an invalid one."""
     try:
         south, west, north, east = (float(value) for value in given)
     except (TypeError, ValueError):
         south = west = north = east = math.nan
     # Written so that NaN fails; an area may lie across the 180th meridian, from 179 to -179 or to 181.
     around = east + 360.0 if east < west else east
-    if not (-_FURTHEST <= south < north <= _FURTHEST and -180.0 <= west <= 180.0 and west < around <= west + 30.0):
+    if not (
+        -_MAX_LATITUDE_DEG <= south < north <= _MAX_LATITUDE_DEG
+        and -180.0 <= west <= 180.0
+        and west < around <= west + 30.0
+    ):
         allowed = "south, west, north, east are expected, degrees -84..84 and -180..180, south below north"
         raise ArgumentError.of_argument("box", given, allowed)
     return Box(south, west, north, around)
 
 
 def _around(file: Path) -> Box:
-    """Return the box of all places of a mission: its items, home, fences and rally points.  Raises PlanflyError."""
+    """Return the box of all items, home, fences and rally points of a mission.  Raises PlanflyError."""
     mission = read_mission(file)
     places = [
         (one.lat_deg, one.lon_deg) for one in (*mission.items, *mission.fences, *mission.rally) if one.has_position
@@ -95,17 +100,17 @@ def _around(file: Path) -> Box:
     first = places[0][1]
     lats = [lat for lat, _ in places]
     lons = [first + (lon - first + 180.0) % 360.0 - 180.0 for _, lon in places]
-    if max(abs(lat) for lat in lats) > _FURTHEST or max(lons) - min(lons) > 30.0:
+    if max(abs(lat) for lat in lats) > _MAX_LATITUDE_DEG or max(lons) - min(lons) > 30.0:
         raise PlanflyError(
-            f"{file}: its places lie too far apart, or beyond {_FURTHEST:g} degrees of latitude", file=file
+            f"{file}: its places lie too far apart, or beyond {_MAX_LATITUDE_DEG:g} degrees of latitude", file=file
         )
     return Box(min(lats), min(lons), max(lats), max(lons))
 
 
 def _widened(box: Box, margin: float) -> Box:
-    """Return an area and the ground beside it.  margin: km."""
+    """Return an area widened by a margin on every side.  margin: km."""
     up = margin / _DEGREE
-    across = up / math.cos(math.radians(min(_FURTHEST, max(abs(box.south), abs(box.north)))))
+    across = up / math.cos(math.radians(min(_MAX_LATITUDE_DEG, max(abs(box.south), abs(box.north)))))
     return Box(box.south - up, box.west - across, box.north + up, box.east + across)
 
 

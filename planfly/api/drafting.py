@@ -1,4 +1,4 @@
-"""Begin a scenario of one's own."""
+"""Write a first version of a new scenario."""
 
 import math
 import os
@@ -31,14 +31,14 @@ def new_scenario(
     autopilot_law: str | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Write a commented scenario from one place to another, which can be planned and flown as it stands.
+    """Write a commented scenario from one place to another, ready to be planned and flown.
 
-    folder: where FOLDER/NAME.toml is written, under the folder's own name; it is made if it is not there.
-    start, destination: latitude and longitude, degrees.  height: of both above ground, m.
+    folder: the folder for FOLDER/NAME.toml, where NAME is the name of the folder; it is made if it is missing.
+    start, destination: latitude and longitude, degrees.  height: height of both above ground, m.
     terrain: an elevation file, a folder of tiles, or an embedded name; None for flat ground.
     aircraft: a name, or a folder.  autopilot_law: as of `planfly.fly`.
-    overwrite: whether a scenario of that name is replaced.
-    The area takes in the straight line and a third of its length about it, as far as the elevation file reaches.
+    overwrite: True replaces a scenario of that name.
+    The area holds the straight line and a margin of a third of its length, within the coverage of the elevation file.
     Returns the file.  Raises a `planfly.PlanflyError` for bad input; nothing is written then.
 
     >>> import planfly, tempfile
@@ -71,7 +71,7 @@ def new_scenario(
             autopilot=law,
             px4_version=version or None,
         )
-        # As it is read from there: a fault is found before anything is written.
+        # Parsed as it will be read from the file, so that a fault is found before anything is written.
         from_spec(parse_scenario(draft_text(draft), str(file)), str(file))
     moved = replace(draft, terrain=ground and _from(target, ground), aircraft=_from(target, model))
     target.mkdir(exist_ok=True)
@@ -80,7 +80,7 @@ def new_scenario(
 
 
 def _target(folder: Path, name: str, *, overwrite: bool) -> Path:
-    """Return the file to write.  Raises PlanflyError for one that is there, and for a folder that cannot be made."""
+    """Return the file to write.  Raises PlanflyError if it exists, or if its folder cannot be made."""
     if not name.isprintable() or not 1 <= len(name) <= 100:
         allowed = "a folder with a name of 1 to 100 printable characters is expected"
         raise PlanflyError.of_argument("folder", folder, allowed, shown=ascii(str(folder)))
@@ -95,7 +95,7 @@ def _target(folder: Path, name: str, *, overwrite: bool) -> Path:
 
 
 def _place(keyword: str, given: Sequence[float]) -> Place:
-    """Latitude and longitude.  Raises ArgumentError."""
+    """Return latitude and longitude.  Raises ArgumentError."""
     try:
         lat, lon = (float(value) for value in given)
     except (TypeError, ValueError):
@@ -106,14 +106,14 @@ def _place(keyword: str, given: Sequence[float]) -> Place:
 
 
 def _whole(given: str | Path, *, is_name: bool) -> str:
-    """Return a path from anywhere; a name of what planfly ships stays."""
+    """Return the absolute path of a file; an embedded name stays as it is."""
     return str(given) if is_name else whole_path(Path(given))
 
 
 def _from(folder: Path, given: str) -> str:
-    """Return a whole path as it is written in a file of a folder; a name stays."""
+    """Return an absolute path as it is written in a file of a folder; a name stays as it is."""
     if not Path(given).is_absolute():
         return given
     relative = os.path.relpath(given, whole_path(folder))
-    # With a slash, so that the folder of an aircraft is known for one.
+    # The slash marks it as a folder of an aircraft instead of a name.
     return relative if "/" in relative else f"./{relative}"

@@ -1,4 +1,4 @@
-"""A plan, a mission or a flight log, written in the forms that files' suffixes name."""
+"""Export of a plan, a mission or a flight log in the formats that the suffixes of files name."""
 
 import contextlib
 from dataclasses import dataclass, field, replace
@@ -41,12 +41,15 @@ from world.files import temporary_folder, write_whole
 from world.scenario import Scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT
 
+# Writer of the text of a map, by suffix.
 MAPS = {".kml": kml_text, ".gpx": gpx_text}
-# Parameters of the autopilot that a mission was judged with: those of returns, rally points, take-off and landing.
+# Suffixes of the autopilot parameters a mission was judged with: for returns, rally points, take-off and landing.
 PARAMETERS = (".parm",)
+# Beginnings of the names of these parameters.
 _JUDGED = ("RTL_", "RALLY_", "LAND_", "TECS_LAND_", "TKOFF_", "FW_LND_", "FW_TKO_", "NAV_DLL_ACT")
-# What a flight log alone can be written as.
+# Suffixes of formats that only a flight log can be written in.
 LOGS = (".csv", ".parquet", ".tlog", ".ulg")
+# Names of the contents in messages, by suffix.
 _CONTENTS = {"fence": "fence items", "rally": "rally points"}
 
 
@@ -54,9 +57,9 @@ _CONTENTS = {"fence": "fence items", "rally": "rally points"}
 class ExportedFiles:
     """Files that `planfly.export` wrote.
 
-    files: in the order asked for.  contents: what each holds, in words.
-    notes: what of the source they do not hold, and what PX4 would refuse of a plan for it, a line each.
-    loss: what of a flight log could not be read, in a line, which is among the notes; "" where nothing is missing.
+    files: in the order of the request.  contents: the content of each file, in words.
+    notes: one line for each part of the source that the files do not hold or that PX4 would refuse of a plan for it.
+    loss: description of the part of a flight log that could not be read, also in the notes; "" if nothing is missing.
     """
 
     files: tuple[Path, ...]
@@ -69,13 +72,13 @@ class ExportedFiles:
 class _Source:
     """Content of an input.
 
-    mission: its items, and a plan's threats as fences.
-    name: a map's title.
-    lines, zones: on a map, lines by what they are; none where no target asks for one.
-    returns, footprint: on a map in KML, lines and shapes that have colours.
-    notes: what the mission does not hold of the plan.
-    log: the input, where it is a flight log.
-    autopilot: that flies the mission; None where no target asks for it.
+    mission: items of the mission, and the threats of a plan as fences.
+    name: title of a map.
+    lines, zones: lines and zones on a map, lines by their meaning; empty if no target is a map.
+    returns, footprint: lines and shapes with colours on a KML map.
+    notes: parts of the plan that the mission does not hold.
+    log: the input, if it is a flight log.
+    autopilot: the autopilot that flies the mission; None if no target needs it.
     """
 
     mission: Mission
@@ -97,14 +100,14 @@ def export(
     at: str | None = None,
     overwrite: bool = False,
 ) -> ExportedFiles:
-    """Write a plan, a mission or a flight in the forms that the files' suffixes name.
+    """Write a plan, a mission or a flight in the formats that the suffixes of the files name.
 
     source: a plan, a flight with a log, or the path of a plan.json, mission file or log.
     files: .waypoints, .plan, .fence, .rally, .kml, .gpx, and .parm with the parameters of take-off, landing and returns
-    that it is judged with; of a flight also .csv, .parquet, .tlog (MAVLink), .ulg (PX4).
-    fence: files of fences or zones beside its own.
-    at: when it is flown, as of `planfly.plan`: zones that are not active then are in none of the files.
-    overwrite: whether files that are there may be replaced.
+    that it is judged with; for a flight also .csv, .parquet, .tlog (MAVLink), .ulg (PX4).
+    fence: files of fences or zones in addition to the source's own.
+    at: time of the flight, as of `planfly.plan`; the files omit zones that are not active then.
+    overwrite: True replaces existing files.
     Raises a `planfly.PlanflyError` for bad input; nothing is written then.
 
     >>> import planfly, tempfile
@@ -132,7 +135,7 @@ def export(
 
 
 def _as_file(source: FlightLog | FlownMission | Plan | str | Path, place: contextlib.ExitStack) -> Path:
-    """Return the file that a source is, or one made for it while the place is open."""
+    """Return the path of a source, or write the source to a file that exists while `place` is open."""
     if isinstance(source, Plan):
         file = place.enter_context(temporary_folder("planfly-export-")) / "plan.json"
         write_whole(file, plan_json(source))
@@ -156,7 +159,7 @@ def _refuse_unknown(target: Path) -> None:
 
 
 def _read(path: Path, targets: tuple[Path, ...], options: MissionOptions) -> _Source:
-    """Read a source as far as the targets need it."""
+    """Read the parts of a source that the targets need."""
     if path.is_file() and is_log(path):
         if (at := options["at"]) is not None:
             allowed = "a log is exported with the zones of its own time"
@@ -179,7 +182,7 @@ def _asks_kml(targets: tuple[Path, ...]) -> bool:
 
 
 def _with_returns(source: _Source, setup: FlightSetup, track: Track | None) -> _Source:
-    """With returns from a few places of a flight or a planned path, and glides, where they can be judged."""
+    """Add returns and glides from a few places of a flight or a planned path, if they can be judged."""
     with stage("flying returns for the map"):
         drawn = return_summary(setup, track).drawn()
     if drawn is None:
@@ -198,14 +201,14 @@ def _read_log(path: Path, *, coloured: bool) -> _Source:
 
 
 def _read_mission(path: Path, options: MissionOptions, *, placed: bool, coloured: bool) -> _Source:
-    """Read a plan or a mission file; a map, parameters, zones and a plan's fence need its place."""
+    """Read a plan or a mission file, and place it in its world if the targets or a plan's fence need it."""
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
     if not (placed or is_plan or fences.zones or options["at"] is not None):
         mission = fences.on_mission(read_mission(path))
         return _Source(replace(mission, autopilot=mission.autopilot or DEFAULT_AUTOPILOT), path.stem)
-    # What a station uploads has no times: which zones count is decided here.
+    # Items that a ground station uploads have no times, so the active zones are selected here.
     setup = open_flight(path, options)
     line, zones = {"plan": plan_line(setup)}, map_zones(setup)
     source = _Source(setup.mission, setup.scenario.name, line, zones, autopilot=setup.autopilot)
@@ -218,14 +221,14 @@ def _read_mission(path: Path, options: MissionOptions, *, placed: bool, coloured
 
 
 def _with_zones(source: _Source, scenario: Scenario) -> _Source:
-    """Return the zones named as fence items, beside the mission's own."""
+    """Return the source with the named zones as fence items, in addition to the mission's own."""
     items, notes = zone_fences(scenario.zones, scenario.origin)
     fenced = replace(source.mission, fences=numbered([*source.mission.fences, *items]))
     return replace(source, mission=fenced, notes=tuple(notes))
 
 
 def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
-    """Return text of a target, and what it holds."""
+    """Return the text of a target, and a description of its content."""
     suffix, mission = target.suffix.lower(), source.mission
     if source.autopilot is not None:
         mission = replace(mission, autopilot=source.autopilot.name)
@@ -253,9 +256,9 @@ def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
 
 
 def judged_parameters(mission: str, autopilot: Autopilot) -> tuple[str, str]:
-    """Return parameters of take-off, landing and returns as a file's text, and what it holds.
+    """Return the text of a file of take-off, landing and return parameters, and a description of it.
 
-    mission: its name in messages.  Raises MissionError for an autopilot that has none of them.
+    mission: its name in messages.  Raises MissionError for an autopilot without such parameters.
     """
     found = () if autopilot.parameters is None else autopilot.parameters.values
     values = {name: value for name, value, _ in found if name.startswith(_JUDGED)}
@@ -267,7 +270,10 @@ def judged_parameters(mission: str, autopilot: Autopilot) -> tuple[str, str]:
 
 
 def _flown_text(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
-    """Return a flight's rows in another program's form, and what that holds; each form loads what it alone needs."""
+    """Return the rows of a flight in the format of another program, and a description.
+
+    Each format imports only the libraries that it needs.
+    """
     content = f"{len(log.track):,} rows, {log.end_time:.0f} s"
     if suffix == ".tlog":
         need_extra("live", ".tlog needs")

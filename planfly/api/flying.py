@@ -44,7 +44,7 @@ from world.extras import need_extra
 from world.scenario import Scenario, over_terrain
 
 # ----------------------------------------------------------------------
-# What the functions return: frozen data, short to print, a table in a notebook.
+# Results of the functions: frozen data, short to print, a table in a notebook.
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -52,13 +52,13 @@ class FlownMission:
     """Result of `planfly.fly`.
 
     setup: everything that decided the flight.
-    track: its rows; none of a flight that could not begin.
-    verdict: whether it flies, with a finding for every rule and place.
-    ended: how it ended, "completed" or the reason why not.
-    events: what the log holds beside the rows.
-    log: the file that it is recorded in; None where none was asked for, or nothing flown.
-    autopilot_log: the log of the autopilot's program beside it, if one flew.
-    returns: from a few places of it, as the log has them; None without a log.
+    track: rows of the flight; empty if it could not begin.
+    verdict: whether the mission flies, with a finding for every rule and place.
+    ended: "completed", or the reason for an early end.
+    events: entries of the log in addition to the rows.
+    log: the file of the flight log; None if no log was requested or nothing was flown.
+    autopilot_log: the autopilot program's own log, next to the flight log, if such a program flew.
+    returns: returns from a few places of the flight, as recorded in the log; None without a log.
     """
 
     setup: FlightSetup
@@ -72,22 +72,22 @@ class FlownMission:
 
     @property
     def mission(self) -> Mission:
-        """Its items, as read or made of a plan."""
+        """Mission that was flown, as read or as made from a plan."""
         return self.setup.mission
 
     @property
     def plan(self) -> Plan | None:
-        """The plan that it is of; None for a mission file."""
+        """Plan that was flown; None for a mission file."""
         return self.setup.plan
 
     @property
     def flyable(self) -> bool:
-        """The verdict's answer."""
+        """True if the verdict is flyable."""
         return self.verdict.flyable
 
     @property
     def returns_line(self) -> str:
-        """Returns from a few places of the flight in a line; "" for a mission without a home."""
+        """Returns from a few places of the flight, in one line; "" for a mission without a home."""
         return returns_line(self.setup, self.track) if self.returns is None else self.returns.line
 
     def __repr__(self) -> str:
@@ -103,11 +103,11 @@ class Judged:
     """Result of `planfly.judge`.
 
     setup: everything that decides the flight.
-    verdict: whether it flies, with a finding for every rule and place.
-    loss: what of a flight log could not be read, in a line; "" where nothing is missing.
-    lossy: whether some of a log could not be read.
-    track: what was flown; None where nothing was.
-    is_log: True for a flight that a log or an earlier call holds.
+    verdict: whether the mission flies, with a finding for every rule and place.
+    loss: description of the part of a flight log that could not be read, in one line; "" if nothing is missing.
+    lossy: True if part of a log could not be read.
+    track: rows of the flight; None if nothing was flown.
+    is_log: True for a flight read from a log or returned by an earlier call.
     """
 
     setup: FlightSetup
@@ -119,7 +119,7 @@ class Judged:
 
     @property
     def returns_line(self) -> str:
-        """Returns from a few places of the flight, or of the planned path, in a line; "" without a home."""
+        """Returns from a few places of the flight or the planned path, in one line; "" without a home."""
         return returns_line(self.setup, self.track)
 
 
@@ -139,8 +139,8 @@ def plan_then_fly(
     """Plan a path, fly it in JSBSim and judge the flight.
 
     scenario: an embedded name, a TOML file's path, or a `Scenario`.
-    seed: of planner and turbulence; None takes the scenario's, or 1.
-    log: where to write the flight as MCAP, replaced if it exists; None writes none.
+    seed: of planner and turbulence; None takes the seed of the scenario, or 1.
+    log: file for the flight as MCAP, replaced if it exists; None writes none.
     options: as of `planfly.fly`.
     Raises a `planfly.PlanflyError` for bad input.  A plan that cannot be flown is a verdict, not an error.
 
@@ -168,24 +168,28 @@ def fly(
     """Fly a plan or a mission file in JSBSim, and judge the flight.
 
     mission: a `Plan`, or the path of a plan.json, .waypoints or .plan file.
-    log: where to write the flight as MCAP; {name} and {seed} in it stand for the mission's name and the seed; None
-    writes none.  overwrite: whether an existing file is replaced.
+    log: file for the flight as MCAP; {name} and {seed} in it stand for the mission's name and the seed; None writes
+    none.  overwrite: True replaces an existing file.
 
-    Where it is flown (None keeps what the plan or the scenario states):
-    scenario: a name or a TOML file; None for the plan's own, or one made around the mission.
-    terrain: an elevation file in place of the scenario's.  fence: files of fences and zones in addition to its own.
-    seed: of the turbulence; None takes the plan's, the scenario's, or 1.
-    wind: speed, m/s, and where it comes from, degrees.  turbulence: "none", "light" or "moderate".
-    at: when, "START" or "START/END" by ISO 8601 with offsets from UTC: zones that are inactive then are left out.
+    The world of the flight (None keeps the value of the plan or the scenario):
+    scenario: a name or a TOML file; None for the plan's own scenario, or one made around the mission.
+    terrain: an elevation file that replaces the terrain of the scenario.
+    fence: files of fences and zones in addition to the mission's own.
+    seed: of the turbulence; None takes the seed of the plan or of the scenario, or 1.
+    wind: speed, m/s, and the direction it comes from, degrees.  turbulence: "none", "light" or "moderate".
+    at: time of the flight, "START" or "START/END" by ISO 8601 with offsets from UTC; zones that are inactive then are
+    left out.
 
-    By what it is flown:
+    The aircraft and its control:
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
     autopilot_law: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16", "px4-1.17" or "ideal".
-    guidance: planfly's own law ("path", "l1", "vector-field") in place of ArduPlane's.  nav: "perfect", "rtk", "gnss".
-    autopilot: the program of ArduPlane or PX4, which then flies.
+    guidance: planfly's own law ("path", "l1", "vector-field") instead of the law of ArduPlane.
+    nav: "perfect", "rtk" or "gnss".
+    autopilot: the program of ArduPlane or PX4, which then flies the mission.
 
-    log_hz: rows a second in the log.  max_hours, max_log: limits at which a flight is stopped, h and MB.
-    levels: True flies a mission that passes by planfly's guidance, too, as one that fails: both flights are compared.
+    log_hz: rows per second in the log.  max_hours, max_log: limits at which a flight is stopped, h and MB.
+    levels: True also flies a mission that passes with planfly's guidance, as is done for one that fails, and compares
+    the two flights.
 
     A plan that cannot be flown is a verdict, not an error; bad input raises a `planfly.PlanflyError`.
 
@@ -220,10 +224,10 @@ def fly(
 def fly_by_each(
     mission: Plan | str | Path, autopilots: Sequence[str], **options: Unpack[MissionOptions]
 ) -> dict[str, FlownMission]:
-    """Fly a mission by the laws of several autopilots, each with its default parameters, and judge each flight.
+    """Fly a mission by the laws of several autopilots with default parameters, and judge each flight.
 
-    autopilots: names, as `autopilot_law` of `planfly.fly` takes them, which is not an option here, nor are `params`
-    and `guidance`.  options: as of `planfly.fly`.
+    autopilots: names, as `autopilot_law` of `planfly.fly` takes them.
+    options: as of `planfly.fly`, except `autopilot_law`, `params` and `guidance`.
     Returns the flights by these names.  Raises a `planfly.PlanflyError` for bad input.
 
     >>> import planfly
@@ -247,7 +251,7 @@ def fly_by_each(
 def _log_target(
     log: str | Path, setup: FlightSetup, mission: Plan | str | Path, program: Path | None, overwrite: bool
 ) -> Path:
-    """Prepare the file of the log; an existing one and the log of a program are replaced.  Raises PlanflyError."""
+    """Prepare the file of the log; an existing one and a program's log are replaced.  Raises PlanflyError."""
     source = None if isinstance(mission, Plan) else Path(mission)
     target = file_target(log, setup.name, setup.seed, overwrite=overwrite, source=source)
     if program is not None:
@@ -258,7 +262,7 @@ def _log_target(
 
 
 # ----------------------------------------------------------------------
-# Judge a flight by its log, or a mission.
+# Judge a flight log or a mission.
 
 
 @with_warm_up()
@@ -266,11 +270,11 @@ def _log_target(
 def judge(
     what: FlightLog | FlownMission | Plan | str | Path, *, geometry: bool = False, **options: Unpack[LogOptions]
 ) -> Judged:
-    """Judge a flight by its log, or a plan or a mission by flying it, and keep what the verdict is about.
+    """Judge a flight log, or fly and judge a plan or a mission; return the verdict and the flight.
 
-    what: a flight log or its path, an autopilot's log, what `planfly.fly` gave, a `Plan`, or the path of a plan.json,
+    what: a flight log or its path, an autopilot's log, a result of `planfly.fly`, a `Plan`, or the path of a plan.json,
     .waypoints or .plan.
-    geometry: True judges a plan or a mission by its geometry alone, which says nothing of how an autopilot flies it.
+    geometry: True judges a plan or a mission by its geometry alone, without the flight by an autopilot.
     options: of a plan or mission, as of `planfly.fly`; a flight is judged as it was flown, and only `terrain` replaces
     its ground and `fence` adds to its fences.
     plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
@@ -281,7 +285,7 @@ def judge(
     ['autopilot', 'geometric']
     """
     if isinstance(what, str | Path) and is_imported_log(Path(what)):
-        # Imported here: no other check needs the libraries that read other programs' logs.
+        # Imported here: only this check needs the libraries that read the logs of other programs.
         from planfly.api.imported import read_imported
 
         found = read_imported(what, **options)
@@ -307,7 +311,7 @@ def check(
 ) -> Verdict:
     """Judge a flight by its log, or a plan or a mission by flying it.
 
-    The arguments are those of `planfly.judge`, which also returns what the verdict is about.
+    Takes the arguments of `planfly.judge`, which returns the flight in addition to the verdict.
 
     Raises a `planfly.PlanflyError` for bad input.
 
@@ -320,7 +324,7 @@ def check(
 
 
 def _source_of(what: FlightLog | FlownMission | Plan | str | Path) -> str:
-    """Return the file that is judged, as messages name it."""
+    """Return the name of the judged file for messages."""
     if isinstance(what, FlightLog):
         return what.source
     if isinstance(what, FlownMission):
@@ -329,19 +333,20 @@ def _source_of(what: FlightLog | FlownMission | Plan | str | Path) -> str:
 
 
 def refuse(source: str, given: Mapping[str, Any], allowed: str) -> None:
-    """Refuse keywords that do not go with what is judged.  Raises ScenarioError."""
+    """Refuse keywords that do not apply to the judged source.  Raises ScenarioError."""
     for name, value in given.items():
         if value is not None:
             raise ScenarioError.of_argument(name, value, allowed, shown="", file=source)
 
 
-# Why a log takes no other world.
+# Reason why a log cannot be judged in another world, in messages.
 _AS_FLOWN = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
+# Reason why a log cannot be judged in another scenario, in messages.
 _WHERE_FLOWN = "a log is judged in the scenario it carries; only `terrain` replaces its ground"
 
 
 def refuse_other_flight(source: str, options: MissionOptions) -> None:
-    """Refuse options of another flight than the one that a log holds.  Raises ScenarioError."""
+    """Refuse options that would change the flight recorded in a log.  Raises ScenarioError."""
     kept = (*LOG_OPTIONS, "terrain", "fence", "scenario")
     refuse(source, {name: value for name, value in options.items() if name not in kept}, _AS_FLOWN)
     refuse(source, {"scenario": options["scenario"]}, _WHERE_FLOWN)
@@ -363,7 +368,7 @@ def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, 
 def named_program(autopilot: str | Path | None) -> Path | None:
     """Return the autopilot's program that is to fly, or None if none is named.
 
-    Raises FlightError for what cannot be run, and MissingExtraError.
+    Raises FlightError for a file that cannot be run, and MissingExtraError.
     """
     if autopilot is None:
         return None

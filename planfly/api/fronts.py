@@ -1,4 +1,4 @@
-"""A front of plans: planned, and written as plans, a table and pictures."""
+"""Plan a front of plans, and write it as plans, a table and pictures."""
 
 import csv
 import io
@@ -22,12 +22,17 @@ from planner.search.plan_front import Front, FrontPlan
 from world.files import write_whole
 from world.scenario import Scenario
 
-# Where a front goes that nobody named a place for.
+# Default folder of a front.
 FRONT_FOLDER = f"{RUN_FOLDER}-front"
+# Name and version of the format of front.json.
 TABLE_SCHEMA = "planfly.front/1"
+# Energy of one watt hour, J.
 WATT_HOUR = 3600.0
+# Columns of the table of a front.
 COLUMNS = ("plan", "length_m", "exposure_s", "clearance_m", "energy_wh", "time_s")
+# Files of the pictures of a front.
 PICTURES = ("front-map.png", "front-values.png")
+# All files of a front that planfly may write.
 FRONT_FILES = (
     *(f"plan-{number}.json" for number in range(1, int(RANGES["front"].high) + 1)),
     *("front.csv", "front.json", *PICTURES),
@@ -47,15 +52,14 @@ def plan_front(
     stop: Callable[[], bool] | None = None,
     **options: Unpack[FlightOptions],
 ) -> Front:
-    """Plan a choice of ways: plans of which none is better than another in all of what they are compared by.
+    """Plan a Pareto front: plans of which none is better than another plan in every criterion.
 
-    They are compared by length, exposure to radars, least height above ground, and energy; by time in place of energy
-    where the scenario's ``[planner] objective`` is "time" or the aircraft's power is not known.  Each has its own
-    certificate and is safe.  Each gains something that is noticed over those taken before it: more than 0.1 % in length
-    or energy, 1 % in exposure or 1 m in height.  There may be fewer such plans than asked for; where no safe plan is
-    found there is none.
+    The criteria are length, exposure to radars, least height above ground, and energy; time replaces energy if the
+    scenario's ``[planner] objective`` is "time" or the power of the aircraft is not known.  Each plan has its own
+    certificate and is safe.  Each plan gains more than 0.1 % in length or energy, 1 % in exposure or 1 m in height over
+    the plans selected before it.  There may be fewer plans than requested; the front is empty if no safe plan is found.
 
-    count: plans at most, 2 to 100.
+    count: largest number of plans, 2 to 100.
     out: a folder for plan-1.json, plan-2.json, ..., the shortest first, their table as front.csv and front.json, and
     two pictures; {name} and {seed} in it stand for the scenario's name and the seed.
     The other keywords are as of `planfly.plan`.
@@ -80,7 +84,7 @@ def plan_front(
 
 
 def _write(front: Front, world: Scenario, folder: Path) -> None:
-    """Write plans, tables and pictures; of a front without plans the empty tables alone."""
+    """Write plans, tables and pictures; for a front without plans only the empty tables."""
     for number, one in enumerate(front.plans, 1):
         write_whole(folder / f"plan-{number}.json", plan_json(one.plan))
     rows = table_rows(front)
@@ -114,7 +118,7 @@ def _write(front: Front, world: Scenario, folder: Path) -> None:
 
 
 def table_rows(front: Front) -> list[dict[str, Any]]:
-    """Return rows of a front's table, by `COLUMNS`; None for energy that is not known."""
+    """Return the rows of the table of a front, by `COLUMNS`; None for an unknown energy."""
     return [_row(number, one) for number, one in enumerate(front.plans, 1)]
 
 

@@ -37,9 +37,9 @@ from world.extras import needs_extra
 from world.files import whole_path, write_folder
 from world.scenario_tables import names_folder
 
-# How far from its base an aircraft may be, as a factor of mass and span, before the prior is none.
-_FARTHEST = 1.6
-# Ranges of what is stated, with their units: of small aircraft.
+# Largest ratio of stated and base mass or span, either way, for which the base is still a usable prior.
+_MAX_SIZE_RATIO = 1.6
+# Allowed range and unit of each stated number, for small aircraft.
 _RANGES = {"mass": (0.3, 50.0, "kg"), "span": (0.4, 10.0, "m"), "area": (0.03, 10.0, "m2")}
 
 
@@ -47,7 +47,7 @@ _RANGES = {"mass": (0.3, 50.0, "kg"), "span": (0.4, 10.0, "m"), "area": (0.03, 1
 class SlowLog:
     """A log with few rows of inertial sensors or outputs.
 
-    source: the file.  hertz: rows a second.  setting: the autopilot's parameter with the value that records more.
+    source: the file.  hertz: rows per second.  setting: the autopilot parameter with the value that records more rows.
     """
 
     source: str
@@ -59,14 +59,14 @@ class SlowLog:
 class IdentifiedAircraft:
     """Result of `planfly.identify_aircraft`.
 
-    aircraft: as its folder has it.
-    estimate: of each parameter, with covariance.
+    aircraft: the aircraft as written to its folder.
+    estimate: estimate of each parameter, with covariance.
     climb, sink: steepest at cruise, full throttle and idle, degrees: lower end, estimate and upper end (95 %).
-    power: of level flight at cruise, W, likewise.
-    replays: of the check log, by the base and by the identified model; none without one.
-    without_current: logs without the battery's current where others have it: it is used of none then.
-    slow: logs with few rows a second.
-    wide: numbers that the logs leave wide, each with the flight that would narrow it.
+    power: power of level flight at cruise, W: lower end, estimate and upper end (95 %).
+    replays: replays of the check log by the base and by the identified model; empty without a check log.
+    without_current: logs without battery current, if others have it; the current of no log is used then.
+    slow: logs with few rows per second.
+    wide: numbers with a wide interval, each with the flight that would narrow it.
     """
 
     aircraft: Aircraft
@@ -93,14 +93,15 @@ def identify_aircraft(
     base: str | Path = "aerosonde",
     check: str | Path | None = None,
 ) -> IdentifiedAircraft:
-    """Make the folder of an aircraft from flight logs of ArduPlane or PX4, with what is not known of it.
+    """Make the folder of an aircraft from flight logs of ArduPlane or PX4, with a list of what is unknown.
 
     logs: `.BIN` or `.ulg` of one aircraft with one mass, with inertial sensors and servo outputs.
-    folder: to make, which must not be there yet.
-    mass: kg, in flight.  span: of the wing, m.  area: of the wing, m^2; None for the base's share of the span squared.
-    battery: volts and capacity, "44.4V,888Wh"; None for the base's.
-    base: the aircraft that it is most like, by name or folder: what its logs do not show stays the base's.
-    check: a log that is not among them, to replay with both models.
+    folder: the folder to make, which must not exist.
+    mass: kg, in flight.  span: of the wing, m.  area: of the wing, m^2; None takes the ratio of area to squared span
+    from the base.
+    battery: volts and capacity, "44.4V,888Wh"; None takes the battery of the base.
+    base: the most similar aircraft, by name or folder; it supplies every property that the logs do not show.
+    check: a log that is not among `logs`, to replay with both models.
     Raises a `planfly.PlanflyError` for logs that cannot be used; nothing is written then.
     """
     target = check_new_folder(Path(folder))
@@ -154,20 +155,20 @@ def _base(base: str | Path) -> Aircraft:
 
 
 def _check_stated(stated: dict[str, float], prior: Aircraft) -> None:
-    """Refuse numbers of no small aircraft, and a base that is of another class.  Raises FlightError."""
+    """Raise FlightError for numbers outside the range of small aircraft, and for a base of another class."""
     for name, value in stated.items():
         low, high, unit = _RANGES[name]
         if isinstance(value, bool) or not low <= value <= high:
             raise FlightError.of_argument(name, value, f"allowed {low:g}..{high:g} {unit}", shown=f"{value} {unit}")
     for name, value, own in (("mass", stated["mass"], prior.mass), ("span", stated["span"], prior.wing_span)):
-        if not 1.0 / _FARTHEST <= value / own <= _FARTHEST:
-            allowed = f"{own / _FARTHEST:.3g}..{own * _FARTHEST:.3g} is near enough to {prior.name}"
+        if not 1.0 / _MAX_SIZE_RATIO <= value / own <= _MAX_SIZE_RATIO:
+            allowed = f"{own / _MAX_SIZE_RATIO:.3g}..{own * _MAX_SIZE_RATIO:.3g} is near enough to {prior.name}"
             advice = "planfly aircraft --new FOLDER makes a base from a data sheet, for `base`"
             raise FlightError.of_argument(name, value, f"{allowed}; {advice}", shown=f"{value:g}")
 
 
 def _refuse_equal(logs: Sequence[MotionLog]) -> None:
-    """Refuse the same log twice, and a check log that was identified from.  Raises LogError."""
+    """Refuse the same log twice, and a check log that is also used for identification.  Raises LogError."""
     first: dict[str, str] = {}
     for log in logs:
         if log.sha256 in first:
@@ -179,9 +180,10 @@ def _refuse_equal(logs: Sequence[MotionLog]) -> None:
 
 
 def _stretches(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
-    """Return the log's stretches, and its outputs: the base's own where it has the same outputs, rigged as stated.
+    """Return the flight records of a log, and the servo outputs of the aircraft.
 
-    Those of PX4, and elevons, which are mixed within the model, leave the base's own.
+    The outputs are the base's own if they all match the outputs of the log, otherwise the outputs of the log.  With
+    PX4, and with elevons, which are mixed within the model, they are the base's own.
     """
     file = prior.folder / "ardupilot.toml"
     own = read_servos(file) if file.is_file() else {}
@@ -196,14 +198,14 @@ def _stretches(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRecord], dic
 
 
 def _own_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
-    """Return number of the output of each control that has one of its own."""
+    """Return the output number of each control that has an output of its own."""
     if log.program_kind == "px4":
         return {}
     return {name: output.output for name, output in log_outputs(log, prior).items()}
 
 
 def _same(one: ServoOutput, other: ServoOutput) -> bool:
-    """Return True if two are the same output over the same travel, the same way round."""
+    """Return True if two outputs have the same number, travel and direction."""
     (a, *_, b), (c, *_, d) = one.value, other.value
     ends = (one.pulse[0], one.pulse[-1]) == (other.pulse[0], other.pulse[-1])
     return one.output == other.output and ends and (b - a) * (d - c) > 0.0
@@ -244,11 +246,12 @@ def _wide(found: Identified) -> tuple[WideNumber, ...]:
     return wide_numbers(sink, power, with_current=found.estimate.with_current)
 
 
+# Lower end, estimate and upper end (95 %).
 Interval = tuple[float, float, float]
 
 
 def _intervals(found: Identified) -> tuple[Interval, Interval, Interval]:
-    """Climb and sink, degrees, and power, W: lower end, estimate and upper end (95 %)."""
+    """Return climb and sink, degrees, and power, W, each as lower end, estimate and upper end (95 %)."""
     best, drawn = found.performance()
 
     def interval(value: Floats, draws: Floats, factor: float = 1.0) -> Interval:
@@ -264,12 +267,12 @@ def _intervals(found: Identified) -> tuple[Interval, Interval, Interval]:
 
 
 def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
-    """Logs without the battery's current, where another has it."""
+    """Return the names of logs without battery current, if another log has it."""
     lacking = {record.source: None for record in records if not record.has_current}
     return tuple(lacking) if any(record.has_current for record in records) else ()
 
 
 def slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
-    """Return those with few rows a second."""
+    """Return the logs with few rows per second."""
     rates = [(log, slowest_rows(log)) for log in logs]
     return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < PLENTY_HZ)

@@ -1,4 +1,4 @@
-"""Flights that another program logged: imported and judged, and their missions flown again; and damaged logs."""
+"""Import and judge flight logs of other programs, fly their missions again, recover damaged logs."""
 
 import tempfile
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ from planfly.workflow.output_paths import REFLOWN, REFLY_FILES, clean_folder, re
 from world.errors import LogError, ScenarioError
 from world.files import write_whole
 
-# Rows that are recorded at once: a recorder takes many times the bytes of a row for it.
+# Rows recorded per call: a recorder needs many times the bytes of a row.
 _ROWS_AT_ONCE = 4096
 
 
@@ -29,8 +29,8 @@ _ROWS_AT_ONCE = 4096
 class Reflown:
     """Result of `planfly.refly`.
 
-    flights: the longest stretch of the mission first, each beside its simulation.
-    lines: where model and flight differ, in words.
+    flights: each stretch of the mission with its simulation, the longest first.
+    lines: description of the differences between model and flight.
     files: pictures and logs of the simulated flights.
     """
 
@@ -41,7 +41,7 @@ class Reflown:
 
 @takes_options
 def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFlight:
-    """Read and judge a flight of another program's log; options as of `import_log`.
+    """Read and judge a flight from the log of another program; options as of `import_log`.
 
     Raises ScenarioError for an option that a flown log cannot take.
     """
@@ -58,15 +58,15 @@ def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFli
 def import_log(
     log: str | Path, target: str | Path | None = None, *, overwrite: bool = False, **options: Unpack[LogOptions]
 ) -> ImportedFlight:
-    """Read a flight of another program's log, judge it against its plan, and write it as a flight log.
+    """Read a flight from another program's log, judge it against its plan, and write it as a flight log.
 
     log: of ArduPilot (.BIN, .log), a ground station (.tlog), PX4 (.ulg), or a track (.gpx, .igc, .kml, .kmz).
-    target: the flight log to write, as MCAP; None writes none.  overwrite: whether an existing one is replaced.
+    target: the flight log to write, as MCAP; None writes none.  overwrite: True replaces an existing log.
     plan: the mission or plan.json that was to be flown, in place of the log's own mission.
-    flight: which of the log's flights, from 1; None for the longest in AUTO.
-    datum: what the log's heights are above where it does not say, "amsl" or "ellipsoid".
-    scenario, terrain, fence, wind, turbulence, at, aircraft: as of `planfly.fly`; without an aircraft no limits of an
-    aircraft are judged.  The other options are refused: the flight is judged by the speeds of its log.
+    flight: number of the flight in the log, from 1; None for the longest in AUTO.
+    datum: datum of the log's altitudes if the log does not state it, "amsl" or "ellipsoid".
+    scenario, terrain, fence, wind, turbulence, at, aircraft: as of `planfly.fly`; without an aircraft, aircraft limits
+    are not judged.  The other options are refused: the flight is judged by the speeds of its log.
     Raises a `planfly.PlanflyError` for bad input; nothing is written then.
     """
     if target is not None:
@@ -78,11 +78,11 @@ def import_log(
 
 
 def _write(target: Path, flight: ImportedFlight) -> None:
-    """The log, whole or not at all."""
+    """Write the log completely or not at all."""
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
         path = Path(folder) / target.name
         with Recorder(path, flight.setup) as recorder:
-            # Events first, so that each stands in the log where it happened.
+            # Events are written first, so that each one is at its time in the log.
             for event in flight.events:
                 recorder.event(event.time, event.text, event.level)
             for start in range(0, len(flight.track), _ROWS_AT_ONCE):
@@ -92,7 +92,7 @@ def _write(target: Path, flight: ImportedFlight) -> None:
 
 
 # ----------------------------------------------------------------------
-# The mission of an imported flight, flown again in JSBSim: where model and flight differ.
+# Fly the mission of an imported flight again in JSBSim, and compare model and flight.
 
 
 @with_warm_up(*FLYING)
@@ -108,8 +108,9 @@ def refly(
 
     log: a flight log that `planfly.import_log` wrote.
     out: a folder for pictures and for logs of the simulated flights; None writes none.
-    aircraft: that flies it, a name or a folder; None for the log's.  turbulence: in place of the log's.
-    overwrite: whether results that lie there are replaced.
+    aircraft: the aircraft to fly it, a name or a folder; None for the aircraft of the log.
+    turbulence: replaces the turbulence of the log.
+    overwrite: True replaces results in the folder.
     Raises a `planfly.PlanflyError` for bad input; nothing is written then.
     """
     check_arguments(turbulence=turbulence)
@@ -137,7 +138,7 @@ def refly(
 
 
 def _draw(folder: Path, again: Reflight, ending: str) -> list[Path]:
-    # matplotlib loads for pictures alone.
+    # Imported here: only pictures need matplotlib.
     from logs.views.compare import refly_charts
     from logs.views.drawing import draw_chart, png_bytes
 
@@ -150,7 +151,7 @@ def _draw(folder: Path, again: Reflight, ending: str) -> list[Path]:
 
 
 def _record(folder: Path, again: Reflight, log: FlightLog, ending: str) -> Path:
-    """Return the simulated flight as a log of its own, for `compare` and `replay`."""
+    """Write the simulated flight as a separate log, for `compare` and `replay`, and return its file."""
     path = folder / f"simulated{ending}.mcap"
     verdict = judge_flight(again.setup, again.simulated, again.ended)
     with Recorder(path, replace(again.setup, seed=log.setup.seed)) as recorder:
@@ -164,10 +165,11 @@ def _record(folder: Path, again: Reflight, log: FlightLog, ending: str) -> Path:
 
 
 def recover(log: str | Path, out: str | Path | None = None, *, overwrite: bool = False) -> FlightLog | None:
-    """Write what can be read of an unfinished or damaged flight log as a new one.
+    """Write the readable part of an unfinished or damaged flight log as a new log.
 
-    out: the new log; None for ``<log>-recovered.mcap`` beside it.  overwrite: whether an existing one is replaced.
-    Returns the flight as far as it can be read; None where the log is complete, and then nothing is written.
+    out: the new log; None for ``<log>-recovered.mcap`` next to the damaged one.
+    overwrite: True replaces an existing log.
+    Returns the readable part of the flight, or None if the log is complete; then nothing is written.
     Raises a `planfly.PlanflyError` for bad input.
 
     >>> import planfly, tempfile

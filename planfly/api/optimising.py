@@ -1,4 +1,4 @@
-"""The planner's estimation of distribution algorithms alone: any black box within bounds, by ask and tell."""
+"""Ask/tell interface to the planner's estimation of distribution algorithms, for any black box."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,18 +14,19 @@ from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from world.arrays import Floats
 
-# "umda": independent Gaussians, the paper's; "emna": one Gaussian of full covariance; "multistart": Gaussians of full
-# covariance from many starts; "differential": differential evolution, which is no EDA and stands beside them for
+# "umda": independent Gaussians, as in the paper; "emna": one Gaussian of full covariance; "multistart": Gaussians of
+# full covariance from many starts; "differential": differential evolution, which is not an EDA and is included for
 # comparison.
 Model = Literal["umda", "emna", "multistart", "differential"]
+# Optimiser class of each model.
 _MODELS = {"umda": Umda, "emna": Emna, "multistart": Multistart, "differential": DifferentialEvolution}
 
 
 @dataclass(frozen=True, slots=True)
 class BestFound:
-    """A point and what it is worth.
+    """A point with its objective values and constraint violations.
 
-    x: (d,).  values: (m,) of the objectives.  violations: (v,) of the constraints, 0 where met; empty without any.
+    x: (d,).  values: (m,) of the objectives.  violations: (v,) of the constraints, 0 if met; empty if there are none.
     """
 
     x: Floats
@@ -34,7 +35,7 @@ class BestFound:
 
     @property
     def value(self) -> float:
-        """Of the first objective."""
+        """Value of the first objective."""
         return float(self.values[0])
 
     @property
@@ -44,7 +45,7 @@ class BestFound:
 
 
 class Optimiser:
-    """A search within a box: `ask` gives points, `tell` takes what they are worth; made by `planfly.optimise`."""
+    """A search within a box, made by `planfly.optimise`: `ask` gives points, `tell` takes their values."""
 
     def __init__(
         self,
@@ -66,19 +67,19 @@ class Optimiser:
         self.evaluations = 0
 
     def ask(self) -> Floats:
-        """Return points (n, d) in the box that want values: the whole population first, then half of it at a time.
+        """Return points (n, d) in the box to evaluate: first the whole population, then half of it at a time.
 
-        "multistart" asks for as many as the generation of its search has.
+        "multistart" returns as many points as the current generation of its search has.
         """
         return np.array(self._search.ask())
 
     def tell(self, values: ArrayLike, violations: ArrayLike | None = None) -> None:
-        """Take what the points asked for are worth, and draw the next from the better half.
+        """Take the values of the points from `ask`, and draw the next points from the better half.
 
         values: (n,), less is better, or (n, m) for m objectives, between which Pareto dominance decides.
-        violations: (n,) or (n, v), how far each constraint is violated, 0 or less where it is met; less violation
-        counts before values.  What is not a number counts as worst.
-        Raises ValueError for another number of rows than was asked for, or of columns than before.
+        violations: (n,) or (n, v), amount by which each constraint is violated, 0 or less if it is met; a smaller
+        violation takes precedence over values.  NaN is treated as the worst value.
+        Raises ValueError if the number of rows differs from the points asked for, or the number of columns from before.
         """
         asked = self._search.ask()
         given = _columns("values", values, len(asked))
@@ -97,7 +98,7 @@ class Optimiser:
         self._search.tell(scores)
 
     def _keep(self, points: Floats, scores: Floats) -> None:
-        """Keep the points to which no other is preferred, the least first objective first."""
+        """Keep the points to which no other point is preferred, sorted by the first objective."""
         every, known = np.concatenate([self._points, points]), np.concatenate([self._scores, scores])
         first = np.flatnonzero(ranks(known, self._levels) == 0)
         order = first[np.argsort(known[first, self._violations], kind="stable")][: self._most]
@@ -105,7 +106,7 @@ class Optimiser:
 
     @property
     def best(self) -> BestFound:
-        """The best point evaluated; of several objectives the one of `front` that is best in the first.
+        """Best point evaluated; with several objectives, the point of `front` that is best in the first.
 
         Raises ValueError before the first `tell`.
         """
@@ -113,7 +114,7 @@ class Optimiser:
 
     @property
     def front(self) -> tuple[BestFound, ...]:
-        """The points to which no evaluated one is preferred, as many as the population at most."""
+        """Points to which no evaluated point is preferred, at most as many as the population."""
         if not self._levels:
             raise ValueError("nothing has been evaluated yet: call ask() and tell() first")
         v = self._violations
@@ -125,9 +126,9 @@ class Optimiser:
     def minimise(
         self, objective: Callable[[Floats], ArrayLike], generations: int = 100, *, evaluations: int | None = None
     ) -> BestFound:
-        """Ask and tell of an objective that takes points (n, d) and gives values (n,); the best found.
+        """Minimise an objective that takes points (n, d) and gives values (n,); return the best point found.
 
-        generations: how often; with evaluations, until there have been so many in all instead.
+        generations: number of generations.  evaluations: stop at this total number of evaluations instead.
         """
         if evaluations is None:
             for _ in range(generations):
@@ -151,19 +152,19 @@ def optimise(
     seed: int | np.random.Generator = 1,
     initial: ArrayLike | None = None,
 ) -> Optimiser:
-    """The planner's estimation of distribution algorithm alone, for any black box within bounds, by ask and tell.
+    """Return an ask/tell optimiser with the planner's algorithms, for any black box within bounds.
 
     lower, upper: (d,) box.
     model: "umda", the paper's univariate Gaussians; "emna", one Gaussian of full covariance; "multistart", Gaussians of
     full covariance from starts of many widths, for a cost with walls, gaps or several valleys; "differential",
-    differential evolution beside them.
-    population: even number of points, 4 at least; half of them are drawn again in each generation.  Of "multistart" the
-    largest generation.
+    differential evolution, for comparison.
+    population: even number of points, at least 4; half of them are drawn again in each generation.  For "multistart",
+    the size of the largest generation.
     seed: a whole number, or a generator of random numbers.
     initial: (population, d) first points; None for uniform.
-    Raises ValueError for a box that is none, and for another population.
+    Raises ValueError for invalid bounds or an invalid population.
 
-    A bowl's bottom at (1, 2), and the least on the side of a line that it does not lie on, 0.5 at (0.5, 1.5):
+    Minimum of a bowl at (1, 2); and, if a line separates it from the feasible side, a minimum of 0.5 at (0.5, 1.5):
 
     >>> import planfly
     >>> search = planfly.optimise([-5, -5], [5, 5], seed=1)
@@ -179,7 +180,7 @@ def optimise(
     >>> search.best.feasible, round(search.best.value, 1)
     (True, 0.5)
 
-    Eight waypoints through a wall that is open for 0.02 at 0.2 to each side: 1.08 long, around it 2.3:
+    Eight waypoints through a wall with gaps 0.02 wide at 0.2 to each side: length 1.08, or 2.3 around the wall:
 
     >>> def length(across):
     ...     wall = abs(across[:, 3] + across[:, 4]) / 2
@@ -205,7 +206,7 @@ def optimise(
 
 
 def _levels(violations: int, objectives: int) -> tuple[Level, ...]:
-    """Constraints, each with the goal 0, before objectives without goals."""
+    """Return the levels: constraints, each with the goal 0, before objectives without goals."""
     values = Level(tuple(range(violations, violations + objectives)), (NO_GOAL,) * objectives)
     return (Level(tuple(range(violations)), (0.0,) * violations), values) if violations else (values,)
 

@@ -1,4 +1,4 @@
-"""Plan a path, again in flight too, and list the scenarios to plan in."""
+"""Plan a path, plan again in flight, and list the embedded scenarios."""
 
 import math
 import time
@@ -27,7 +27,7 @@ from world.scenario import Scenario, embedded_scenarios, with_planner, with_thre
 # ----------------------------------------------------------------------
 # Plan a path.
 
-# A threat that has popped up: east and north, kill and detection radius, m; a radius of 0 for none.
+# A pop-up threat: east, north, kill radius and detection radius, m; a radius of 0 means no such zone.
 Threat = tuple[float, float, float, float]
 
 
@@ -43,16 +43,16 @@ def plan(
     """Plan a path across a scenario's terrain and threats, within what its aircraft can fly.
 
     scenario: an embedded name (`planfly.scenarios()` lists them), a TOML file's path, or a `Scenario`.
-    out: where to write it as plan.json; {name} and {seed} in it stand for the scenario's name and the seed.
-    overwrite: whether an existing file is replaced.
+    out: file for the plan.json; {name} and {seed} in it stand for the scenario's name and the seed.
+    overwrite: True replaces an existing file.
 
-    seed: of the search; None takes the scenario's, or 1.
+    seed: of the search; None takes the seed of the scenario, or 1.
     algorithm: a name of ``planfly plan --help``; None for the default.
-    budget: evaluations at most.  seconds: time at most; the best path so far is given then.
-    stop: called between generations; once it returns True, the best path so far is given.
-    terrain to nav: the flight that is planned for, as of `planfly.fly`.
+    budget: largest number of evaluations.  seconds: time limit, after which the best path found is returned.
+    stop: called between generations; once it returns True, the best path found is returned.
+    terrain to nav: the flight to plan for, as of `planfly.fly`.
 
-    No feasible path is a plan that says so (`Plan.feasible`, `Plan.safe`), not an error; bad input raises a
+    If no feasible path is found, the returned plan says so (`Plan.feasible`, `Plan.safe`); bad input raises a
     `planfly.PlanflyError`.
 
     >>> import planfly
@@ -79,11 +79,11 @@ def replan(
     overwrite: bool = True,
     **options: Unpack[PlanOptions],
 ) -> Plan:
-    """Plan again in flight: the legs that are flown stay, and what follows goes around threats that have popped up.
+    """Plan again in flight: keep the flown legs, and route the rest around new threats.
 
     scenario: as of `planfly.plan`; threats that only the old plan knew are kept.
     old: the plan that is being flown, or its file.  at_leg: the leg that is about to be flown, from 0.
-    threats: new ones: east, north, kill radius and detection radius of each, m; a radius of 0 for none.
+    threats: new threats: east, north, kill radius and detection radius of each, m; a radius of 0 means no such zone.
     The other keywords are as of `planfly.plan`.
     Raises a `planfly.PlanflyError` for bad input, and for a plan of another mission.
 
@@ -105,7 +105,7 @@ def _with_budget(scenario: Scenario, budget: int | None) -> Scenario:
 
 
 def _with_new_threats(scenario: Scenario, old: Plan, threats: Sequence[Threat]) -> Scenario:
-    """A scenario with those of the old plan's threats that it lacks, and with new ones.  Raises ScenarioError."""
+    """Return a scenario with the old plan's threats it lacks, and with new threats.  Raises ScenarioError."""
     for east, north, _, _ in threats:
         if scenario.terrain is not None and math.isnan(scenario.terrain.height(east, north)):
             place = f"east {east:g} m, north {north:g} m: outside the terrain that is known"
@@ -122,7 +122,10 @@ def _planned(
     out: str | Path | None,
     overwrite: bool,
 ) -> Plan:
-    """Search, and write the plan.  flown: the plan that is being flown and the leg to plan from; None for a new one."""
+    """Search, and write the plan.
+
+    flown: the plan being flown and the leg to plan from; None for a new plan.
+    """
     number, target = choose_seed(world, options["seed"]), None
     if out is not None:
         read = None if isinstance(source, Scenario) else Path(source)
@@ -137,7 +140,7 @@ def _planned(
 
 
 def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
-    """Return what a search asks between generations: "interrupted", "budget" after so many seconds, or "" to go on."""
+    """Return the check between generations: "interrupted", "budget" after `seconds`, or "" to go on."""
     deadline = None if seconds is None else time.monotonic() + seconds
 
     def ends() -> str:
@@ -149,14 +152,14 @@ def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> St
 
 
 def conditions_of_plan(plan: Plan) -> Conditions:
-    """Aircraft, speed, weather, autopilot and ground that a plan is for."""
+    """Return the aircraft, speed, weather, autopilot and ground that a plan was made for."""
     aircraft, _ = find_airframe(plan.scenario)
     autopilot = load_autopilot(plan.scenario, aircraft)
     return conditions_of(plan.scenario, aircraft.name, cruise_airspeed(plan.scenario, aircraft, autopilot), autopilot)
 
 
 def what_blocks(plan: Plan) -> tuple[str, ...]:
-    """Return what is in the way of a plan that is not feasible, a line each; nothing for a feasible one.
+    """Return the reasons why a plan is not feasible, a line each; empty for a feasible plan.
 
     >>> import planfly
     >>> planfly.what_blocks(planfly.plan("tight", seed=1))
@@ -168,7 +171,7 @@ def what_blocks(plan: Plan) -> tuple[str, ...]:
 
 
 def scenarios() -> dict[str, str]:
-    """Return name and description of each embedded scenario.
+    """Return the name and description of each embedded scenario.
 
     >>> import planfly
     >>> list(planfly.scenarios())[0]

@@ -1,4 +1,4 @@
-"""A recorded flight again: as a timeline, as instruments, as a film, in Foxglove and in ground stations."""
+"""Replay a recorded flight as a timeline, instruments or a film, in Foxglove or in ground stations."""
 
 import math
 import re
@@ -17,14 +17,14 @@ from world.errors import LogError
 from world.extras import needs_extra
 from world.running_clock import RunningClock
 
-# Numbers that may be meant as ports that ground stations listen at.
+# Numbers that may be meant as the port of a ground station.
 _PORTS = range(1024, 65536)
-# A scheme, a name in small letters, as browsers write it, and a port.
+# Origin of web pages: a scheme, a lower-case host name, as browsers write it, and a port.
 _ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[a-z0-9._\[\]:-]+")
-# Frames a second of instruments.
+# Frame rate of the instruments, Hz.
 _FRAMES = 10.0
-# Seconds to wait for a ground station unless another time is given.
-_STATION_PATIENCE = 10.0
+# Default time to wait for a ground station, s.
+_STATION_TIMEOUT_S = 10.0
 
 
 def _opened(log: FlightLog | str | Path) -> FlightLog:
@@ -32,7 +32,7 @@ def _opened(log: FlightLog | str | Path) -> FlightLog:
 
 
 def replayed_part(log: FlightLog, start: float | None, end: float | None) -> tuple[float, float]:
-    """Start and end of what is replayed, s of the flight.  Raises LogError where there is nothing between them."""
+    """Return start and end of the replayed part, s of the flight.  Raises LogError if the part is empty."""
     check_arguments(start=start, end=end)
     first = start if start is not None else float(log.track.time[0])
     last = log.end_time if end is None else min(end, log.end_time)
@@ -52,7 +52,7 @@ def replayed_part(log: FlightLog, start: float | None, end: float | None) -> tup
 def timeline(
     log: FlightLog | str | Path, *, start: float | None = None, end: float | None = None
 ) -> tuple[TimelineEntry, ...]:
-    """Return what happened in a flight, in order of time: legs, turns, clearances, threats and events.
+    """Return the timeline of a flight: legs, turns, clearances, threats and events in order of time.
 
     log: a flight log, or its path.  start, end: of the part that is listed, s of the flight; None for all of it.
     Raises a `planfly.PlanflyError` for bad input.
@@ -69,7 +69,7 @@ def timeline(
 
 @with_warm_up()
 def instruments(log: FlightLog | str | Path) -> Instruments:
-    """Return the instruments of a recorded flight: `Instruments.frame` gives them at a time, as lines of text.
+    """Return the instruments of a recorded flight; `Instruments.frame` gives their text lines at a time.
 
     >>> import planfly
     >>> from logs.recording.example_log import example_log
@@ -87,11 +87,12 @@ def replay(
     speed: float | None = None,
     width: int | Callable[[], int] = 80,
 ) -> Iterator[tuple[float, list[str]]]:
-    """Play a flight by the clock, as the command does on a terminal: ten times a second, and once at its end.
+    """Play a flight in real time, as the command does: ten times a second, and once at its end.
 
     start, end: of the part that is played, s of the flight; None for all of it.  speed: times real time, 1 if None.
-    width: of the lines, in characters, 60 at least, or what tells it when they are made.
-    Gives the time, s of the flight, and the instruments as lines of text.  A machine that sleeps makes it wait, too.
+    width: of the lines, in characters, at least 60, or a function that returns it for each frame.
+    Yields the time, s of the flight, and the instruments as lines of text.  The replay also pauses while the machine
+    sleeps.
     Raises a `planfly.PlanflyError` for bad input, at once.
 
     >>> import planfly
@@ -131,10 +132,10 @@ def movie(
 
     out: a .gif, an .mp4 (which needs ffmpeg), or a folder for PNG frames.
     start, end: of the part that is drawn, s of the flight; None for all of it.
-    speed: times real time; None for a film of 20 s.  overwrite: whether an existing target is replaced.
+    speed: times real time; None for a film of 20 s.  overwrite: True replaces an existing target.
     Returns the files written.  Raises a `planfly.PlanflyError` for bad input.
     """
-    # matplotlib loads for pictures alone.
+    # Imported here: only films need matplotlib.
     from planfly.replays.movie import write_movie
 
     check_arguments(speed=speed)
@@ -168,13 +169,13 @@ def play_to_foxglove(
     """Play a flight to Foxglove on this machine over WebSocket; needs the extra ``planfly[foxglove]``.
 
     start, end: of the part that is played, s of the flight; None for all of it.  speed: times real time, 1 if None.
-    port: 0 for any that is free.  wait: for the first viewer, s; None without end.
-    allow_origin: web pages that may connect beside Foxglove's own, each as "https://HOST"; several are a sequence, or
-    separated by commas.
-    stop: asked all the time; once it is true the call returns.  on_message: called with the address.
+    port: 0 for any free port.  wait: time to wait for the first viewer, s; None waits without limit.
+    allow_origin: web pages that may connect in addition to Foxglove's own, each as "https://HOST"; several are a
+    sequence, or separated by commas.
+    stop: polled continuously; once it returns True the call returns.  on_message: called with the address.
     Raises a `planfly.PlanflyError` for bad input, and if no client subscribes in time.
     """
-    # Nobody else needs foxglove-sdk.
+    # Imported here: only this function needs foxglove-sdk.
     from planfly.replays import foxglove_server
 
     check_arguments(speed=speed, port=port, wait=wait)
@@ -196,7 +197,7 @@ def play_to_foxglove(
 
 
 def _origin(text: str) -> str:
-    """Return the origin of web pages, as browsers state it.  Raises LogError for what is none."""
+    """Return the origin of web pages, as browsers state it.  Raises LogError for an invalid origin."""
     if not _ORIGIN.fullmatch(text):
         allowed = "the origin of a web page is expected, such as https://example.com or http://localhost:8080"
         raise LogError.of_argument("allow_origin", text, allowed)
@@ -217,14 +218,14 @@ def play_to_stations(
     stop: Callable[[], bool] = _never,
     on_message: Callable[[str], None] = _ignore,
 ) -> None:
-    """Play a flight into MAVLink ground stations, as if it were flown now; needs the extra ``planfly[live]``.
+    """Play a flight into MAVLink ground stations as if it were flown now; needs ``planfly[live]``.
 
-    to: where they listen, IP:PORT, one or several.  bind, allow, sign_key: as of `planfly.serve`.
-    speed: times real time, 1 if None.  wait: for the first station, s; 10 if None.
-    stop: asked all the time; once it is true the call returns.  on_message: called with what happens, a line each.
-    Raises a `planfly.PlanflyError` for bad input, and where no station answers in time.
+    to: addresses of the stations, IP:PORT, one or several.  bind, allow, sign_key: as of `planfly.serve`.
+    speed: times real time, 1 if None.  wait: time to wait for the first station, s; 10 if None.
+    stop: polled continuously; once it returns True the call returns.  on_message: called with one line for each event.
+    Raises a `planfly.PlanflyError` for bad input, and if no station answers in time.
     """
-    # Nobody else needs MAVLink.
+    # Imported here: only this function needs MAVLink.
     from planfly.replays import stations
 
     check_arguments(speed=speed, wait=wait)
@@ -233,7 +234,7 @@ def play_to_stations(
         _opened(log),
         access,
         speed=speed or 1.0,
-        wait=_STATION_PATIENCE if wait is None else wait,
+        wait=_STATION_TIMEOUT_S if wait is None else wait,
         stopped=stop,
         on_message=on_message,
     )

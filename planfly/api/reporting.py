@@ -25,6 +25,7 @@ from world.html_table import html_table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# Flight or plan to report.
 Source = FlightLog | FlownMission | Plan | str | Path
 
 
@@ -32,8 +33,8 @@ Source = FlightLog | FlownMission | Plan | str | Path
 class WrittenReport:
     """Files that `planfly.report` wrote.
 
-    page: the HTML page, which needs no other file.  files: it and the pictures beside it.
-    verdict: of the flight or plan that it shows.
+    page: the HTML page, which needs no other file.  files: the page and the separate pictures.
+    verdict: verdict on the flight or plan shown.
     """
 
     page: Path
@@ -46,7 +47,7 @@ class WrittenReport:
 
 
 class _Shown(NamedTuple):
-    """Content of pictures and pages; versions of the packages that flew it, None for the present packages."""
+    """Content of pictures and pages, and package versions of the flight, None for the installed ones."""
 
     setup: FlightSetup
     verdict: Verdict
@@ -60,8 +61,9 @@ class _Shown(NamedTuple):
 def figures(source: Source) -> "dict[str, Figure]":
     """Return the pictures of a flight, or of a plan that was not flown, as matplotlib figures by name.
 
-    source: a flight log or its path, what `planfly.fly` gave, or a `Plan`.
-    "map", "profile", "scene", "turns", "envelope", and of a flight "time", "exposure", "controls" and "energy".
+    source: a flight log or its path, a result of `planfly.fly`, or a `Plan`.
+    The names are "map", "profile", "scene", "turns", "envelope", and for a flight also "time", "exposure", "controls"
+    and "energy".
     Raises a `planfly.PlanflyError` for bad input.
 
     >>> import planfly
@@ -69,7 +71,7 @@ def figures(source: Source) -> "dict[str, Figure]":
     >>> type(drawn["map"])
     <class 'matplotlib.figure.Figure'>
     """
-    # matplotlib loads for pictures alone.
+    # Imported here: only pictures need matplotlib.
     from logs.views.figures import draw_figures
 
     shown = _shown(source)
@@ -87,9 +89,9 @@ def report(
 ) -> WrittenReport:
     """Write ``report.html`` and its figures into a folder, made if it is missing.
 
-    source: as of `planfly.figures`.  out: the folder.  svg: the figures as SVG, too.
-    overwrite: whether results that lie there may be replaced.  command: the line that repeats it, for the page.
-    Raises a `planfly.PlanflyError` for bad input, and for a folder that holds anything.
+    source: as of `planfly.figures`.  out: the folder.  svg: True also writes the figures as SVG.
+    overwrite: True replaces results in the folder.  command: the command line that repeats the report, for the page.
+    Raises a `planfly.PlanflyError` for bad input, and for a folder that is not empty.
 
     >>> import planfly, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -121,7 +123,7 @@ def report(
 def foxglove_layout(file: str | Path, *, overwrite: bool = False) -> Path:
     """Write the layout file with which Foxglove shows flight logs.
 
-    overwrite: whether an existing file is replaced.
+    overwrite: True replaces an existing file.
     Raises a `planfly.PlanflyError` for a file that cannot be written.
 
     >>> import planfly, tempfile
@@ -143,7 +145,7 @@ def compare(
     svg: bool = False,
     overwrite: bool = False,
 ) -> Comparison:
-    """Return two flights judged and measured alike.
+    """Judge and measure two flights in the same way, and compare them.
 
     first, second: flight logs, or their paths.
     out: a folder for ``compare.html`` and its pictures; None draws none.  svg, overwrite: as of `planfly.report`.

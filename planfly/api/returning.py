@@ -1,4 +1,4 @@
-"""Will it come home?  From everywhere on the way of a mission, a plan or a flight, with its engine and without."""
+"""Judge returns to launch from every place on a mission, plan or flight, with and without engine."""
 
 import shutil
 from dataclasses import dataclass, replace
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Suggested:
-    """A remedy, and the returns with it: by the control law, the least certain ones in JSBSim."""
+    """A remedy and the returns with it, flown by the control law; the least certain ones also in JSBSim."""
 
     remedy: Remedy
     returns: Returns
@@ -63,12 +63,12 @@ class Suggested:
 class ReturnsFound:
     """Result of `planfly.returns`.
 
-    setup: what was flown, and by what.
-    returns: each of them, and in ranges of seconds, the worst first.
-    glides: what can be reached where the engine stops; empty where that was not asked.
-    suggested: what would help, the plainest first, each with the returns that it leads to; none where none was asked.
-    files: written, none where no folder was named.
-    by_program: the worst, flown by ArduPlane itself; None where none was named.
+    setup: the flown mission, its aircraft and its autopilot.
+    returns: all returns, and the same in ranges of seconds, the worst first.
+    glides: places that can be reached after an engine failure; empty if they were not requested.
+    suggested: remedies, the simplest first, each with the returns it leads to; empty if none were requested.
+    files: files written; empty if no folder was named.
+    by_program: the worst returns, flown by ArduPlane itself; None if no program was named.
     """
 
     setup: FlightSetup
@@ -80,17 +80,17 @@ class ReturnsFound:
 
     @property
     def safe(self) -> bool:
-        """True if every return is."""
+        """True if every return is safe."""
         return self.returns.safe
 
     @property
     def undecided(self) -> bool:
-        """True if none is known to be unsafe, and of some it is not known."""
+        """True if no return is known to be unsafe, and some are undecided."""
         return self.returns.undecided
 
     @property
     def headline(self) -> str:
-        """All of them in a line."""
+        """Summary of all returns, in one line."""
         return headline(self.returns)
 
     @property
@@ -100,29 +100,29 @@ class ReturnsFound:
 
     @property
     def lines_of_ranges(self) -> tuple[str, ...]:
-        """Each range of seconds in words, the worst first."""
+        """Description of each range of seconds, the worst first."""
         return tuple(range_text(one, self.returns, self.setup.scenario) for one in self.returns.ranges)
 
     @property
     def lines_of_program(self) -> tuple[str, ...]:
-        """Outcomes of the worst returns by the ArduPlane program and by the control law; empty if it flew none."""
+        """Outcomes of the worst returns by the ArduPlane program and by the law; empty if it flew none."""
         if self.by_program is None:
             return ()
         return (self.by_program.headline(), *self.by_program.lines(self.returns, self.setup.scenario))
 
     @property
     def line_of_no_return(self) -> str:
-        """From where on the battery no longer brings it back."""
+        """Description of the point after which the battery no longer suffices for the return."""
         return no_return_text(self.returns)
 
     @property
     def headline_of_glides(self) -> str:
-        """Reach of the aircraft without its engine, in a line."""
+        """Reach of the aircraft without its engine, in one line."""
         return glides_headline(self.glides)
 
     @property
     def lines_of_glides(self) -> tuple[str, ...]:
-        """Each range of seconds from which the same can be reached without the engine, in words, by time."""
+        """Description of each range of seconds with the same reachable place without the engine, by time."""
         return tuple(glide_range_text(one, self.glides) for one in self.glides.ranges)
 
     @property
@@ -160,7 +160,7 @@ class ReturnsFound:
         return f"<ReturnsFound {self.setup.scenario.name}: {self.headline}>"
 
 
-# Why a flight takes no other world.
+# Reason why the returns of a flight cannot be judged in another world, in messages.
 _AS_FLOWN = "a flight's returns are flown as it was flown; only `terrain` replaces its ground"
 
 
@@ -177,14 +177,14 @@ def returns(
     overwrite: bool = True,
     **options: Unpack[LogOptions],
 ) -> ReturnsFound:
-    """Fly the return to launch from everywhere on the way, judge each, and tell what is reached without an engine.
+    """Fly and judge returns to launch from every place on a flight, and find places in gliding range.
 
-    what: a `Plan`, the path of a plan.json, .waypoints or .plan, which is flown first; or a flight: what `planfly.fly`
-    gave, a flight log or its path, or an autopilot's log.
-    every: s between two returns.  suggest: whether to look for what would make all of them safe.
-    autopilot: ArduPlane's program, which then flies the worst ``points`` of them, too, far apart.
-    out: folder for pictures; None writes none.  overwrite: whether results in it are replaced.
-    options: of a plan or mission, as of `planfly.fly`; of a flight only terrain.
+    what: a `Plan`, the path of a plan.json, .waypoints or .plan, which is flown first; or a flight: a result of
+    `planfly.fly`, a flight log or its path, or an autopilot's log.
+    every: time between two returns, s.  suggest: True looks for remedies that make all returns safe.
+    autopilot: ArduPlane's program, which then also flies the worst ``points`` returns, spaced far apart.
+    out: folder for pictures; None writes none.  overwrite: True replaces results in the folder.
+    options: for a plan or mission, as of `planfly.fly`; for a flight, only terrain.
     plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a home.
 
@@ -210,14 +210,14 @@ def returns(
 
 
 def _imported(path: Path, options: LogOptions) -> "ImportedFlight":
-    # Imported here: no other call needs the libraries that read other programs' logs.
+    # Imported here: only this call needs the libraries that read the logs of other programs.
     from planfly.api.imported import read_imported
 
     return read_imported(path, **options)
 
 
 def _over(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
-    """Return a setup with another ground, where one is named."""
+    """Return the setup over the named terrain, or as it is if none is named."""
     return setup if terrain is None else setup.in_scenario(over_terrain(setup.scenario, str(terrain)))
 
 
@@ -235,7 +235,10 @@ class _Asked(NamedTuple):
 def _asked(
     every: float, suggest: bool, out: str | Path | None, autopilot: str | Path | None, points: int, *, overwrite: bool
 ) -> _Asked:
-    """The same, checked.  Raises PlanflyError for a folder that is a file, or holds anything, and a wrong program."""
+    """Check a request.
+
+    Raises PlanflyError for a folder that is a file or is not empty, and for a wrong program.
+    """
     program = named_program(autopilot)
     if program is not None:
         refuse_program(program)
@@ -250,7 +253,7 @@ def _of_import(found: "ImportedFlight", asked: _Asked) -> ReturnsFound:
 
 def _of_mission(setup: FlightSetup, asked: _Asked) -> ReturnsFound:
     """Fly a mission, and judge the returns of its flight."""
-    return_world(setup)  # Raises before it is flown.
+    return_world(setup)  # Raises errors before the flight.
     with stage("flying the mission"):
         flown = fly_and_judge(setup, airframe_of(setup), None, reference="never")
     return _judged(flown.setup, flown.track, asked, flown.ended)
@@ -292,8 +295,8 @@ def _judged(setup: FlightSetup, track: Track, asked: _Asked, ended: str) -> Retu
 
 
 def _suggested(world: ReturnWorld, starts: ReturnStarts, found: ReturnsFound, every: float) -> tuple[Suggested, ...]:
-    """Return what helps of what would make them safe."""
-    # What sinks to the ground in a take-off or a landing, nothing of this would help.
+    """Return the suggested remedies that improve the returns."""
+    # Remedies do not help a return that sinks to the ground in a take-off or a landing.
     judged = [one.time for one in found.returns.each]
     aloft = starts.at(np.flatnonzero(np.isin(starts.time, judged)))
     with stage("looking for what would make them safe"):
@@ -306,8 +309,8 @@ def _suggested(world: ReturnWorld, starts: ReturnStarts, found: ReturnsFound, ev
 
 
 def _files(setup: FlightSetup, track: Track, drawn: DrawnReturns) -> dict[str, bytes]:
-    """Pictures of returns, and the map with their lines and shapes, by file name."""
-    # matplotlib loads for pictures alone.
+    """Draw the pictures of returns, and the map with their lines and shapes, by file name."""
+    # Imported here: only pictures need matplotlib.
     from logs.views.figures import draw_pictures, return_views
 
     flown = [track_line(setup, track)] if len(track) else []

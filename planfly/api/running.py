@@ -1,4 +1,4 @@
-"""The whole chain into one folder: plan, export, fly, record, judge and report, once or in rounds."""
+"""Run the whole chain into one folder: plan, export, fly, record, judge and report, once or in rounds."""
 
 import contextlib
 import json
@@ -38,13 +38,13 @@ class Round:
     """One round of a run.
 
     number: from 0.
-    changes: what was tightened for its planning, a line each.
-    verdict: on its flight, or on its plan where nothing was flown.
-    flown: whether it was flown.
-    folder: where its files are.
+    changes: limits tightened for its planning, a line each.
+    verdict: verdict on its flight, or on its plan if nothing was flown.
+    flown: True if it was flown.
+    folder: the folder of its files.
     notes: on the scenario's zones and the mission's route.
-    has_log: whether a flight log was written.
-    returns_line: returns from a few places of the flight in a line; "" where nothing was flown.
+    has_log: True if a flight log was written.
+    returns_line: returns from a few places of the flight, in one line; "" if nothing was flown.
     """
 
     number: int
@@ -62,9 +62,9 @@ class RunResult:
     """Result of `planfly.run`.
 
     scenario: its name.  seed: of planner and turbulence.
-    folder: where the files are; those of earlier rounds in round-0, round-1, ...
-    rounds: at least one; the last one's verdict is the answer.
-    ended: why no round followed.
+    folder: the folder of the files; the files of earlier rounds are in its subfolders round-0, round-1, ...
+    rounds: at least one; the verdict of the last round is the answer.
+    ended: reason why no further round followed.
     """
 
     scenario: str
@@ -75,12 +75,12 @@ class RunResult:
 
     @property
     def verdict(self) -> Verdict:
-        """Of the last round."""
+        """Verdict of the last round."""
         return self.rounds[-1].verdict
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The files in the folder itself."""
+        """Files in the folder, without its subfolders."""
         found = (self.folder / name for name in (*RUN_FILES, "rounds.json"))
         return tuple(file for file in found if file.exists())
 
@@ -89,14 +89,14 @@ class RunResult:
 class _Task:
     """Settings that every round has in common.
 
-    scenario: what each round is judged in.
-    airframe: its aircraft.
-    command: the line that repeats it, for the report.
-    folder: where the results go.
-    program: of an autopilot, None for planfly's own simulation.
-    reference: when reference flights are flown.
-    limits: how long it may fly, and how large its log may grow.
-    every: of so many rows one goes into the log.
+    scenario: the scenario that each round is judged in.
+    airframe: the aircraft of the scenario.
+    command: the command line that repeats the run, for the report.
+    folder: the folder for the results.
+    program: program of an autopilot; None for planfly's own simulation.
+    reference: cases in which reference flights are flown.
+    limits: limits of the flight time and of the size of the log.
+    every: the log keeps one row out of this many.
     """
 
     scenario: Scenario
@@ -125,11 +125,12 @@ def run(
     """Plan, export, fly, record, judge and report into one folder.
 
     scenario: an embedded name, a TOML file's path, or a `Scenario`.
-    seed: of planner and turbulence; None takes the scenario's, or 1.
-    refine: rounds more, up to 20, each planned within limits tightened by what the flight before could not do.
+    seed: of planner and turbulence; None takes the seed of the scenario, or 1.
+    refine: number of additional rounds, up to 20, each planned within limits tightened by the failures of the previous
+    flight.
     out: the folder; {name} and {seed} in it stand for the scenario's name and the seed.
-    overwrite: whether results that lie there are replaced, as they always are in the default folder.
-    on_round: called with each round once it is over.  The other keywords are as of `planfly.fly`.
+    overwrite: True replaces results in the folder; in the default folder they are always replaced.
+    on_round: called with each round once it has ended.  The other keywords are as of `planfly.fly`.
     Raises a `planfly.PlanflyError` for bad input, before anything is written.
 
     >>> import planfly, tempfile
@@ -158,7 +159,7 @@ def run(
 
 
 def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
-    """Write the command line of ``planfly run`` with options by their keywords.
+    """Return the command line of ``planfly run`` for options by their keywords.
 
     >>> command_line("tight", 3, {"wind": (8.0, 270.0), "autopilot_law": "px4", "params": "my file.parm"})
     "planfly run tight --seed 3 --wind 8,270 --autopilot-law px4 --params 'my file.parm'"
@@ -176,7 +177,10 @@ def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
 def _rounds(
     task: _Task, refine: int, held: contextlib.ExitStack, on_round: Callable[[Round], None] | None
 ) -> RunResult:
-    """Plan and fly until it flies; held: keeps the folder from the first plan on."""
+    """Plan and fly until a round flies or no round is left.
+
+    held: keeps the folder from the first plan on.
+    """
     scenario, airframe, folder = task.scenario, task.airframe, task.folder
     flown: list[Round] = []
 
@@ -205,7 +209,7 @@ def _rounds(
 
 def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
     """Write a plan and its mission, and fly it if it is feasible."""
-    # matplotlib loads for pictures alone.
+    # Imported here: only the report needs matplotlib.
     from logs.views.report.page import write_report
 
     folder, airframe = task.folder, task.airframe
@@ -235,7 +239,7 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
             limits=task.limits,
         )
     write_whole(folder / "verdict.json", verdict_json(flown.verdict))
-    beside = flown.returns or return_summary(flown.setup, flown.track)
+    summary = flown.returns or return_summary(flown.setup, flown.track)
     with stage("drawing", "drawing a report"):
         write_report(
             folder,
@@ -246,17 +250,17 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
             versions=package_versions(),
             command=task.command,
             events=flown.events,
-            returns=beside.drawn(),
+            returns=summary.drawn(),
         )
     notes = (*setup.scenario.notes, *setup.notes)
     has_log = len(flown.track) > 0
     return Round(
-        number, (), flown.verdict, flown=True, folder=folder, notes=notes, has_log=has_log, returns_line=beside.line
+        number, (), flown.verdict, flown=True, folder=folder, notes=notes, has_log=has_log, returns_line=summary.line
     )
 
 
 def _keep(folder: Path, number: int) -> None:
-    """Move a round's results out of the way of the next."""
+    """Move the results of a round to its own subfolder before the next round."""
     kept = folder / f"round-{number}"
     kept.mkdir(exist_ok=True)
     for name in RUN_FILES:

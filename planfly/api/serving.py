@@ -1,4 +1,4 @@
-"""A MAVLink vehicle that ground stations find, upload to, arm, start and follow."""
+"""Serve a simulated MAVLink vehicle that ground stations find, upload to, arm, start and follow."""
 
 import ipaddress
 from collections.abc import Callable, Sequence
@@ -40,19 +40,19 @@ def serve(
     on_message: Callable[[str], None] = _ignore,
     **options: Unpack[MissionOptions],
 ) -> None:
-    """Be a MAVLink vehicle in a simulated world, until ``stop`` is true; needs the extra ``planfly[live]``.
+    """Serve a MAVLink vehicle in a simulated world until ``stop`` returns True; needs ``planfly[live]``.
 
-    mission: a file to begin with; None waits for an upload.
+    mission: the file of the first mission; None waits for an upload.
     options: as of `planfly.fly`; without a mission the scenario is "jacksboro-air" unless another is named.
-    to: where ground stations listen, IP:PORT, one or several.  bind: where the vehicle listens.
+    to: addresses of ground stations, IP:PORT, one or several.  bind: address of the vehicle.
     allow: IP addresses beyond this machine that may talk to it.  sign_key: a file with a MAVLink signing key.
     speed: times real time, 0.1 to 100.  log: the folder of the flight logs.
-    stop: asked all the time.  on_message: called with what happens, a line each.
+    stop: polled continuously.  on_message: called with one line for each event.
 
-    A script that calls it does so under ``if __name__ == "__main__":``, for the processes that fly import it.
+    A script must call it under ``if __name__ == "__main__":``, because the flight processes import the script.
     Raises a `planfly.PlanflyError` for bad input.
     """
-    # Imported here: nobody else needs MAVLink.
+    # Imported here: only this function needs MAVLink.
     from planfly.live.served_flights import ServeOptions, open_served
     from planfly.live.served_vehicle import serve_vehicle
 
@@ -66,13 +66,13 @@ def serve(
 
 
 # ----------------------------------------------------------------------
-# Who may talk to a vehicle.
+# Access to a vehicle.
 
 
 def link_access(
     to: str | Sequence[str], bind: str, allow: str | Sequence[str] | None = (), sign_key: str | Path | None = None
 ) -> "Access":
-    """Addresses and key of a link.
+    """Return the addresses and the key of a link.
 
     to: IP:PORT of each station.  bind: IP:PORT of the vehicle.  allow: IP addresses of stations beyond this machine.
     Several are a sequence, or separated by commas.  Raises FlightError or PlanflyError.

@@ -1,4 +1,4 @@
-"""Will the photos come out?  The lines of a survey as they are flown, and what would help those that are lost."""
+"""Judge how much of each photo line of a survey can be used, and suggest remedies for lost lines."""
 
 from dataclasses import dataclass, replace
 from itertools import count
@@ -51,13 +51,13 @@ class SurveyFound:
     """Result of `planfly.survey`.
 
     setup, track, verdict: of the flight.
-    surveys: of the mission, in flying order.
-    lines: of each survey, how its lines were flown; None for one that was not.
-    overlaps: of each survey, how much its photos overlap; None where its camera is not known.
-    remedies: what would help, each flown; none where none was asked for, or nothing is lost.
-    nearest: where nothing that was asked for would help, the trial that came nearest.
-    kept: why no other layout was tried, in words.
-    files: written, none where no folder was named.
+    surveys: surveys of the mission, in flying order.
+    lines: for each survey, the measures of its flown lines; None if it was not flown.
+    overlaps: for each survey, the overlap of its photos; None if its camera is not known.
+    remedies: remedies that help, each flown; empty if none were requested or nothing is lost.
+    nearest: the trial that came closest, if remedies were requested and none helps.
+    kept: reason why no other layout was tried, in words.
+    files: files written; empty if no folder was named.
     """
 
     setup: FlightSetup
@@ -73,17 +73,17 @@ class SurveyFound:
 
     @property
     def usable(self) -> bool:
-        """True if enough of every line can be used, and photos overlap as asked."""
+        """True if enough of every line can be used and the photos overlap as required."""
         return all(usable(one) for lines in self.lines for one in lines) and all(map(kept_overlap, self.overlaps))
 
     @property
     def headline(self) -> str:
-        """All lines in a line."""
+        """Summary of all photo lines, in one line."""
         return lines_headline([one for lines in self.lines for one in lines])
 
     @property
     def lines_of_lines(self) -> tuple[str, ...]:
-        """Each survey, and its lines, in words."""
+        """Description of each survey and its lines."""
         out = []
         for survey, lines, overlap in zip(self.surveys, self.lines, self.overlaps, strict=True):
             out += [survey_text(survey), *overlap_lines(overlap)]
@@ -92,12 +92,12 @@ class SurveyFound:
 
     @property
     def lines_of_remedies(self) -> tuple[str, ...]:
-        """Remedies, in words."""
+        """Description of the remedies."""
         return tuple(remedy_text(one, self.setup.path.length) for one in self.remedies)
 
     @property
     def lines_without_remedy(self) -> tuple[str, ...]:
-        """That nothing was found that would help, what came nearest, and why no other layout was tried, in words."""
+        """Statement that no remedy was found, the closest trial, and the reason why no other layout was tried."""
         said = [
             "no turn-around, order, course, parameter or airspeed alone was found that would help, nor longer"
             " turn-arounds with another parameter or a slower flight"
@@ -113,7 +113,7 @@ class SurveyFound:
         return f"<SurveyFound {self.setup.scenario.name}: {self.headline}>"
 
 
-# Why a flight takes no other world.
+# Reason why a flown survey cannot be judged in another world, in messages.
 _AS_FLOWN = "a flight's photo lines are those that were flown"
 
 
@@ -128,15 +128,15 @@ def survey(
     overwrite: bool = True,
     **options: Unpack[MissionOptions],
 ) -> SurveyFound:
-    """Fly a survey, and tell how much of each photo line can be used, and how much its photos overlap.
+    """Fly a survey, and report the usable part of each photo line and the overlap of the photos.
 
-    what: the path of a .waypoints or .plan, which is flown; or what `planfly.fly` gave, or a flight log or its path.
-    camera: its sensor across the way and along it, and its focal length, mm; and, if any are asked for, the overlaps
-    along lines and across them, percent; None takes those of a .plan.
-    suggest: whether to look for what would let all lines be used, of a mission: longer turn-arounds, every so-manieth
-    line, another course, a parameter of the autopilot, a slower flight; each is flown before it is named.
-    out: folder for a picture of the lines, and what would help as a .waypoints and a .param; None writes none.
-    overwrite: whether results in it are replaced.
+    what: the path of a .waypoints or .plan, which is flown; or a result of `planfly.fly`, or a flight log or its path.
+    camera: sensor size across and along the track, and focal length, mm; optionally also the required overlaps along
+    and across lines, percent; None takes the values of a .plan.
+    suggest: True looks for remedies that make all lines of a mission usable: longer turn-arounds, an interleave stride
+    (fly every n-th line), another course, an autopilot parameter, a slower flight; each is flown before it is named.
+    out: folder for a picture of the lines, and for the remedies as a .waypoints and a .param; None writes none.
+    overwrite: True replaces results in the folder.
     options: of a mission, as of `planfly.fly`.
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a survey.
     """
@@ -162,7 +162,7 @@ def survey(
 
 
 def _camera(numbers: tuple[float, ...] | None) -> Camera | None:
-    """Return a call's camera.  Raises ArgumentError for one that is none."""
+    """Return the camera of a call.  Raises ArgumentError for invalid numbers."""
     if numbers is None:
         return None
     try:
@@ -179,7 +179,10 @@ def _camera(numbers: tuple[float, ...] | None) -> Camera | None:
 
 
 def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
-    """A setup whose surveys are flown with a camera; overlaps that it does not ask for are those of the mission."""
+    """Return a setup with a camera for its surveys.
+
+    Overlaps that are not given with the camera are taken from the mission.
+    """
     if camera is None:
         return setup
     plans = []
@@ -191,7 +194,7 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
 
 
 def _flown(setup: FlightSetup, suggest: bool) -> SurveyFound:
-    """Fly a mission, measure its lines, and look for what would help."""
+    """Fly a mission, measure its lines, and look for remedies."""
     _require_survey(setup)
     airframe = airframe_of(setup)
     with stage(f"flying {flight_text(setup)}", "flying a survey") as advance:
@@ -206,7 +209,7 @@ def _flown(setup: FlightSetup, suggest: bool) -> SurveyFound:
 
 
 def _written(found: SurveyFound, out: str | Path | None, overwrite: bool) -> SurveyFound:
-    """Write the picture of the lines, and the missions that would help, where a folder is named."""
+    """Write the picture of the lines and the remedied missions, if a folder is named."""
     if out is None:
         return found
     folder, chart = clean_folder(out, SURVEY_FILES, overwrite=overwrite), survey_chart(found.setup, found.track)
@@ -224,7 +227,7 @@ def _written(found: SurveyFound, out: str | Path | None, overwrite: bool) -> Sur
             write_whole(path, mission_text(remedy.mission, "waypoints"))
             files.append(path)
         if remedy.kind == "parameter":
-            # Those of the person's own file are flown with, too.
+            # The parameters of the user's own file are included, because they were flown, too.
             own = found.setup.autopilot.with_parameters(**{remedy.name: remedy.value}).parameters
             stated = {} if own is None else own.by_origin("file")
             path = folder / "parameter.param"
@@ -234,7 +237,7 @@ def _written(found: SurveyFound, out: str | Path | None, overwrite: bool) -> Sur
 
 
 def _with_lines(scenario: Scenario) -> Scenario:
-    """Return a scenario that judges all parallel lines as a survey's: that is what was asked for."""
+    """Return a scenario that judges all parallel lines as survey lines, as the call requests."""
     limits = scenario.limits.model_copy(update={"surveys": "lines"})
     return replace(scenario, limits=limits, spec=scenario.spec.model_copy(update={"limits": limits}))
 
@@ -250,7 +253,7 @@ def _require_survey(setup: FlightSetup) -> None:
 
 
 def _of_flight(setup: FlightSetup, track: Track, ended: str) -> SurveyFound:
-    """Judge and measure a flight that was flown already."""
+    """Judge and measure a flight that has already been flown."""
     _require_survey(setup)
     requirements = route_requirements(setup)
     return _measured(requirements, track, judge_flight(setup, track, ended, requirements=requirements))

@@ -1,1 +1,1 @@
-"""One module a command, each with a function of its own name; `registry` finds it."""
+"""Commands of planfly: one module for each, with a function of the same name, which `registry` finds."""

@@ -1,4 +1,4 @@
-"""``planfly aircraft``: an aircraft as tables and as pictures, or a folder for one of one's own."""
+"""``planfly aircraft``: show an aircraft as tables and pictures, or make the folder of a new one."""
 
 import argparse
 import math
@@ -22,18 +22,21 @@ if TYPE_CHECKING:
     from flight.dynamics.characteristics import Mode, TrimRow
     from planfly import AircraftNumbers
 
+# Bank angles of the printed turn radii, degrees.
 _BANKS_DEG = (15.0, 20.0, 30.0, 40.0)
+# Course changes of the printed turns, degrees.
 _TURNS_DEG = (30.0, 45.0, 60.0, 90.0, 120.0)
-_SHEET = (
+# Keywords of the numbers of a data sheet.
+_DATA_SHEET_KEYWORDS = (
     *("mass", "span", "area", "cruise", "stall", "top", "bank", "climb"),
     *("battery", "motor", "prop", "layout", "fuel"),
 )
-# Wind of the ground slopes that are shown, m/s.
-_WIND = 10.0
+# Wind of the printed ground slopes, m/s.
+_WIND_MPS = 10.0
 
 
 def aircraft_options(line: LineParser) -> None:
-    """The parser of ``planfly aircraft``."""
+    """Add the parser of ``planfly aircraft``."""
     parser = line.command(
         "aircraft",
         "show an aircraft: mass, trims, modes, envelope and step responses; without a name, list them",
@@ -105,7 +108,7 @@ def _sheet_options(parser: CommandParser) -> None:
 
 
 def aircraft(args: argparse.Namespace) -> int:
-    """List the embedded aircraft, print and draw the one that is named, or make a folder for a new one."""
+    """List the embedded aircraft, print and draw the named one, or make a folder for a new one."""
     if args.logs is not None:
         return _identify(args)
     for name in ("base", "check"):
@@ -113,7 +116,7 @@ def aircraft(args: argparse.Namespace) -> int:
             raise PlanflyError.of_argument(name, getattr(args, name), "goes with `logs` LOG", shown="")
     if args.folder is not None:
         return _make_folder(args)
-    for name in _SHEET:
+    for name in _DATA_SHEET_KEYWORDS:
         if getattr(args, name) is not None:
             raise PlanflyError.of_argument(name, getattr(args, name), "goes with `folder` FOLDER", shown="")
     if args.source is not None:
@@ -137,7 +140,7 @@ def aircraft(args: argparse.Namespace) -> int:
 
 
 def _answer(chosen: "Sequence[Aircraft]", numbers: "AircraftNumbers | None" = None) -> object:
-    """Return what --json writes: of one aircraft with its numbers, or of several without."""
+    """Return the answer for --json: one aircraft with its numbers, or several without."""
     from planfly.terminal.answers import AircraftAnswer, aircraft_detail, aircraft_entry
 
     detail = None if numbers is None else aircraft_detail(numbers)
@@ -152,7 +155,7 @@ def _make_folder(args: argparse.Namespace) -> int:
     made = call(planfly.new_aircraft, args)
     files = sorted(file.name for file in made.folder.iterdir())
     shown = folder if folder.is_absolute() else f"./{folder}"
-    sheet = any(getattr(args, name) is not None for name in (*_SHEET, "params"))
+    sheet = any(getattr(args, name) is not None for name in (*_DATA_SHEET_KEYWORDS, "params"))
     whose = "from a data sheet" if sheet else f"as {Path(args.source or 'aerosonde').name}"
     print(f"aircraft  {shown}/ ({', '.join(files)}), {whose}")
     if sheet:
@@ -169,7 +172,9 @@ def _identify(args: argparse.Namespace) -> int:
             said = "the folder to make" if name == "out" else "of the aircraft as it flew"
             raise PlanflyError(f"--identify needs --{name}, {said}", field=f"--{name}")
     given = [
-        name for name in _SHEET if name not in ("mass", "span", "area", "battery") and getattr(args, name) is not None
+        name
+        for name in _DATA_SHEET_KEYWORDS
+        if name not in ("mass", "span", "area", "battery") and getattr(args, name) is not None
     ]
     if given or args.name is not None or args.folder is not None:
         field = "name" if args.name is not None else f"--{given[0]}" if given else "--new"
@@ -310,9 +315,9 @@ def _print_envelope(chosen: "Aircraft", envelope: "Envelope") -> None:
     print(f"\nsteepest climb / dive over the ground at {chosen.airspeed:g} m/s and 500 m, deg")
     for title, tail, cross in (
         ("calm", 0.0, 0.0),
-        (f"{_WIND:g} m/s tailwind", _WIND, 0.0),
-        (f"{_WIND:g} m/s headwind", -_WIND, 0.0),
-        (f"{_WIND:g} m/s crosswind", 0.0, _WIND),
+        (f"{_WIND_MPS:g} m/s tailwind", _WIND_MPS, 0.0),
+        (f"{_WIND_MPS:g} m/s headwind", -_WIND_MPS, 0.0),
+        (f"{_WIND_MPS:g} m/s crosswind", 0.0, _WIND_MPS),
     ):
         print(f"  {title:<18}{_pair(*envelope.slope_limits(chosen.airspeed, 500.0, tail, cross))}")
 
@@ -323,13 +328,13 @@ def _print_turns(chosen: "Aircraft") -> None:
     speeds = [chosen.airspeed_min, chosen.airspeed, chosen.airspeed_max]
     print("\nturn radius, m, by ground speed and bank")
     print("  m/s     " + "".join(f"{bank:>8.0f} deg" for bank in _BANKS_DEG))
-    for speed in (*speeds, chosen.airspeed + _WIND):
+    for speed in (*speeds, chosen.airspeed + _WIND_MPS):
         cells = "".join(f"{turn_radius(speed, math.radians(bank)):12.0f}" for bank in _BANKS_DEG)
-        print(f"  {speed:<8.1f}{cells}" + ("  (cruise in a 10 m/s tailwind)" if speed == speeds[1] + _WIND else ""))
+        print(f"  {speed:<8.1f}{cells}" + ("  (cruise in a 10 m/s tailwind)" if speed == speeds[1] + _WIND_MPS else ""))
     bank = _deg(chosen.max_bank)
     print(f"\nshortest leg between two equal turns, m, at {bank:.0f} deg of bank, by ground speed and turn")
     print("  m/s     " + "".join(f"{turn:>8.0f} deg" for turn in _TURNS_DEG))
-    for speed in (*speeds, chosen.airspeed + _WIND):
+    for speed in (*speeds, chosen.airspeed + _WIND_MPS):
         radius = turn_radius(speed, chosen.max_bank)
         print(
             f"  {speed:<8.1f}" + "".join(f"{2.0 * radius * math.tan(math.radians(t) / 2.0):12.0f}" for t in _TURNS_DEG)

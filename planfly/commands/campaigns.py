@@ -1,4 +1,4 @@
-"""``planfly campaign`` and ``planfly winds``: how likely a mission is to fly, and the largest wind it flies in."""
+"""``planfly campaign`` and ``planfly winds``: probability that a mission flies, and its largest wind."""
 
 import argparse
 import signal
@@ -17,11 +17,12 @@ from planfly.workflow.output_paths import RESULTS
 from world.errors import PlanflyError
 from world.interruption import Interrupted
 
-_EXITS = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "none asked": FLYABLE}
+# Exit code for each answer of a campaign.
+_EXIT_CODES = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "none asked": FLYABLE}
 
 
 def campaign_options(line: LineParser) -> None:
-    """The parser of ``planfly campaign``."""
+    """Add the parser of ``planfly campaign``."""
     parser = line.command(
         "campaign",
         "fly a mission many times in varied weather and with varied aircraft: how likely is it to fly",
@@ -53,7 +54,7 @@ def campaign_options(line: LineParser) -> None:
 
 
 def winds_options(line: LineParser) -> None:
-    """The parser of ``planfly winds``."""
+    """Add the parser of ``planfly winds``."""
     parser = line.command(
         "winds",
         "find the largest wind from each direction in which a mission flies",
@@ -117,7 +118,7 @@ def _shared_options(parser: CommandParser) -> None:
 
 
 def campaign(args: argparse.Namespace) -> int:
-    """Fly a campaign, go on with one, or fly one of its flights again."""
+    """Fly a campaign, resume one, or fly one of its flights again."""
     folder = _folder(args, "campaign")
     if args.refly is not None:
         return _refly(args, folder)
@@ -130,11 +131,11 @@ def campaign(args: argparse.Namespace) -> int:
     print("\n".join(campaign_lines(result.summary)))
     print(f"results   {folder}/ (report.html, summary.json, campaign.sqlite, worst/)")
     give_answer(args, lambda: (folder / "summary.json").read_text(encoding="utf-8"))
-    return _EXITS[result.answer]
+    return _EXIT_CODES[result.answer]
 
 
 def winds(args: argparse.Namespace) -> int:
-    """Find the boundary of each direction, or go on with that, and draw the chart."""
+    """Find the boundary of each direction, or resume the search, and draw the chart."""
     folder = _folder(args, "winds")
     with _kept_flights(folder, "winds.sqlite") as interrupted:
         found = call(planfly.winds, args, out=folder)
@@ -149,7 +150,7 @@ def winds(args: argparse.Namespace) -> int:
 
 
 def _folder(args: argparse.Namespace, kind: str) -> Path:
-    """Return the folder of the files: as named, or ``runs/<name>-<kind>``."""
+    """Return the folder of the files: the named one, or ``runs/<name>-<kind>``."""
     return Path(args.out) if args.out else RESULTS / f"{Path(args.target).stem}-{kind}"
 
 
@@ -168,9 +169,9 @@ def _refly(args: argparse.Namespace, folder: Path) -> int:
 
 @contextmanager
 def _kept_flights(folder: Path, table: str) -> Iterator[Callable[[], int]]:
-    """Say which flights an interruption leaves, and how to go on; gives the exit code afterwards, 0 without one.
+    """Report the flights kept after an interruption; yield a function that returns the exit code.
 
-    An interruption before there is a table is passed on.
+    An interruption before the table exists is raised again.
     """
     code = 0
     try:

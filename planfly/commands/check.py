@@ -1,4 +1,4 @@
-"""``planfly check``: judge a log by what it holds, or a mission by flying it."""
+"""``planfly check``: judge a log by its content, or a mission by flying it."""
 
 import argparse
 from collections.abc import Mapping
@@ -25,11 +25,12 @@ if TYPE_CHECKING:
     from planfly import Judged, Verdict
     from planfly.terminal.verdict_answers import VerdictsDocument
 
+# Logs of other programs, as shown in the help.
 LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
 
 
 def check_options(line: LineParser) -> None:
-    """The parser of ``planfly check``."""
+    """Add the parser of ``planfly check``."""
     parser = line.command(
         "check",
         "judge a flight by its log (planfly's or an autopilot's), or a mission by flying it; write nothing",
@@ -65,7 +66,7 @@ def check_options(line: LineParser) -> None:
 
 
 def check(args: argparse.Namespace) -> int:
-    """Judge a flight or a mission; the exit code is the verdict's, or 3 for a log that is cut short."""
+    """Judge a flight or a mission; the exit code follows the verdict, or is 3 for an incomplete log."""
     if args.autopilots is not None:
         return _check_for(args)
     judged = call(planfly.judge, args)
@@ -81,15 +82,15 @@ def check(args: argparse.Namespace) -> int:
     return verdict_code(judged.verdict)
 
 
-# What does not go with several autopilots: what belongs to one of them, or to a log.
-_OF_ONE = ("params", "guidance", "autopilot_law", "plan", "flight", "datum", "geometry")
+# Options that are not allowed with --for, because they belong to one autopilot or to a log.
+_SINGLE_AUTOPILOT_OPTIONS = ("params", "guidance", "autopilot_law", "plan", "flight", "datum", "geometry")
 
 
 def _check_for(args: argparse.Namespace) -> int:
-    """Fly a mission by each autopilot; the exit code is that of the worst verdict."""
+    """Fly a mission by each autopilot; the worst verdict decides the exit code."""
     from planfly.terminal.autopilot_table import autopilot_lines
 
-    for name in _OF_ONE:
+    for name in _SINGLE_AUTOPILOT_OPTIONS:
         if (value := getattr(args, name)) not in (None, False):
             raise ArgumentError.of_argument(name, value, "not with --for, which flies several autopilots")
     flown = call(planfly.fly_by_each, args, mission=args.what)

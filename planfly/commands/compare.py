@@ -1,4 +1,4 @@
-"""``planfly compare``: two flights laid over each other, as a table and as pictures."""
+"""``planfly compare``: compare two flights in a table and in pictures."""
 
 import argparse
 import math
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def compare_options(line: LineParser) -> None:
-    """The parser of ``planfly compare``."""
+    """Add the parser of ``planfly compare``."""
     parser = line.command(
         "compare",
         "compare two flights: a table of differences, and pictures",
@@ -31,7 +31,7 @@ def compare_options(line: LineParser) -> None:
 
 
 def compare(args: argparse.Namespace) -> int:
-    """Print the differences, and draw them where a folder is named; 3 if either log is cut short."""
+    """Print the differences, and draw them if a folder is named; return 3 if either log is incomplete."""
     from logs.views.report.compare import difference_lines
 
     logs = [planfly.read_log(Path(file)) for file in (args.first, args.second)]

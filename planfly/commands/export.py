@@ -1,4 +1,4 @@
-"""``planfly export``: a plan, a mission or a log as the files that its targets' suffixes name."""
+"""``planfly export``: write a plan, a mission or a log in the formats that the suffixes of files name."""
 
 import argparse
 
@@ -12,7 +12,7 @@ from planfly.terminal.results import print_warnings
 
 
 def export_options(line: LineParser) -> None:
-    """The parser of ``planfly export``."""
+    """Add the parser of ``planfly export``."""
     parser = line.command(
         "export",
         "write a plan, mission or log in the format that a suffix names",
@@ -39,7 +39,7 @@ def export_options(line: LineParser) -> None:
 
 
 def export(args: argparse.Namespace) -> int:
-    """Read the source, then write every target; 3 for a log that is cut short."""
+    """Read the source, then write every target; return 3 for an incomplete log."""
     written = planfly.export(args.source, *args.files, fence=args.fence, at=args.at, overwrite=args.overwrite)
     print_warnings(written.notes)
     for file, content in zip(written.files, written.contents, strict=True):
@@ -59,7 +59,7 @@ def export(args: argparse.Namespace) -> int:
 
 
 def _kind(suffix: str) -> str:
-    """Return what a file of a suffix is about."""
+    """Return the kind of content of a file with a suffix."""
     if suffix in (".kml", ".gpx"):
         return "map"
     if suffix == ".parm":

@@ -1,4 +1,4 @@
-"""``planfly fly``: a plan or any mission file, flown and logged."""
+"""``planfly fly``: fly a plan or a mission file, and log the flight."""
 
 import argparse
 import shlex
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def fly_options(line: LineParser) -> None:
-    """The parser of ``planfly fly``."""
+    """Add the parser of ``planfly fly``."""
     parser = line.command(
         "fly",
         "fly a plan or any mission file, write the log, and judge the flight",
@@ -41,7 +41,7 @@ def fly_options(line: LineParser) -> None:
 
 
 def fly(args: argparse.Namespace) -> int:
-    """Fly a mission into a log; the exit code is the verdict's."""
+    """Fly a mission into a log; the exit code follows the verdict."""
     named = args.log is not None
     log = args.log if named else f"{RUN_FOLDER}/flight.mcap"
     flown = call(planfly.fly, args, log=log, overwrite=args.overwrite or not named)

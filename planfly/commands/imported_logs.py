@@ -1,4 +1,4 @@
-"""``planfly import`` and ``planfly refly``: a flight of another program's log, and its mission flown in JSBSim."""
+"""``planfly import`` and ``planfly refly``: import another program's log, and fly its mission again."""
 
 import argparse
 from pathlib import Path
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def import_log_options(line: LineParser) -> None:
-    """The parser of ``planfly import``."""
+    """Add the parser of ``planfly import``."""
     parser = line.command(
         "import",
         "convert an autopilot's log into a flight log, and judge the flight against its plan",
@@ -48,7 +48,7 @@ def import_log_options(line: LineParser) -> None:
 
 
 def import_log(args: argparse.Namespace) -> int:
-    """Import a log; the exit code is the verdict's, or 3 for a log of which some could not be read."""
+    """Import a log; the exit code follows the verdict, or is 3 if part of the log could not be read."""
     flight = call(planfly.import_log, args)
     print_verdict(flight.verdict, flight.setup.route.notes)
     print(f"log       {Path(args.target)} ({len(flight.track)} rows)")
@@ -66,7 +66,7 @@ def _import_answer(target: Path, flight: "ImportedFlight", code: int) -> object:
 
 
 def refly_options(line: LineParser) -> None:
-    """The parser of ``planfly refly``."""
+    """Add the parser of ``planfly refly``."""
     parser = line.command(
         "refly",
         "fly the mission of an imported flight again in JSBSim, in the wind of its log, and compare the two",
@@ -84,7 +84,7 @@ def refly_options(line: LineParser) -> None:
 
 
 def refly(args: argparse.Namespace) -> int:
-    """Fly, compare and draw; 3 for a log that is cut short."""
+    """Fly the mission again, compare and draw the flights; return 3 for an incomplete log."""
     source = Path(args.log)
     log = planfly.read_log(source)
     folder = args.out or source.with_name(f"{source.stem}-refly")

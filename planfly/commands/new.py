@@ -1,4 +1,4 @@
-"""``planfly new``: a scenario of one's own to begin with, and whether it can be planned."""
+"""``planfly new``: write a first version of a new scenario, and try to plan it."""
 
 import argparse
 import shlex
@@ -13,7 +13,7 @@ from planfly.terminal.output import give_answer
 
 
 def new_options(line: LineParser) -> None:
-    """The parser of ``planfly new``."""
+    """Add the parser of ``planfly new``."""
     parser = line.command(
         "new",
         "write a commented scenario from one place to another, and plan it once",
@@ -49,7 +49,7 @@ def new_options(line: LineParser) -> None:
 
 
 def new(args: argparse.Namespace) -> int:
-    """Write it, and plan it; 4 where the plan is not safe, which does not take the file away."""
+    """Write the scenario, and plan it; return 4 if the plan is not safe, and keep the file."""
     from planner.plan import Objective
 
     file = call(planfly.new_scenario, args)

@@ -1,4 +1,4 @@
-"""``planfly paper``: section V of the paper planned again, as tables and figures."""
+"""``planfly paper``: repeat the plans of section V of the paper, as tables and figures."""
 
 import argparse
 from dataclasses import asdict
@@ -15,7 +15,7 @@ from planfly.workflow.output_paths import RESULTS
 
 
 def paper_options(line: LineParser) -> None:
-    """The parser of ``planfly paper``."""
+    """Add the parser of ``planfly paper``."""
     parser = line.command(
         "paper",
         "plan the paper's section V again: tables and figures of seeded plans in three encodings",
@@ -40,7 +40,7 @@ def paper_options(line: LineParser) -> None:
 
 
 def paper(args: argparse.Namespace) -> int:
-    """Plan, write and print; 0 whatever the table holds: no path in it is an answer too."""
+    """Plan, write and print the table; return 0 for every result, because no path is also an answer."""
     folder = Path(args.out) if args.out else RESULTS / "paper"
     made = call(planfly.paper_tables, args, out=folder, overwrite=args.overwrite or args.out is None)
     from planfly.planning.paper import table_text

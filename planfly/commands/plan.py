@@ -1,4 +1,4 @@
-"""``planfly plan``: a path alone, within a budget or until Ctrl-C, from the start or in flight."""
+"""``planfly plan``: plan a path, within a budget or until Ctrl-C, from the start or in flight."""
 
 import argparse
 import signal
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def plan_options(line: LineParser) -> None:
-    """The parser of ``planfly plan``."""
+    """Add the parser of ``planfly plan``."""
     parser = line.command(
         "plan",
         "plan a path, or plan again in flight, without flying it",
@@ -84,7 +84,7 @@ def _algorithms() -> str:
 
 
 def plan(args: argparse.Namespace) -> int:
-    """Plan, and write the plan file; 4 where the plan is not safe."""
+    """Plan a path, and write the plan file; return 4 if the plan is not safe."""
     _check_replanning(args)
     if args.front is not None:
         return _front(args)
@@ -111,7 +111,7 @@ def plan(args: argparse.Namespace) -> int:
 
 
 def _front(args: argparse.Namespace) -> int:
-    """Plan a front and write its folder; 4 where there is no safe plan."""
+    """Plan a front and write its folder; return 4 if there is no safe plan."""
     from planfly.api.fronts import FRONT_FOLDER
     from planfly.terminal.plan_answers import front_answer, front_lines
 
@@ -166,7 +166,7 @@ def _answer(made: "Plan", target: "Path", code: int) -> object:
 
 @contextmanager
 def _best_so_far() -> Iterator[Callable[[], bool]]:
-    """Give what a search asks between generations: whether Ctrl-C was pressed.  A second one ends the command."""
+    """Yield a function that returns True after Ctrl-C, to stop a search; a second Ctrl-C ends the command."""
     pressed = False
 
     def press(_signal: int, _frame: FrameType | None) -> None:
@@ -183,7 +183,7 @@ def _best_so_far() -> Iterator[Callable[[], bool]]:
 
 
 def _check_replanning(args: argparse.Namespace) -> None:
-    """Refuse half of the options that go together.  Raises ScenarioError."""
+    """Refuse an option of planning in flight without the others.  Raises ScenarioError."""
     if args.old is None:
         for name in ("at_leg", "threats"):
             if (value := getattr(args, name)) is not None:
@@ -195,7 +195,7 @@ def _check_replanning(args: argparse.Namespace) -> None:
 
 
 def _print_plan(made: "Plan") -> None:
-    """A plan on the terminal."""
+    """Print a plan."""
     from logs.verdict.conditions import autopilot_line, condition_lines
     from planfly.api.planning import conditions_of_plan
     from planner.plan import Objective

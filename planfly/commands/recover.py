@@ -1,4 +1,4 @@
-"""``planfly recover``: a new log of what can be read of an unfinished or damaged one."""
+"""``planfly recover``: write the readable part of an unfinished or damaged log as a new log."""
 
 import argparse
 from pathlib import Path
@@ -12,7 +12,7 @@ from planfly.terminal.results import warn_of_loss
 
 
 def recover_options(line: LineParser) -> None:
-    """The parser of ``planfly recover``."""
+    """Add the parser of ``planfly recover``."""
     parser = line.command(
         "recover",
         "write what can be read of an unfinished or damaged log as a new, complete one",
@@ -23,7 +23,7 @@ def recover_options(line: LineParser) -> None:
 
 
 def recover(args: argparse.Namespace) -> int:
-    """Write what can be read as a new log; nothing is written for a log that is complete."""
+    """Write the readable part as a new log; write nothing if the log is complete."""
     source = Path(args.log)
     target = Path(args.out) if args.out else source.with_name(f"{source.stem}-recovered.mcap")
     log = call(planfly.recover, args, out=target)

@@ -1,8 +1,9 @@
-"""The commands: one list, of which the parser, the help, the schemas and the dispatch are made.
+"""List of the commands, from which the parser, the help, the schemas and the dispatch are made.
 
-A command is a module here with two functions: ``NAME_options`` adds its parser to the line, and ``NAME`` takes the
-parsed arguments, calls the API, prints, and returns the exit code.  The API compiles the kernels that it needs.
-All modules are light: what a command works with is imported when it is given.
+A command is a module of this package with two functions: ``NAME_options`` adds its parser to the line, and ``NAME``
+takes the parsed arguments, calls the API, prints, and returns the exit code.  The API compiles the kernels that it
+needs.
+All modules are light: the code that a command needs is imported when the command runs.
 """
 
 import argparse
@@ -14,16 +15,17 @@ from typing import Any, NamedTuple
 from planfly._version import __version__
 from planfly.terminal.command_parser import LineParser
 
+# Function of a command: from parsed arguments to exit code.
 CommandFunction = Callable[[argparse.Namespace], int]
 
 
 class Command(NamedTuple):
-    """A command of the line.
+    """A command of planfly.
 
-    section: the heading that it stands below in ``planfly --help``.
-    answer: what it answers with --json, a class of `planfly.terminal.answers`, or "MODULE.CLASS" of one beside it; ""
-        for a command without it.
-    module, function: in this package; "" where they have the command's name.
+    section: the heading above it in ``planfly --help``.
+    answer: class of its answer with --json, in `planfly.terminal.answers`, or "MODULE.CLASS" in `planfly.terminal`; ""
+        for a command without --json.
+    module, function: names in this package; "" if they equal the name of the command.
     """
 
     name: str
@@ -33,18 +35,20 @@ class Command(NamedTuple):
     function: str = ""
 
     def load(self, ending: str = "") -> Any:
-        """Return the command's function; with the ending "_options" the one that adds its parser."""
+        """Return the function of the command; with the ending "_options", the function that adds its parser."""
         module = import_module(f"planfly.commands.{self.module or self.name}")
         return getattr(module, (self.function or self.name) + ending)
 
 
+# Section titles of the help.
 _FLY = "plan and fly"
 _LOOK = "judge and show"
-_OTHERS = "logs of autopilots"
-_MANY = "many flights"
+_AUTOPILOT_LOGS = "logs of autopilots"
+_MANY_FLIGHTS = "many flights"
 _AIRCRAFT = "aircraft, scenarios and terrain"
 _HELP = "help"
 
+# All commands, in the order of the help.
 COMMANDS = (
     Command("run", _FLY, "RunAnswer"),
     Command("plan", _FLY, "plan_answers.PlanDocument"),
@@ -59,11 +63,11 @@ COMMANDS = (
     Command("compare", _LOOK, "CompareAnswer"),
     Command("replay", _LOOK, "ReplayAnswer"),
     Command("recover", _LOOK, "RecoverAnswer"),
-    Command("import", _OTHERS, "ImportAnswer", "imported_logs", "import_log"),
-    Command("refly", _OTHERS, "ReflyAnswer", "imported_logs"),
-    Command("campaign", _MANY, "CampaignDocument", "campaigns"),
-    Command("winds", _MANY, "WindsDocument", "campaigns"),
-    Command("paper", _MANY, "PaperAnswer"),
+    Command("import", _AUTOPILOT_LOGS, "ImportAnswer", "imported_logs", "import_log"),
+    Command("refly", _AUTOPILOT_LOGS, "ReflyAnswer", "imported_logs"),
+    Command("campaign", _MANY_FLIGHTS, "CampaignDocument", "campaigns"),
+    Command("winds", _MANY_FLIGHTS, "WindsDocument", "campaigns"),
+    Command("paper", _MANY_FLIGHTS, "PaperAnswer"),
     Command("aircraft", _AIRCRAFT, "AircraftAnswer"),
     Command("scenarios", _AIRCRAFT, "ScenariosAnswer", "shell"),
     Command("new", _AIRCRAFT, "NewAnswer"),
@@ -94,9 +98,9 @@ def build_parser() -> LineParser:
 
 
 def find_command(name: str) -> CommandFunction:
-    """Return the function that carries a command out: parsed arguments to exit code.
+    """Return the function that executes a command: from parsed arguments to exit code.
 
-    Its results go to standard output, its progress to standard error.  Raises KeyError for a name that is none.
+    Its results go to standard output, its progress to standard error.  Raises KeyError for an unknown name.
 
     >>> find_command("scenarios").__module__
     'planfly.commands.shell'
@@ -109,9 +113,10 @@ def _named(name: str) -> Command:
 
 
 # ----------------------------------------------------------------------
-# The JSON schemas of what the commands answer.
+# JSON schemas of the answers of commands.
 
-_DRAFT = "https://json-schema.org/draft/2020-12/schema"
+# Identifier of JSON Schema, draft 2020-12.
+_JSON_SCHEMA_DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def answering_commands() -> list[str]:
@@ -120,24 +125,24 @@ def answering_commands() -> list[str]:
 
 
 def answer_schema(name: str) -> dict[str, Any]:
-    """Return the JSON schema, draft 2020-12, of a command's answer.  Raises KeyError for a command without one.
+    """Return the JSON schema, draft 2020-12, of a command's answer; raise KeyError without an answer.
 
     >>> sorted(answer_schema("scenarios")["properties"])
     ['exit_code', 'scenarios', 'schema']
     """
-    # Imported here: nobody else needs schemas.
+    # Imported here: only this function needs schemas.
     from pydantic import TypeAdapter
 
     if name not in answering_commands():
         raise KeyError(name)
     module, _, answer = _named(name).answer.rpartition(".")
-    beside = import_module(f"planfly.terminal.{module or 'answers'}")
-    made = TypeAdapter(getattr(beside, answer)).json_schema(mode="serialization")
-    return {"$schema": _DRAFT, **made, "title": f"planfly {name} --json"}
+    answers = import_module(f"planfly.terminal.{module or 'answers'}")
+    made = TypeAdapter(getattr(answers, answer)).json_schema(mode="serialization")
+    return {"$schema": _JSON_SCHEMA_DRAFT, **made, "title": f"planfly {name} --json"}
 
 
 def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the object that an answer is, by its schema; each of them, where options choose one.
+    """Return the object schema of an answer, or all of them if options choose between several.
 
     >>> [one["properties"]["schema"]["const"] for one in answer_objects(answer_schema("check"))]
     ['planfly.verdict/3', 'planfly.verdicts/1']

@@ -1,4 +1,4 @@
-"""``planfly replay``: a flight from its log, on the terminal, as a film, or to other programs."""
+"""``planfly replay``: replay a flight from its log on the terminal, as a film, or to other programs."""
 
 import argparse
 import shutil
@@ -27,17 +27,22 @@ from world.running_clock import RunningClock
 if TYPE_CHECKING:
     from planfly import FlightLog
 
-# Frames a second on a terminal.
+# Frame rate on a terminal, Hz.
 _RATE = 10.0
-_ENTER = "\x1b[?1049h\x1b[?25l"
-_LEAVE = "\x1b[?25h\x1b[?1049l"
+# Terminal sequence: switch to the alternate screen and hide the cursor.
+_ENTER_SCREEN = "\x1b[?1049h\x1b[?25l"
+# Terminal sequence: show the cursor and leave the alternate screen.
+_LEAVE_SCREEN = "\x1b[?25h\x1b[?1049l"
+# Terminal sequence: move the cursor to the top left corner.
 _HOME = "\x1b[H"
-_TO_LINE_END = "\x1b[K"
-_TO_END = "\x1b[J"
+# Terminal sequence: erase to the end of the line.
+_ERASE_LINE_END = "\x1b[K"
+# Terminal sequence: erase to the end of the screen.
+_ERASE_SCREEN_END = "\x1b[J"
 
 
 def replay_options(line: LineParser) -> None:
-    """The parser of ``planfly replay``."""
+    """Add the parser of ``planfly replay``."""
     parser = line.command(
         "replay",
         "replay a flight from its log alone: as instruments on a terminal, as a timeline elsewhere",
@@ -91,7 +96,7 @@ def replay_options(line: LineParser) -> None:
 
 
 def replay(args: argparse.Namespace) -> int:
-    """Instruments on a terminal, the timeline elsewhere, or what the options name; 3 for a log that is cut short."""
+    """Show instruments, the timeline or the output of the options; return 3 for an incomplete log."""
     stations = isinstance(args.to, str)
     if bool(args.foxglove) + bool(args.movie) + stations > 1:
         options = "--foxglove, --movie, --to IP:PORT"
@@ -118,7 +123,7 @@ def replay(args: argparse.Namespace) -> int:
 
 
 def _answer(args: argparse.Namespace, log: "FlightLog", code: int) -> object:
-    """Return the timeline of the part that is replayed, all of it where it goes to ground stations."""
+    """Return the timeline of the replayed part, or of the whole flight if it is sent to ground stations."""
     from planfly.terminal.answers import ReplayAnswer, TimelineEvent
 
     entries = planfly.timeline(log) if isinstance(args.to, str) else call(planfly.timeline, args, log=log)
@@ -143,12 +148,12 @@ def _show_instruments(log: "FlightLog", args: argparse.Namespace) -> None:
     """Show frames until the end or an interruption; the last one stays on the terminal."""
     speed, lines = args.speed or 1.0, list[str]()
     frames = call(planfly.replay, args, log=log, width=lambda: shutil.get_terminal_size().columns)
-    print(_ENTER, end="")
+    print(_ENTER_SCREEN, end="")
     try:
         for _, lines in frames:
             fitting = [*lines[: max(1, shutil.get_terminal_size().lines - 2)], f"x {speed:g}, Ctrl-C stops"]
-            text = "".join(line + _TO_LINE_END + "\n" for line in fitting)
-            print(_HOME + text + _TO_END, end="", flush=True)
+            text = "".join(line + _ERASE_LINE_END + "\n" for line in fitting)
+            print(_HOME + text + _ERASE_SCREEN_END, end="", flush=True)
     finally:
-        print(_LEAVE, end="", flush=True)
+        print(_LEAVE_SCREEN, end="", flush=True)
     print("\n".join(lines))

@@ -1,4 +1,4 @@
-"""``planfly report``: figures and report.html from a log alone, or the layout file for Foxglove."""
+"""``planfly report``: write figures and report.html from a log, or the layout file for Foxglove."""
 
 import argparse
 import sys
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def report_options(line: LineParser) -> None:
-    """The parser of ``planfly report``."""
+    """Add the parser of ``planfly report``."""
     parser = line.command(
         "report",
         "draw the figures and write report.html from a log alone, or write the layout for Foxglove",
@@ -33,7 +33,7 @@ def report_options(line: LineParser) -> None:
 
 
 def report(args: argparse.Namespace) -> int:
-    """Draw and write; the exit code is the verdict's, or 3 for a log that is cut short."""
+    """Draw and write the report; the exit code follows the verdict, or is 3 for an incomplete log."""
     if args.layout:
         return _write_layout(args)
     if args.log is None:

@@ -1,4 +1,4 @@
-"""``planfly returns``: the return to launch from everywhere on the way."""
+"""``planfly returns``: judge the return to launch from every place on a flight."""
 
 import argparse
 import math
@@ -23,12 +23,12 @@ from planfly.terminal.output import give_answer
 if TYPE_CHECKING:
     from planfly import ReturnsFound
 
-# Ranges of seconds that are listed.
+# Largest number of ranges of seconds that are listed.
 _LISTED = 20
 
 
 def returns_options(line: LineParser) -> None:
-    """The parser of ``planfly returns``."""
+    """Add the parser of ``planfly returns``."""
     parser = line.command(
         "returns",
         "fly the return to launch from everywhere on the way: say whether each is safe, where it goes and why; and"
@@ -74,7 +74,7 @@ def returns_options(line: LineParser) -> None:
 
 
 def returns(args: argparse.Namespace) -> int:
-    """Judge every return: 0 for all safe, 4 where one is not, 3 where that is not known."""
+    """Judge every return; return 0 if all are safe, 4 if one is not, 3 if that is not known."""
     from logs.verdict.conditions import flown_lines, setup_conditions
 
     found = call(planfly.returns, args)

@@ -1,4 +1,4 @@
-"""``planfly run``: the whole chain into one folder, once or in rounds."""
+"""``planfly run``: run the whole chain into one folder, once or in rounds."""
 
 import argparse
 from typing import TYPE_CHECKING
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def run_options(line: LineParser) -> None:
-    """The parser of ``planfly run``."""
+    """Add the parser of ``planfly run``."""
     parser = line.command(
         "run",
         "plan, export, fly, log, judge and report",
@@ -52,7 +52,7 @@ def run_options(line: LineParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Plan, export, fly, record, judge and report; with ``--refine N`` up to N rounds more."""
+    """Plan, export, fly, record, judge and report; with ``--refine N``, up to N more rounds."""
     result = call(planfly.run, args, on_round=_print_round)
     if args.refine:
         _print_rounds(result)

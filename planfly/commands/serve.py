@@ -1,4 +1,4 @@
-"""``planfly serve``: a vehicle that ground stations find, upload to, arm, start and follow."""
+"""``planfly serve``: simulate a vehicle that ground stations find, upload to, arm, start and follow."""
 
 import argparse
 
@@ -16,20 +16,21 @@ from planfly.terminal.options import (
     world_options,
 )
 
-_SERVED = """
+# Help text on the modes and commands of the vehicle.
+_VEHICLE_HELP = """
 It flies the modes AUTO, LOITER, GUIDED (to a place) and RTL, and changes between them in flight.
 Parameters are read, listed and set by name before a flight: those of the autopilot's law, and PFLY_FORCE,
 which at 1 has a mission that is judged not flyable armed and flown all the same (default: 0)."""
 
 
 def serve_options(line: LineParser) -> None:
-    """The parser of ``planfly serve``."""
+    """Add the parser of ``planfly serve``."""
     parser = line.command(
         "serve",
         "simulate a MAVLink vehicle that a ground station uploads to, arms, starts and watches",
         "planfly serve mission.waypoints --terrain jacksboro",
         extra="live",
-        more=_SERVED,
+        more=_VEHICLE_HELP,
     )
     completed(
         parser.add_argument("mission", metavar="MISSION", nargs="?", help="a mission file to begin with"),

@@ -11,39 +11,40 @@ from planfly.terminal.options import json_option
 from planfly.terminal.output import give_answer
 from world.files import did_you_mean
 
-_COMPLETION = """\
+# Help text on the installation of the completion.
+_COMPLETION_HELP = """\
 to complete in this shell, and in those to come:
   bash   eval "$(planfly completion bash)", in ~/.bashrc
   zsh    eval "$(planfly completion zsh)", in ~/.zshrc after compinit
   fish   planfly completion fish > ~/.config/fish/completions/planfly.fish"""
 
 # ----------------------------------------------------------------------
-# ``planfly completion``: the script by which a shell completes.
+# ``planfly completion``: the completion script of a shell.
 
 
 def completion_options(line: LineParser) -> None:
-    """The parser of ``planfly completion``."""
+    """Add the parser of ``planfly completion``."""
     parser = line.command(
         "completion",
         "print the script with which a shell completes planfly's commands, options and names",
         "planfly completion bash",
     )
-    parser.more = lambda: _COMPLETION
+    parser.more = lambda: _COMPLETION_HELP
     parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help="bash, zsh or fish")
 
 
 def completion(args: argparse.Namespace) -> int:
-    """Print the script of a shell."""
+    """Print the completion script of a shell."""
     print(shell_script(args.shell))
     return FLYABLE
 
 
 # ----------------------------------------------------------------------
-# ``planfly help``: what a command does, or the JSON schema of its answer.
+# ``planfly help``: the help of a command, or the JSON schema of its answer.
 
 
 def show_help_options(line: LineParser) -> None:
-    """The parser of ``planfly help``."""
+    """Add the parser of ``planfly help``."""
     parser = line.command(
         "help", "show the help of a command, or list the commands", "planfly help fly", "planfly help fly --schema"
     )
@@ -55,7 +56,7 @@ def show_help_options(line: LineParser) -> None:
 
 
 def show_help(args: argparse.Namespace) -> int:
-    """Print the help of a command, of all, or a schema; 2 for a command that there is not."""
+    """Print the help of one command or all, or a schema; return 2 for an unknown command."""
     # Imported here: the registry lists this module.
     from planfly.commands.registry import answering_commands, build_parser, schema_text
 
@@ -86,13 +87,13 @@ def _refuse(why: str) -> int:
 
 
 def scenarios_options(line: LineParser) -> None:
-    """The parser of ``planfly scenarios``."""
+    """Add the parser of ``planfly scenarios``."""
     parser = line.command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
     json_option(parser.group("results"), "scenarios")
 
 
 def scenarios(args: argparse.Namespace) -> int:
-    """Return name and description of each embedded scenario, on standard output."""
+    """Print the name and description of each embedded scenario."""
     known = planfly.scenarios()
     for name, description in known.items():
         print(f"{name:<12} {description}")

@@ -1,4 +1,4 @@
-"""``planfly studio``: a page of this machine on which a mission is dragged, judged while it is dragged, and flown."""
+"""``planfly studio``: serve a local page to drag a mission, judge it while dragging, and fly it."""
 
 import argparse
 
@@ -15,7 +15,8 @@ from planfly.terminal.options import (
     world_options,
 )
 
-_HANDS = """
+# Help text on mouse and keyboard.
+_CONTROLS_HELP = """
 Waypoints are dragged on the map, heights on the profile below it; a diamond on a leg inserts one.  While it is dragged
 the geometry is judged; when it is let go the mission is flown by the autopilot's law.  Keys: arrows move a waypoint by
 10 m (with Shift 100 m), Page Up and Page Down by 5 m of height, Delete deletes it, Ctrl+Z and Ctrl+Shift+Z undo and
@@ -24,14 +25,14 @@ Only this machine reaches the page, by the address that is printed."""
 
 
 def studio_options(line: LineParser) -> None:
-    """The parser of ``planfly studio``."""
+    """Add the parser of ``planfly studio``."""
     parser = line.command(
         "studio",
         "a page on which a mission is dragged, judged while it is dragged, flown, and saved",
         "planfly studio jacksboro",
         "planfly studio mission.waypoints --terrain jacksboro --no-browser",
         extra="studio",
-        more=_HANDS,
+        more=_CONTROLS_HELP,
     )
     completed(
         parser.add_argument(

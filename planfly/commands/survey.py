@@ -1,4 +1,4 @@
-"""``planfly survey``: how much of each photo line can be used."""
+"""``planfly survey``: judge how much of each photo line can be used."""
 
 import argparse
 from pathlib import Path
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def survey_options(line: LineParser) -> None:
-    """The parser of ``planfly survey``."""
+    """Add the parser of ``planfly survey``."""
     parser = line.command(
         "survey",
         "fly a survey: say how much of each photo line can be used, and what would help those that are lost",
@@ -52,7 +52,7 @@ def survey_options(line: LineParser) -> None:
 
 
 def survey(args: argparse.Namespace) -> int:
-    """Judge every photo line: 4 where one cannot be used, else as the flight is judged."""
+    """Judge every photo line; return 4 if one cannot be used, else the code of the verdict on the flight."""
     from logs.verdict.conditions import flown_lines, setup_conditions
 
     found = call(planfly.survey, args)
@@ -73,7 +73,7 @@ def survey(args: argparse.Namespace) -> int:
     for path in found.files:
         print(f"  written {path}")
     if missions := [path for path in found.files if path.suffix == ".waypoints"]:
-        # Where nothing switches a camera, any other command judges a mission as a path.
+        # Without items that switch a camera, every other command judges a mission as a path.
         settings = [f" --params {quote(str(path))}" for path in found.files if path.suffix == ".param"]
         also = settings[0] if missions[0].stem == "parameter" and settings else ""
         following = f"next      planfly survey {quote(str(missions[0]))}{also} with the same options, as it was flown"

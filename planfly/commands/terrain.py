@@ -1,4 +1,4 @@
-"""``planfly terrain``: the ground of an area, from tiles that are there or from a server."""
+"""``planfly terrain``: write the terrain of an area, from local tiles or from a server."""
 
 import argparse
 import shlex
@@ -11,12 +11,12 @@ from planfly.terminal.options import call, result_options
 from planfly.terminal.output import give_answer
 from planfly.terminal.results import print_warnings
 
-# How many degrees are named.
+# Largest number of degree cells without data that are named.
 _NAMED = 4
 
 
 def terrain_options(line: LineParser) -> None:
-    """The parser of ``planfly terrain``."""
+    """Add the parser of ``planfly terrain``."""
     parser = line.command(
         "terrain",
         "get the ground of an area as a GeoTIFF, from a folder of tiles or the Copernicus DEM's server",
@@ -49,7 +49,7 @@ def terrain_options(line: LineParser) -> None:
 
 
 def terrain(args: argparse.Namespace) -> int:
-    """Write it."""
+    """Write the terrain of an area."""
     made = call(planfly.terrain, args, out=args.out or "dem.tif")
     rows, cols = made.shape
     tiles = made.tiles[0] if len(made.tiles) == 1 else f"{len(made.tiles)} tiles"

@@ -1,4 +1,4 @@
-"""The first start after an install: kernels are compiled in two processes before the work begins, and counted."""
+"""Compile kernels at the first start after an install, in two processes, before the work begins."""
 
 import contextlib
 import functools
@@ -19,20 +19,21 @@ from world.compile_events import tell_before_compiling
 from world.kernel_cache import VARIABLE, can_write
 
 # ----------------------------------------------------------------------
-# Units of kernels compiled by processes of their own, which leave them in the cache.
+# Units of kernels are compiled by separate processes, which store them in the cache.
 
-# More would wait for each other: the longest unit is nearly half of all.
+# Number of processes; more would wait for each other, because the longest unit takes nearly half of the total time.
 PROCESSES = 2
-# Without the current folder, whose modules may have our names.
+# Arguments of Python; -P leaves out the current folder, whose modules may have the names of ours.
 PROGRAM = ("-P", "-m", "planfly.kernel_units")
-_OVER = ""
+# Line that marks the end of the output of a process.
+_END_OF_OUTPUT = ""
 
 
 def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None]) -> None:
-    """Have units compiled into a cache folder; return when all are done, or given up.
+    """Compile units into a cache folder; return when all are compiled or given up.
 
-    units: longest first.  on_ready: called with how many of their kernels are ready.
-    The processes end with this call, however it ends, and with this process.
+    units: longest first.  on_ready: called with the number of kernels that are ready.
+    The processes end with this call, also if it raises, and with this process.
     """
     waiting, lines = deque(units), queue.SimpleQueue[str]()
     count = min(PROCESSES, len(units), os.cpu_count() or 1)
@@ -45,7 +46,7 @@ def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None
         over = 0
         while over < count:
             line = lines.get()
-            over += line == _OVER
+            over += line == _END_OF_OUTPUT
             word, _, name = line.partition(" ")
             if word == "ready" and name not in ready:
                 ready.add(name)
@@ -73,9 +74,9 @@ def _start(folder: Path) -> "subprocess.Popen[str]":
 
 
 def _lead(helper: "subprocess.Popen[str]", waiting: "deque[str]", lines: "queue.SimpleQueue[str]") -> None:
-    """Give a process one unit after another, and pass its lines on; an empty one at its end."""
+    """Give a process one unit after another, and pass its lines on; an empty line marks its end."""
     requests, answers = helper.stdin, helper.stdout
-    # It may have died, or the other one was quicker.
+    # The process may have died, or the other process may have taken the last unit.
     with contextlib.suppress(OSError, IndexError):
         while requests is not None and answers is not None:
             requests.write(f"{waiting.popleft()}\n")
@@ -89,29 +90,31 @@ def _lead(helper: "subprocess.Popen[str]", waiting: "deque[str]", lines: "queue.
         with contextlib.suppress(OSError):
             if pipe is not None:
                 pipe.close()
-    lines.put(_OVER)
+    lines.put(_END_OF_OUTPUT)
 
 
 # ----------------------------------------------------------------------
-# Warm-up: when the first kernel has to be compiled, all that the work needs are compiled side by side.
+# Warm-up: when the first kernel has to be compiled, all kernels that the work needs are compiled in parallel.
 
 _Taken = ParamSpec("_Taken")
 _Given = TypeVar("_Given")
 
-# Each group is compiled at its first use: a command may do so more than once.
+# Title of the stage; a command may show it more than once, because each group is compiled at its first use.
 TITLE = "compiling numeric kernels"
+# End of the message on compiled kernels.
 KEPT = ", which later runs load"
-_WAY_OUT = f"{VARIABLE}=FOLDER names one that can"
-# Units that this process has had compiled, or tried to.
+# Hint at the variable that names another cache folder.
+_CACHE_DIR_HINT = f"{VARIABLE}=FOLDER names one that can"
+# Units that this process has compiled or tried to compile.
 _shared: set[str] = set()
 
 
 @contextmanager
 def warm_up(*units: str) -> Iterator[None]:
-    """Compile the kernels of units when the work inside first needs one that is not in the cache, and report it once.
+    """Compile all kernels of units when the work inside first needs one that is not cached.
 
-    units: of `planfly.kernel_units`, longest first: what the work will call.  They are compiled in two processes before
-    the work goes on; where the cache cannot be written they are compiled as they are called.
+    units: units of `planfly.kernel_units` that the work will call, longest first.  They are compiled in two processes
+    before the work continues; if the cache cannot be written, each kernel is compiled when it is called.
     """
     reported = False
 
@@ -127,7 +130,7 @@ def warm_up(*units: str) -> Iterator[None]:
 
 
 def with_warm_up(*units: str) -> Callable[[Callable[_Taken, _Given]], Callable[_Taken, _Given]]:
-    """Run a function of the public API under `warm_up`."""
+    """Return a decorator that runs a function of the public API under `warm_up`."""
 
     def decorate(verb: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
         @functools.wraps(verb)
@@ -141,15 +144,15 @@ def with_warm_up(*units: str) -> Callable[[Callable[_Taken, _Given]], Callable[_
 
 
 def _report_and_compile(units: list[str]) -> None:
-    # Whoever compiles has imported it.
+    # Imported here: code that compiles kernels has already imported it.
     from world.kernels import TEMPORARY, WANTED, cache_folder
 
     folder = cache_folder()
     if not can_write(folder):
-        say(f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them; {_WAY_OUT}")
+        say(f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them; {_CACHE_DIR_HINT}")
         return
     if TEMPORARY:
-        say(f"compiling the numeric kernels for this command alone: {WANTED} cannot be written; {_WAY_OUT}")
+        say(f"compiling the numeric kernels for this command alone: {WANTED} cannot be written; {_CACHE_DIR_HINT}")
     title = TITLE if TEMPORARY else TITLE + KEPT
     if not (units and sys.executable and is_received()):
         say(f"{title} ...")

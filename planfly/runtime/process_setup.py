@@ -8,17 +8,17 @@ from types import FunctionType
 from typing import TypeVar
 
 _Given = TypeVar("_Given")
-# Values that all frames within `with_large_stack` may hold together: numba recurses some 500 frames deep.
+# Total number of values in all frames within `with_large_stack`; Numba recurses some 500 frames deep.
 _STACK_VALUES = 2**17
-# In the environment of a process that `prepare_process` set up, and so of those that it starts.
+# Environment variable of a process set up by `prepare_process`, inherited by its child processes.
 _MARK = "PLANFLY_OWN_PROCESS"
 
 
 def prepare_process() -> None:
-    """Before NumPy is imported: collect garbage seldom, and leave linear algebra one thread.
+    """Collect garbage seldom, and limit linear algebra to one thread; call it before NumPy is imported.
 
-    A quarter of a start went into looking for garbage among what is imported, and a tenth into threads that wait by
-    spinning: no matrix here is large enough for a second one.
+    Garbage collection during imports took a quarter of the start, and spinning threads a tenth; no matrix here is large
+    enough for a second thread.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ[_MARK] = "1"
@@ -26,10 +26,10 @@ def prepare_process() -> None:
 
 
 def prepare_child() -> None:
-    """Collect garbage seldom in a process that one of planfly's own started, such as a campaign's worker.
+    """Collect garbage seldom in a process that planfly started, such as the worker of a campaign.
 
-    A sixth of what a short campaign takes went into looking for garbage in its processes.  Where address space is
-    limited, import nothing that does not fit (`world.address_space`).
+    Garbage collection in the processes of a short campaign took a sixth of its time.  If address space is limited,
+    import nothing that does not fit (`world.address_space`).
     """
     if _MARK in os.environ:
         gc.set_threshold(200_000, 50, 50)
@@ -49,7 +49,7 @@ def watch_address_space() -> None:
 
 
 def limit_of_address_space() -> int | None:
-    """Return bytes that this process may map; None without a limit, as on Windows.
+    """Return the number of bytes that this process may map, or None without a limit, as on Windows.
 
     >>> limit_of_address_space() is None or limit_of_address_space() > 0
     True
@@ -63,11 +63,11 @@ def limit_of_address_space() -> int | None:
 
 
 def with_large_stack(work: Callable[[], _Given]) -> _Given:
-    """Run work whose frames lie in one large piece of memory, and return what it returns.
+    """Run work with its frames in one large piece of memory, and return its result.
 
     CPython keeps frames in pieces of 16 KB and returns the last one as soon as it is empty.  Numba's recursion crosses
-    the edge between two so often that a sixth of its time went into pages that the kernel took back and gave again.  A
-    frame that asks for many values gets a piece of their size, and those within share it.
+    the boundary between two pieces so often that a sixth of its time went into pages that the operating system took
+    back and provided again.  A frame with many values gets a piece of their size, and inner frames share it.
 
     >>> with_large_stack(lambda: 7)
     7

@@ -1,4 +1,4 @@
-"""Progress of long work: the API reports stages of work, and its caller decides where they are shown.
+"""Report the progress of long work: the API reports stages, and its caller shows them.
 
 Without a receiver nothing is shown.  Only the compilation of kernels, up to a minute after an install, is then logged
 as a warning of the logger ``planfly``, which Python writes to standard error unless logging is configured otherwise.
@@ -11,27 +11,28 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import NamedTuple
 
-# Takes how far a stage is: done, total, a remark.
+# Function that takes the progress of a stage: done, total, a remark.
 Advance = Callable[[float, float, str], None]
 
 
 class Receiver(NamedTuple):
     """Receiver of progress.
 
-    stage: begins a stage by its title and its kind, and gives what takes how far it is.
-    say: takes a line that stands for itself.
+    stage: begins a stage by its title and its kind, and returns the function that takes its progress.
+    say: takes a line that belongs to no stage.
     """
 
     stage: Callable[[str, str], AbstractContextManager[Advance]]
     say: Callable[[str], None]
 
 
+# Receiver of the progress of the running work.
 _receiver: ContextVar[Receiver | None] = ContextVar("receiver", default=None)
 
 
 @contextmanager
 def received_by(receiver: Receiver) -> Iterator[None]:
-    """Send the progress of what runs inside to a receiver."""
+    """Send the progress of the work inside to a receiver."""
     token = _receiver.set(receiver)
     try:
         yield
@@ -42,7 +43,7 @@ def received_by(receiver: Receiver) -> Iterator[None]:
 def stage(title: str, kind: str = "") -> AbstractContextManager[Advance]:
     """Begin a stage of work; its context gives a function that takes done, total and a remark.
 
-    kind: what stages have in common that go at the same pace, where the title says more ("planning" of any scenario).
+    kind: common name of stages with the same pace, if the title is more specific ("planning" for any scenario).
 
     >>> with stage("flying") as advance:
     ...     advance(1.0, 2.0, "half")
@@ -52,7 +53,7 @@ def stage(title: str, kind: str = "") -> AbstractContextManager[Advance]:
 
 
 def say(line: str) -> None:
-    """A line about the work; without a receiver it is logged as a warning."""
+    """Report a line about the work; without a receiver it is logged as a warning."""
     receiver = _receiver.get()
     if receiver is not None:
         receiver.say(line)
@@ -64,7 +65,7 @@ def say(line: str) -> None:
 
 
 def say_replaced(*files: Path) -> None:
-    """Say of each file that is there that it is replaced: a program's flight may be about to replace a law's."""
+    """Report each existing file that is replaced: the flight of a program may replace the flight of a law."""
     for file in files:
         if file.exists():
             say(f"{file} is there: replaced")
@@ -86,8 +87,8 @@ def _ignore(_done: float, _total: float, _remark: str) -> None:
 def progress(callback: Callable[[str, float, float, str], None]) -> AbstractContextManager[None]:
     """Report the progress of the calls inside a ``with`` block.
 
-    callback: called with the title of a stage ("planning jacksboro"), how much of how much is done, and a remark;
-    with 0, 0 and "" for a line that stands for itself.
+    callback: called with the title of a stage ("planning jacksboro"), the amount done, the total, and a remark; with
+    0, 0 and "" for a line that belongs to no stage.
 
     >>> with progress(lambda title, done, total, remark: print(title, done, total, remark)):
     ...     with stage("flying") as advance:

@@ -1,4 +1,7 @@
-"""Answers of the commands with ``--json``.  Paths are as the command names them; numbers carry their unit."""
+"""Answers of the commands with ``--json``.
+
+Paths are as the command names them; numbers carry their unit.
+"""
 
 import math
 from typing import Any, Literal
@@ -12,7 +15,7 @@ from planfly.api.aircraft import AircraftNumbers
 from planfly.terminal.verdict_answers import STRICT
 
 # ----------------------------------------------------------------------
-# What ``planfly aircraft`` answers with ``--json``.
+# Answer of ``planfly aircraft`` with ``--json``.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -30,7 +33,7 @@ class TrimEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ModeEntry:
-    """A mode in cruise: its root, of a pair the one with the positive imaginary part."""
+    """A mode in cruise: its root; for a conjugate pair, the root with the positive imaginary part."""
 
     name: str
     root_real_1_s: float
@@ -74,7 +77,7 @@ class AircraftEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class AircraftAnswer:
-    """planfly aircraft: the one that was named or made, or all that come with planfly."""
+    """planfly aircraft: the named or made aircraft, or all embedded ones."""
 
     schema: Literal["planfly.aircraft/1"] = "planfly.aircraft/1"
     exit_code: int
@@ -82,7 +85,7 @@ class AircraftAnswer:
 
 
 def aircraft_entry(one: Aircraft, detail: AircraftDetail | None) -> AircraftEntry:
-    """Return an aircraft's metadata, and what was worked out."""
+    """Return the metadata of an aircraft, and the facts computed for it."""
     return AircraftEntry(
         name=one.name,
         title=one.title,
@@ -100,7 +103,7 @@ def aircraft_entry(one: Aircraft, detail: AircraftDetail | None) -> AircraftEntr
 
 
 def aircraft_detail(numbers: AircraftNumbers) -> AircraftDetail:
-    """Return what was worked out, in the answer's units."""
+    """Return the computed facts, in the units of the answer."""
     slow, fast = numbers.envelope.level_speeds(0.0)
     trims = [
         TrimEntry(
@@ -129,12 +132,12 @@ def aircraft_detail(numbers: AircraftNumbers) -> AircraftDetail:
 
 
 # ----------------------------------------------------------------------
-# What ``planfly campaign`` and ``planfly winds`` answer: also the content of summary.json and winds.json.
+# Answers of ``planfly campaign`` and ``planfly winds``: also the content of summary.json and winds.json.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class FailedPlace:
-    """Flights that failed a rule at a place; the place as of a verdict's finding."""
+    """Flights that failed a rule at a place; the place as in a finding of a verdict."""
 
     where: str
     flights: int
@@ -157,7 +160,7 @@ class FailedRule:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class SensitivityEntry:
-    """Share of the deciding margin's variance that a quantity explains."""
+    """Share of the variance of the deciding margin that a quantity explains."""
 
     quantity: str
     first_order: float | None
@@ -166,7 +169,7 @@ class SensitivityEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class CampaignDocument:
-    """planfly campaign: how likely a mission is to fly."""
+    """planfly campaign: the probability that a mission flies."""
 
     schema: Literal["planfly.campaign-summary/1"]
     name: str
@@ -210,7 +213,7 @@ class WindFlights:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class WindDirection:
-    """The boundary of one direction."""
+    """Boundary of the wind from one direction."""
 
     from_deg: float
     boundary_mps: float
@@ -284,7 +287,7 @@ class FlyAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ExportedFile:
-    """A file that was written."""
+    """A written file."""
 
     file: str
     content: str
@@ -293,7 +296,7 @@ class ExportedFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ExportAnswer:
-    """planfly export: what was written."""
+    """planfly export: the written files."""
 
     schema: Literal["planfly.export/1"] = "planfly.export/1"
     exit_code: int
@@ -303,7 +306,7 @@ class ExportAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class TimelineEvent:
-    """One thing that happened in a flight."""
+    """One event of a flight."""
 
     time_s: float
     kind: str
@@ -349,7 +352,7 @@ class ReportAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class QuantityPair:
-    """One quantity of two flights; null where a flight has none."""
+    """One quantity of two flights; null if a flight does not have it."""
 
     name: str
     unit: str
@@ -359,7 +362,7 @@ class QuantityPair:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class CompareAnswer:
-    """planfly compare: both flights' quantities."""
+    """planfly compare: the quantities of both flights."""
 
     schema: Literal["planfly.compare/1"] = "planfly.compare/1"
     exit_code: int
@@ -383,7 +386,7 @@ class ImportAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ReflyAnswer:
-    """planfly refly: where model and flight differ, in lines, and the files."""
+    """planfly refly: the differences between model and flight, in lines, and the files."""
 
     schema: Literal["planfly.refly/1"] = "planfly.refly/1"
     exit_code: int
@@ -421,7 +424,7 @@ class PaperAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class NewAnswer:
-    """planfly new: the scenario's file, and what planning it comes to."""
+    """planfly new: the file of the scenario, and the result of planning it."""
 
     schema: Literal["planfly.new/1"] = "planfly.new/1"
     exit_code: int
@@ -432,7 +435,7 @@ class NewAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class TerrainAnswer:
-    """planfly terrain: the file, and what it is from."""
+    """planfly terrain: the file, and its source."""
 
     schema: Literal["planfly.terrain/1"] = "planfly.terrain/1"
     exit_code: int
@@ -457,7 +460,7 @@ class ScenarioEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ScenariosAnswer:
-    """planfly scenarios: those that there are."""
+    """planfly scenarios: the embedded scenarios."""
 
     schema: Literal["planfly.scenarios/1"] = "planfly.scenarios/1"
     exit_code: int

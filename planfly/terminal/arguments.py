@@ -1,4 +1,4 @@
-"""Arguments of the command line as values, and what a shell proposes for them."""
+"""Arguments of the command line as values, and their completion by a shell."""
 
 import argparse
 import contextlib
@@ -11,11 +11,11 @@ from logs.importers.open_log import SUFFIXES
 from planfly.arguments import CAMERA, CHOICES, RANGES, is_camera, is_place, is_wind
 
 # ----------------------------------------------------------------------
-# Texts of the command line as values, within the ranges of the API's keywords.
+# Conversion of command line texts to values, within the ranges of the keywords of the API.
 
 
 def number(keyword: str) -> Callable[[str], Any]:
-    """Return what turns a text into the number that a keyword of the API may be.
+    """Return a converter from text to a number in the range of a keyword of the API.
 
     >>> number("seed")("3"), number("max_hours")("1.5")
     (3, 1.5)
@@ -37,7 +37,7 @@ def number(keyword: str) -> Callable[[str], Any]:
 
 
 def wind(text: str) -> tuple[float, float]:
-    """SPEED,FROM of a steady wind: m/s and degrees."""
+    """Convert SPEED,FROM of a steady wind: m/s and degrees."""
     try:
         speed, source = (float(part) for part in text.split(","))
     except ValueError:
@@ -50,7 +50,7 @@ def wind(text: str) -> tuple[float, float]:
 
 
 def camera(text: str) -> tuple[float, ...]:
-    """WxH,FOCAL or WxH,FOCAL,FRONT,SIDE: mm of sensor and focal length, and percent of overlap.
+    """Convert WxH,FOCAL or WxH,FOCAL,FRONT,SIDE: mm of sensor and focal length, and percent of overlap.
 
     >>> camera("23.5x15.6,16")
     (23.5, 15.6, 16.0)
@@ -66,7 +66,7 @@ def camera(text: str) -> tuple[float, ...]:
 
 
 def place(text: str) -> tuple[float, float]:
-    """LAT,LON: degrees."""
+    """Convert LAT,LON: degrees."""
     try:
         lat, lon = (float(part) for part in text.split(","))
     except ValueError:
@@ -79,7 +79,7 @@ def place(text: str) -> tuple[float, float]:
 
 
 def area(text: str) -> tuple[float, ...]:
-    """S,W,N,E: degrees; the API says which are an area."""
+    """Convert S,W,N,E: degrees; the API checks that they are an area."""
     try:
         edges = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -90,7 +90,7 @@ def area(text: str) -> tuple[float, ...]:
 
 
 def autopilots(text: str) -> list[str]:
-    """Return names of autopilots with commas between."""
+    """Convert names of autopilots separated by commas."""
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in CHOICES["autopilot_law"]:
@@ -99,14 +99,14 @@ def autopilots(text: str) -> list[str]:
 
 
 def time_or_stations(text: str) -> float | str:
-    """Return a time of the flight, or where ground stations listen: an address has a colon."""
+    """Convert a time of the flight, or the addresses of ground stations: an address has a colon."""
     if ":" in text:
         return text
     return number("end")(text)
 
 
 def budget(text: str) -> tuple[int | None, float | None]:
-    """Evaluations, or seconds where the text ends in s."""
+    """Convert a number of evaluations, or of seconds if the text ends in s."""
     try:
         if text.endswith("s"):
             return None, number("seconds")(text[:-1])
@@ -118,7 +118,7 @@ def budget(text: str) -> tuple[int | None, float | None]:
 
 
 def threat(text: str) -> tuple[float, float, float, float]:
-    """EAST,NORTH,KILL,DETECTION of a pop-up threat, m."""
+    """Convert EAST,NORTH,KILL,DETECTION of a pop-up threat, m."""
     try:
         east, north, kill, detection = (float(part) for part in text.split(","))
     except ValueError:
@@ -131,7 +131,7 @@ def threat(text: str) -> tuple[float, float, float, float]:
 
 
 def problems(text: str) -> tuple[int, ...]:
-    """Return numbers of threats out of the paper's four."""
+    """Convert numbers of threats, each one of the four of the paper."""
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})
     if not all(part.isdecimal() for part in parts) or not set(numbers) <= set(CHOICES["problems"]):
@@ -140,27 +140,31 @@ def problems(text: str) -> tuple[int, ...]:
 
 
 # ----------------------------------------------------------------------
-# What a shell proposes for an argument; `argcomplete` asks, in a process that ends after it.
+# Completion of arguments by a shell; `argcomplete` asks for it, in a process that then ends.
 
+# Function that proposes values for the beginning of a word.
 Completer = Callable[..., Iterable[str]]
-# Set by a shell's script where it asks.
+# Environment variable that the script of a shell sets to ask for completions.
 ASKS_COMPLETION = "_ARGCOMPLETE"
+# Supported shells.
 SHELLS = ("bash", "zsh", "fish")
-# Beside which file the embedded ones stand: their modules would load numbers first.
+# Root of the embedded files; importing their modules instead would load NumPy.
 _ROOT = Path(__file__).parents[2]
+# Suffixes of plans and mission files.
 MISSIONS = ("json", "waypoints", "plan", "txt")
+# Suffixes of the logs of other programs.
 IMPORTED_LOGS = ("BIN", "log", *(suffix[1:] for suffix in SUFFIXES))
 
 
 def completed(action: argparse.Action, completer: Completer) -> argparse.Action:
-    """Return an argument that a completer proposes values for."""
-    # argcomplete's own way of telling it.
+    """Return an argument after attaching the completer for its values."""
+    # argcomplete reads this attribute.
     action.completer = completer  # type: ignore[attr-defined]
     return action
 
 
 def files(*suffixes: str) -> Completer:
-    """Proposes files of these suffixes, and folders."""
+    """Return a completer for files with these suffixes, and for folders."""
 
     def propose(prefix: str, **_about: object) -> Iterable[str]:
         from argcomplete.completers import FilesCompleter
@@ -171,7 +175,7 @@ def files(*suffixes: str) -> Completer:
 
 
 def scenario_words(prefix: str, **_about: object) -> list[str]:
-    """Return names of the scenarios that come with planfly, and scenario files.
+    """Return the names of embedded scenarios, and scenario files.
 
     >>> scenario_words("jack")
     ['jacksboro', 'jacksboro-air', 'jacksboro-field']
@@ -181,7 +185,7 @@ def scenario_words(prefix: str, **_about: object) -> list[str]:
 
 
 def aircraft_words(prefix: str, **_about: object) -> list[str]:
-    """Return names of the aircraft that come with planfly, and folders.
+    """Return the names of embedded aircraft, and folders.
 
     >>> aircraft_words("aero")
     ['aerosonde']
@@ -191,19 +195,19 @@ def aircraft_words(prefix: str, **_about: object) -> list[str]:
 
 
 def mission_or_scenario_words(prefix: str, **about: object) -> list[str]:
-    """Scenarios, plans and missions."""
+    """Return scenarios, plans and missions."""
     return [*scenario_words(prefix, **about), *files(*MISSIONS)(prefix)]
 
 
 def answer_shell(parser: argparse.ArgumentParser) -> None:
-    """Print what completes the line that a shell has asked about, and end the process."""
+    """Print the completions that a shell has asked for, and end the process."""
     import argcomplete
 
     argcomplete.autocomplete(parser, always_complete_options="long")
 
 
 def shell_script(shell: str) -> str:
-    """Return the script that has a shell ask planfly.  shell: one of `SHELLS`."""
+    """Return the script that lets a shell ask planfly for completions.  shell: one of `SHELLS`."""
     from argcomplete.shell_integration import shellcode
 
     return shellcode(["planfly"], shell=shell)

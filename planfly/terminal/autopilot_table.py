@@ -1,4 +1,4 @@
-"""One mission flown by several autopilots: their verdicts as a table, a column each."""
+"""Table of the verdicts on one mission flown by several autopilots, a column for each."""
 
 from collections.abc import Mapping
 
@@ -8,13 +8,14 @@ from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
 from planfly.terminal.command_parser import coloured
 
+# Space between two columns.
 _GAP = "  "
 
 
 def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
-    """Return the table by rule, then what each autopilot's verdict says first.
+    """Return the table by rule, then the first lines of the verdict on each autopilot.
 
-    verdicts: by the autopilot's name, in the order of the columns.
+    verdicts: by the name of the autopilot, in the order of the columns.
 
     >>> flies = Verdict((), flyable=True, complete=True, lines=("flyable",), level="flown")
     >>> fails = Verdict((), flyable=False, complete=True, lines=("not flyable: speed", "NAV_ACC_RAD 10"), level="flown")
@@ -38,7 +39,7 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
         lines.append(f"  {title:<{widths[0]}}{_GAP}{_GAP.join(padded)}".rstrip())
     for name, verdict in verdicts.items():
         first, *rest = verdict.lines or ("",)
-        # Where another value of a parameter passes, the second line names it.
+        # If another value of a parameter passes, the second line names it.
         more = f"; {rest[0]}" if rest and not verdict.flyable else ""
         lines.append(f"{name}: " + coloured(first, "good" if verdict.flyable else "bad") + more)
         if verdict.conditions is not None:
@@ -54,7 +55,7 @@ def _answer(verdict: Verdict) -> str:
 
 
 def _state(rule: RuleFindings | None) -> str:
-    """Count the findings of a rule that failed, or that pass."""
+    """Return the number of findings of a rule that failed, or that pass."""
     if rule is None or not rule.judged:
         return "not judged" if rule else ""
     return f"{len(rule.failed)} of {rule.judged} failed" if rule.failed else f"{rule.judged} ok"

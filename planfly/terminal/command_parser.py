@@ -1,4 +1,4 @@
-"""A parser that answers bad usage in a line, names the option that was meant, and lays its help out in groups."""
+"""Parser that reports bad usage in one line, suggests the intended option, and groups its help."""
 
 import argparse
 import os
@@ -12,15 +12,16 @@ from world.errors import PlanflyError
 from world.files import did_you_mean
 
 # ----------------------------------------------------------------------
-# Colour where a terminal wants it: a terminal that is none, NO_COLOR and TERM=dumb want none, FORCE_COLOR wants it.
+# Colour for terminals: off if the stream is not a terminal, with NO_COLOR and with TERM=dumb; on with FORCE_COLOR.
 
+# Meaning of a colour.
 Style = Literal["good", "bad", "warning", "hint"]
 # Colours of ECMA-48, "select graphic rendition": green, red, yellow and cyan.
 _STYLES: dict[Style, int] = {"good": 32, "bad": 31, "warning": 33, "hint": 36}
 
 
 def wants_colour(stream: TextIO) -> bool:
-    """Return True if a stream is shown in colour.  NO_COLOR precedes FORCE_COLOR; empty ones are ignored.
+    """Return True if a stream is shown in colour; NO_COLOR overrides FORCE_COLOR; empty ones are ignored.
 
     >>> import io
     >>> wants_colour(io.StringIO())
@@ -34,7 +35,7 @@ def wants_colour(stream: TextIO) -> bool:
 
 
 def coloured(text: str, style: Style, stream: TextIO | None = None) -> str:
-    """Return a text as a stream, standard output if None, is to get it.
+    """Return a text in a style if the stream is shown in colour; the stream is standard output if None.
 
     >>> coloured("flyable", "good")
     'flyable'
@@ -44,13 +45,14 @@ def coloured(text: str, style: Style, stream: TextIO | None = None) -> str:
     return f"\x1b[{_STYLES[style]}m{text}\x1b[0m"
 
 
-# In a help: what stands above a paragraph, and options, wherever they stand.
+# Heading of a paragraph in a help.
 _HEADING = re.compile(r"^(\S[^\n]*:)(?=$| planfly)", re.MULTILINE)
+# Option anywhere in a help.
 _NAMED = re.compile(r"(?<![\w/-])--?[a-z][a-z-]*")
 
 
 def coloured_help(text: str) -> str:
-    r"""Return a help as a terminal that wants colour gets it; the text is the same.
+    r"""Return a help with colours for a terminal; its text stays the same.
 
     >>> coloured_help("usage: planfly fly [--at TIME]").split("\x1b")
     ['', '[33musage:', '[0m planfly fly [', '[36m--at', '[0m TIME]']
@@ -60,32 +62,33 @@ def coloured_help(text: str) -> str:
     return text
 
 
+# Long option as one word.
 _OPTION = re.compile(r"--[a-z][a-z-]*")
 
 
 class OptionTaker(Protocol):
-    """A parser, or a group of its options."""
+    """Parser, or group of its options."""
 
     def add_argument(self, *names: str, **settings: Any) -> argparse.Action:
-        """Take an option."""
+        """Add an option."""
 
 
 class CommandParser(argparse.ArgumentParser):
-    """A parser of one command, or of the whole line."""
+    """Parser of one command, or of the whole command line."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
         self._aliases: dict[str, str] = {}
-        # What the help says between the examples and the exit codes; made when it is printed.
+        # Text of the help between the examples and the exit codes; made when the help is printed.
         self.more: Callable[[], str] = str
 
     def error(self, message: str) -> NoReturn:
-        """One line, as for every other bad input."""
+        """Print one line, as for all other bad input, and exit."""
         line = f"{self.prog}: {message} (see {self.prog} --help)"
         self.exit(BAD_INPUT, coloured(line, "bad", sys.stderr) + "\n")
 
     def format_help(self) -> str:
-        """Return the help, with what is made for it alone."""
+        """Return the help, with the text that is made only when it is printed."""
         epilog, more = self.epilog, self.more()
         if more:
             self.epilog = (epilog or "").replace(EXIT_CODES, f"{more}\n\n{EXIT_CODES}")
@@ -94,25 +97,25 @@ class CommandParser(argparse.ArgumentParser):
         return coloured_help(text) if wants_colour(sys.stdout) else text
 
     def group(self, title: str, description: str | None = None) -> OptionTaker:
-        """Return options that stand together in the help, under a title."""
+        """Return a group of options shown together in the help, under a title."""
         return self.add_argument_group(title, description)
 
     def alias(self, keyword: str, option: str) -> None:
-        """State that an option also stands for a keyword of the API that is not its destination."""
+        """Map an option to another keyword of the API in addition to its destination."""
         self._aliases[keyword] = option
 
     def keywords(self) -> dict[str, str]:
-        """Return the option that states each keyword of the API."""
+        """Return the option for each keyword of the API."""
         named = {action.dest: action.option_strings[-1] for action in self._actions if action.option_strings}
         return named | self._aliases
 
     def options(self) -> list[str]:
-        """Return the long options that it takes."""
+        """Return the long options of the parser."""
         return list(dict.fromkeys(_OPTION.findall(self.format_usage())))
 
 
 class LineParser(CommandParser):
-    """The parser of the whole line.  commands: those of its commands, by name."""
+    """Parser of the whole command line.  commands: the parsers of its commands, by name."""
 
     def __init__(self, version: str, description: str, example: str) -> None:
         super().__init__(
@@ -124,7 +127,7 @@ class LineParser(CommandParser):
         self.commands: dict[str, CommandParser] = {}
         self._sections: dict[str, argparse._ArgumentGroup] = {}
         self._section = ""
-        # prog is named: to find it out argparse would lay out a help.
+        # prog is given, because argparse would format a help to determine it.
         self._parsers = self.add_subparsers(
             dest="command",
             metavar="COMMAND",
@@ -132,18 +135,18 @@ class LineParser(CommandParser):
             parser_class=CommandParser,
             prog="planfly",
         )
-        # Shown in sections instead.
+        # The commands are shown in sections instead.
         self._positionals._group_actions.clear()
 
     def section(self, title: str) -> None:
-        """Have the commands that follow listed below a title."""
+        """List the commands added from here on below a title."""
         self._section = title
 
     def command(self, name: str, summary: str, *examples: str, extra: str = "", more: str = "") -> CommandParser:
-        """Make the parser of a command.
+        """Add the parser of a command.
 
-        summary: what it does.  examples: lines of its help.  extra: of planfly, which it needs; "" for none.
-        more: sentences after the first, of its own help.
+        summary: one sentence on the command.  examples: lines of its help.  extra: the extra that it needs, or "".
+        more: further sentences of its own help.
         """
         needs = f"  It needs the extra planfly[{extra}]." if extra else ""
         shown = f"\n{' ' * len('example: ')}".join(examples)
@@ -156,14 +159,14 @@ class LineParser(CommandParser):
         self.commands[name] = made
         if self._section not in self._sections:
             self._sections[self._section] = self.add_argument_group(self._section)
-        # The line of the list of commands that argparse has just made.
+        # Entry for the command list that argparse has just made.
         self._sections[self._section]._group_actions.append(self._parsers._choices_actions[-1])
         return made
 
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> argparse.Namespace:
-        """Return the arguments by name; for bad usage one line that names what may have been meant, and SystemExit."""
+        """Return the arguments by name.  For bad usage, print one line with a suggestion and raise SystemExit."""
         words = _with_negatives(sys.argv[1:] if args is None else list(args))
         if words and not words[0].startswith("-") and words[0] not in self.commands:
             there = did_you_mean(words[0], self.commands) or f"; there are {', '.join(self.commands)}"
@@ -171,7 +174,7 @@ class LineParser(CommandParser):
         parsed, left = self.parse_known_args(words, namespace)
         if left:
             parser = self.commands[parsed.command]
-            # What follows a -- is no option, whatever it begins with.
+            # Words after a -- are not options, even if they begin with a dash.
             after = words[words.index("--") :] if "--" in words else []
             option = next((word for word in left if word.startswith("-") and word not in after), "").partition("=")[0]
             if option:
@@ -180,12 +183,12 @@ class LineParser(CommandParser):
         return parsed
 
 
-# What argparse takes for an option of its own: the negative first of several numbers.
+# Several numbers of which the first is negative, which argparse would take for an option.
 _NEGATIVES = re.compile(r"-\.?\d[^=]*")
 
 
 def _with_negatives(words: list[str]) -> list[str]:
-    """Return a command line in which negative numbers stand with the option that they follow: --from -33.9,18.4."""
+    """Return a command line with negative numbers joined to the option before them: --from=-33.9,18.4."""
     joined: list[str] = []
     for word in words:
         if _NEGATIVES.fullmatch(word) and joined and _OPTION.fullmatch(joined[-1]):
@@ -196,14 +199,14 @@ def _with_negatives(words: list[str]) -> list[str]:
 
 
 # ----------------------------------------------------------------------
-# Errors of the API name its keywords; on the command line they name the options that state them.
+# Errors of the API name its keywords; on the command line they name the matching options.
 
-# In an error's text: `keyword`, and keyword=True.
+# Keyword in the text of an error: `keyword` or keyword=True.
 _KEYWORD = re.compile(r"`(\w+)`|\b(\w+)=True\b")
 
 
 def error_text(error: PlanflyError, parser: CommandParser) -> str:
-    """Return an error's line with the options of a command's parser in place of the keywords that they state.
+    """Return the line of an error, with keywords of the API replaced by the options of a command.
 
     >>> parser = CommandParser(prog="planfly replay")
     >>> _ = parser.add_argument("--from", dest="start")
@@ -214,7 +217,7 @@ def error_text(error: PlanflyError, parser: CommandParser) -> str:
     'a.gif: exists; --overwrite replaces it'
     """
     options, text = parser.keywords(), str(error)
-    # A change that a keyword asked for is reported in the keyword's name; a file alone may be named like one.
+    # An error in a change made by a keyword has the keyword as its file; a real file may have the same name.
     of_keyword = error.file in options and bool(error.field)
     begin = f"{error.file}: " if error.file and not of_keyword else ""
     head = error.file if of_keyword else error.argument

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from planfly import Verdict
 
+# Text on the exit codes for the help.
 EXIT_CODES = """\
 exit codes: 0 flyable, or flown as planned
             1 internal or system error
@@ -18,7 +19,7 @@ FAULT = 1
 BAD_INPUT = 2
 LOSS = 3
 NOT_FLYABLE = 4
-# By Ctrl-C, as a shell counts what a signal ended: 128 and the signal's number.
+# Interrupted by Ctrl-C, in the convention of shells for signals: 128 plus the number of the signal.
 INTERRUPTED = 130
 
 

@@ -1,6 +1,6 @@
-"""Options that several commands take, in the groups of their help, and how the API is called with them.
+"""Options shared by several commands, in the groups of their help, and the call of the API with them.
 
-An option's destination is the keyword of the API that it states, so that `call` hands it over by itself.
+The destination of an option is the matching keyword of the API, so that `call` passes it without further code.
 """
 
 import argparse
@@ -29,9 +29,9 @@ Returned = TypeVar("Returned")
 
 
 def call(function: Callable[..., Returned], args: argparse.Namespace, **more: Any) -> Returned:
-    """Call a function of the API with the options that it has keywords for.
+    """Call a function of the API with the options that match its keywords.
 
-    Options that were not given (None) leave the keyword at its default.  more: keywords that take their place.
+    Options that were not given (None) leave the keyword at its default.  more: keywords that override the options.
 
     >>> call(lambda *, seed=1, out="here": (seed, out), argparse.Namespace(seed=3, out=None, json=None))
     (3, 'here')
@@ -42,7 +42,7 @@ def call(function: Callable[..., Returned], args: argparse.Namespace, **more: An
 
 
 # ----------------------------------------------------------------------
-# What is written, and how much is printed.
+# Output files, and amount of printed text.
 
 
 def result_options(
@@ -50,7 +50,7 @@ def result_options(
 ) -> None:
     """Add the options for output files and for the amount of printed text.
 
-    out: what --out names, "" for a command without it.  what: its placeholder.  junit: whether its answer is a verdict.
+    out: help of --out, "" for a command without it.  what: its placeholder.  junit: True if its answer is a verdict.
     """
     group = parser.group("results")
     if out:
@@ -65,7 +65,7 @@ def result_options(
 
 
 def json_option(group: OptionTaker, command: str) -> None:
-    """The answer as data, and silence."""
+    """Add the options for the answer as data, and for no printed text."""
     group.add_argument(
         "--json",
         metavar="FILE",
@@ -78,11 +78,11 @@ def json_option(group: OptionTaker, command: str) -> None:
 
 
 # ----------------------------------------------------------------------
-# Where a mission flies, and with what.
+# World of a flight, its aircraft and its autopilot.
 
 
 def world_options(parser: CommandParser) -> OptionTaker:
-    """Return what a mission is judged in."""
+    """Add the options for the world that a mission is judged in, and return their group."""
     group = parser.group("where it flies")
     completed(
         group.add_argument(
@@ -96,14 +96,14 @@ def world_options(parser: CommandParser) -> OptionTaker:
 
 
 def terrain_option(group: OptionTaker) -> None:
-    """The ground."""
+    """Add the option for the terrain."""
     suffixes, names = ", ".join(SUFFIXES), ", ".join(EMBEDDED)
     words = f"elevation file ({suffixes}), a folder or .vrt of such tiles, or an embedded name: {names}"
     group.add_argument("--terrain", metavar="DEM", help=words)
 
 
 def fence_option(group: OptionTaker) -> None:
-    """Fences beside the mission's own."""
+    """Add the option for fences in addition to the mission's own."""
     found = group.add_argument(
         "--fence",
         metavar="FILE",
@@ -116,7 +116,7 @@ def fence_option(group: OptionTaker) -> None:
 
 
 def time_option(group: OptionTaker) -> None:
-    """When it is flown."""
+    """Add the option for the time of the flight."""
     group.add_argument(
         "--at",
         metavar="TIME",
@@ -126,7 +126,7 @@ def time_option(group: OptionTaker) -> None:
 
 
 def flown_by_options(parser: CommandParser) -> None:
-    """The aircraft, and the wind."""
+    """Add the options for the aircraft and the wind."""
     group = parser.group("aircraft and weather")
     completed(
         group.add_argument(
@@ -154,14 +154,14 @@ def flown_by_options(parser: CommandParser) -> None:
 
 
 def turbulence_option(group: OptionTaker) -> None:
-    """The gusts."""
+    """Add the option for the turbulence."""
     group.add_argument(
         "--turbulence", choices=CHOICES["turbulence"], help="turbulence (default: the scenario's, or none)"
     )
 
 
 def pilot_options(parser: CommandParser) -> OptionTaker:
-    """Return the autopilot."""
+    """Add the options for the autopilot, and return their group."""
     group = parser.group("autopilot")
     found = group.add_argument(
         "--params",
@@ -186,7 +186,7 @@ def pilot_options(parser: CommandParser) -> OptionTaker:
 
 
 def steering_options(parser: CommandParser) -> OptionTaker:
-    """Return the autopilot, and how well it knows where it is."""
+    """Add the options for the autopilot and its position errors, and return their group."""
     group = pilot_options(parser)
     group.add_argument(
         "--nav",
@@ -198,12 +198,12 @@ def steering_options(parser: CommandParser) -> OptionTaker:
 
 
 def program_option(group: OptionTaker, does: str) -> None:
-    """An autopilot's program."""
+    """Add the option for the program of an autopilot."""
     group.add_argument("--autopilot", metavar="PATH", help=does)
 
 
 def flight_options(parser: CommandParser) -> None:
-    """Add what decides a flight in addition to its mission: aircraft, weather, autopilot, and when it is stopped."""
+    """Add the options of a flight: aircraft, weather, autopilot, and its limits."""
     flown_by_options(parser)
     group = steering_options(parser)
     program_option(
@@ -235,7 +235,7 @@ def flight_options(parser: CommandParser) -> None:
 
 
 def log_rate_option(group: OptionTaker) -> None:
-    """Rows a second."""
+    """Add the option for the rows per second in the log."""
     group.add_argument(
         "--log-hz",
         metavar="HZ",
@@ -264,17 +264,17 @@ def imported_log_options(parser: CommandParser) -> None:
 def log_argument(
     parser: CommandParser, name: str = "log", metavar: str = "LOG.mcap", what: str = "a flight log"
 ) -> None:
-    """A flight log to read."""
+    """Add the argument for a flight log to read."""
     completed(parser.add_argument(name, metavar=metavar, help=what), files("mcap"))
 
 
 def scenario_argument(parser: CommandParser, **settings: object) -> None:
-    """A scenario to plan in."""
+    """Add the argument for a scenario to plan in."""
     completed(parser.add_argument("scenario", metavar="SCENARIO", **settings), scenario_words)  # type: ignore[arg-type]
 
 
 # ----------------------------------------------------------------------
-# Commands that talk to ground stations: with whom, and how they are stopped.
+# Commands that talk to ground stations: their links, and how they are stopped.
 
 
 def own_link_options(parser: CommandParser, *, bind: str) -> None:
@@ -289,7 +289,7 @@ def own_link_options(parser: CommandParser, *, bind: str) -> None:
 
 @contextlib.contextmanager
 def stop_signals() -> Iterator[Callable[[], bool]]:
-    """Yield turn SIGINT and SIGTERM into a question, so that logs are closed in order: gives whether to stop."""
+    """Yield a function that returns True after SIGINT or SIGTERM, so that logs can be closed properly."""
     asked = False
 
     def ask(_number: int, _frame: FrameType | None) -> None:
@@ -305,5 +305,5 @@ def stop_signals() -> Iterator[Callable[[], bool]]:
 
 
 def print_at_once(text: str) -> None:
-    """Print a line of something that goes on for long."""
+    """Print and flush a line of a long-running command."""
     print(text, flush=True)

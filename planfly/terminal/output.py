@@ -1,4 +1,4 @@
-"""Output of a command: standard output that survives a closed pipe, progress on standard error, and the answer."""
+"""Output of a command: standard output, which survives a closed pipe, progress and the answer."""
 
 import argparse
 import contextlib
@@ -25,22 +25,22 @@ if TYPE_CHECKING:
     from logs.verdict.verdict import Verdict
 
 # ----------------------------------------------------------------------
-# Standard output that outlives its reader: ``planfly check M | head -1`` still ends with the verdict's exit code.
+# Standard output that tolerates a closed pipe: ``planfly check M | head -1`` still exits with the code of the verdict.
 
 
 class _TolerantStream(io.TextIOBase):
-    """Writes to a stream until its reader has gone, and drops the rest."""
+    """Stream that writes until its reader has gone, and drops the rest."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._gone = False
 
     def writable(self) -> bool:
-        """Take text, always."""
+        """Return True: the stream always takes text."""
         return True
 
     def isatty(self) -> bool:
-        """Return True if the stream behind is a terminal."""
+        """Return True if the underlying stream is a terminal."""
         return self._stream.isatty()
 
     def write(self, text: str, /) -> int:
@@ -62,13 +62,13 @@ class _TolerantStream(io.TextIOBase):
             except BrokenPipeError:
                 self._leave()
             except OSError as error:
-                # What it still holds would be tried again when the interpreter ends.
+                # The interpreter would try to write the buffered text again when it ends.
                 self._leave()
                 raise _named(error) from error
 
     def _leave(self) -> None:
         self._gone = True
-        # What the stream still holds must have somewhere to go when the interpreter ends.
+        # When the interpreter ends, the buffered text must have somewhere to go.
         with contextlib.suppress(OSError, ValueError), Path(os.devnull).open("w") as nowhere:
             os.dup2(nowhere.fileno(), self._stream.fileno())
 
@@ -78,15 +78,15 @@ def _named(error: OSError) -> OSError:
 
 
 def open_standard_streams() -> None:
-    """Have the process begin with its three streams open, and able to take any text.
+    """Open the three standard streams that are closed, and let them take any text.
 
-    Where one is closed, the next file that is opened would get its number, and what a library prints would go there.
+    If one were closed, the next file to be opened would get its number, and text that a library prints would go there.
     """
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            # The lowest number that is free.
+            # This takes the lowest free descriptor.
             os.open(os.devnull, os.O_RDWR)
     if sys.stdout is None:
         sys.stdout = io.TextIOWrapper(io.FileIO(1, "w", closefd=False), "utf-8")
@@ -94,12 +94,12 @@ def open_standard_streams() -> None:
         sys.stderr = io.TextIOWrapper(io.FileIO(2, "w", closefd=False), "utf-8")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            # A terminal of few letters, or a file name that is no text.
+            # For a terminal with a small character set, or a file name that is not valid text.
             stream.reconfigure(errors="backslashreplace")
 
 
 def printable(text: str) -> str:
-    r"""Return one line without what would move a terminal's cursor or turn its text around: escapes take its place.
+    r"""Return a text as one line, with escapes for characters that move the cursor or reverse the text.
 
     >>> print(printable("a\nb \x1b[2J \u202e"))
     a b \x1b[2J \u202e
@@ -110,7 +110,7 @@ def printable(text: str) -> str:
 
 @contextlib.contextmanager
 def tolerate_closed_output() -> Iterator[None]:
-    """Let the reader of standard output close it."""
+    """Tolerate that the reader of standard output closes it."""
     tolerant = _TolerantStream(sys.stdout)
     with contextlib.redirect_stdout(tolerant):
         try:
@@ -120,16 +120,16 @@ def tolerate_closed_output() -> Iterator[None]:
 
 
 # ----------------------------------------------------------------------
-# What stages took the last time, by their kind: what there is to say of one before anything of it is measured.
+# Durations of previous runs, by kind of stage: the estimate for a stage before it reports any progress.
 
-# Kinds are a few dozen; what is longer is none of ours.
+# Largest file of durations that is read, bytes.  There are a few dozen kinds; a larger file was not written by planfly.
 _MAX_BYTES = 20_000
 
 
-class _LastTime(NamedTuple):
-    """Duration of a stage of a kind.
+class _LastDuration(NamedTuple):
+    """Duration of the previous stage of a kind.
 
-    each: s for each unit that it counts, 0 where it counts none.  whole: s of all of it.
+    each: seconds per unit of work, 0 if its units are unknown.  whole: seconds for the whole stage.
     """
 
     each: float
@@ -137,27 +137,27 @@ class _LastTime(NamedTuple):
 
 
 def _times_file() -> Path:
-    # Imported here: who asks for help has no need of it.
+    # Imported here: the help does not need it.
     from platformdirs import user_cache_dir
 
     return Path(user_cache_dir("planfly")) / "durations.json"
 
 
-def _last_times() -> dict[str, _LastTime]:
-    """By kind of stage; none where the file is not there, or no such file."""
+def _last_durations() -> dict[str, _LastDuration]:
+    """Return the last duration by kind of stage; empty if the file is missing or invalid."""
     found = {}
     with contextlib.suppress(OSError, ValueError, RecursionError):
         read = json.loads(read_at_most(_times_file(), _MAX_BYTES, "durations"))
         for kind, taken in read.items() if isinstance(read, dict) else ():
             numbers = taken if isinstance(taken, list) and len(taken) == 2 else [math.nan]
             if all(isinstance(one, int | float) and 0.0 <= one < math.inf for one in numbers):
-                found[str(kind)] = _LastTime(*map(float, numbers))
+                found[str(kind)] = _LastDuration(*map(float, numbers))
     return found
 
 
-def _keep_time(kind: str, taken: _LastTime) -> None:
-    """Remember what a stage of a kind took; nothing is said where that cannot be written."""
-    text = json.dumps(_last_times() | {kind: tuple(float(f"{one:.4g}") for one in taken)}, indent=1)
+def _keep_time(kind: str, taken: _LastDuration) -> None:
+    """Store the duration of a stage of a kind; a file that cannot be written is ignored silently."""
+    text = json.dumps(_last_durations() | {kind: tuple(float(f"{one:.4g}") for one in taken)}, indent=1)
     with contextlib.suppress(OSError):
         _times_file().parent.mkdir(parents=True, exist_ok=True)
         write_whole(_times_file(), text)
@@ -171,31 +171,34 @@ def _say(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
-# s.  Where no terminal is, an estimate is told this long after the first report, and again when four times as long has
-# passed, at least once a minute; and a stage that reports nothing is named after the first second, and once a minute.
-_FIRST_REPORT = 2.0
-_REPORT_AGAIN = 4.0
-_REPORT_EVERY = 60.0
+# Without a terminal, delay from the first report of a stage to the first line with an estimate, s.
+_FIRST_REPORT_DELAY_S = 2.0
+# Ratio of the time of the next line to the time of the last line.
+_REPORT_INTERVAL_RATIO = 4.0
+# Longest time between two lines, also of a stage that reports nothing, s.
+_MAX_REPORT_INTERVAL_S = 60.0
+# Interval at which a stage checks the clock, s; a stage that reports nothing is named after the first interval.
 _LOOKS_EVERY = 1.0
-# Stages that have begun in this process: one within another makes the outer one's time none that comes again.
-_begun = itertools.count()
+# Counter of the stages begun in this process.  The duration of a stage that contains another one is not stored: the
+# inner stage may not occur again.
+_stage_numbers = itertools.count()
 
 
 class _TimeLeft:
-    """Time left for a stage, extrapolated from its first report on; known from its second report on.
+    """Time left for a stage, extrapolated from its first report; known from its second report on.
 
-    Until then there is what such a stage took the last time.
-    What comes before the first report is not the work: kernels may have been compiled.
+    Until then, the duration of the previous stage of its kind is given.
+    The time before the first report is left out: kernels may have been compiled in it.
     """
 
     def __init__(self, kind: str) -> None:
-        self._kind, self._number = kind, next(_begun)
+        self._kind, self._number = kind, next(_stage_numbers)
         self._started = time.monotonic()
         self._first: tuple[float, float] | None = None
-        self._done, self._due = 0.0, _FIRST_REPORT
+        self._done, self._due = 0.0, _FIRST_REPORT_DELAY_S
 
     def estimate(self, done: float, total: float) -> str:
-        """In words; "" where nothing has been done since the first report, or all, or where the total is not known."""
+        """Return the time left in words; "" if no progress since the first report, all done, or total unknown."""
         if self._first is None:
             self._first = time.monotonic(), done
         self._done, more = done, done - self._first[1]
@@ -204,8 +207,8 @@ class _TimeLeft:
         return f"{_duration(self._passed() * (total - done) / more)} left"
 
     def at_first(self, to_do: float) -> str:
-        """In words, before anything is measured.  to_do: units that are to be done, 0 if unknown."""
-        last = _last_times().get(self._kind)
+        """Return an estimate in words before any progress is measured.  to_do: units of work, 0 if unknown."""
+        last = _last_durations().get(self._kind)
         if last is not None and to_do > 0.0 and last.each > 0.0:
             return f"about {_duration(last.each * to_do)}, at the pace of the last time here"
         if last is not None:
@@ -213,29 +216,29 @@ class _TimeLeft:
         return "no estimate yet" if to_do > 0.0 else "no estimate"
 
     def is_due(self) -> bool:
-        """Return True if it is time to tell again; asked by what then tells."""
+        """Return True if the next progress line is due, and schedule the one after it."""
         passed = self._passed()
         if passed < self._due:
             return False
-        self._due = min(_REPORT_AGAIN * passed, passed + _REPORT_EVERY)
+        self._due = min(_REPORT_INTERVAL_RATIO * passed, passed + _MAX_REPORT_INTERVAL_S)
         return True
 
     def elapsed(self) -> float:
-        """Return seconds since it began."""
+        """Return the seconds since the stage began."""
         return time.monotonic() - self._started
 
     def keep(self) -> None:
-        """Remember what all of it took for the next time, unless it had another stage within, such as a compilation."""
-        if next(_begun) == self._number + 1:
+        """Store the duration for the next run, unless the stage contained another one, such as a compilation."""
+        if next(_stage_numbers) == self._number + 1:
             units = 0.0 if self._first is None else self._done - self._first[1]
-            _keep_time(self._kind, _LastTime(self._passed() / units if units > 0.0 else 0.0, self.elapsed()))
+            _keep_time(self._kind, _LastDuration(self._passed() / units if units > 0.0 else 0.0, self.elapsed()))
 
     def _passed(self) -> float:
         return 0.0 if self._first is None else time.monotonic() - self._first[0]
 
 
 def _duration(seconds: float) -> str:
-    """Return a duration that is an estimate.
+    """Return an estimated duration in words.
 
     >>> _duration(0.4), _duration(89.0), _duration(600.0), _duration(9000.0)
     ('1 s', '89 s', '10 min', '2.5 h')
@@ -247,11 +250,11 @@ def _duration(seconds: float) -> str:
 
 @contextmanager
 def progress(title: str, kind: str = "") -> Iterator[Advance]:
-    """Show a stage of work; the work reports how much of how much is done, and a remark.
+    """Show the progress of a stage; the work reports the units done, the total and a remark.
 
     kind: see `planfly.runtime.stages.stage`.
-    Beside the remark stands how long it will still take, where the remark does not say; at first, what such a stage
-    took the last time on this machine, or that there is no estimate.  A total of 0 is unknown.
+    The time left follows the remark, unless the remark states it.  At first, the duration of the previous stage of its
+    kind on this machine is shown, or "no estimate".  A total of 0 means that the total is unknown.
     """
     left = _TimeLeft(kind or title)
     shown = _Bar(title, left) if sys.stderr.isatty() else _Lines(title, left)
@@ -262,11 +265,11 @@ def progress(title: str, kind: str = "") -> Iterator[Advance]:
 
 @contextmanager
 def _looked_at(shown: "_Bar | _Lines") -> Iterator[None]:
-    """Have a stage look at the clock now and then, whatever its work is at; without a thread where there is no room."""
+    """Update the elapsed time of a stage at intervals from a thread, or not at all if no thread can start."""
     over = threading.Event()
 
     def look() -> None:
-        # Whoever read it may be gone: the work itself meets that.
+        # The reader of the stream may be gone: the work itself handles that error.
         with contextlib.suppress(OSError, ValueError):
             while not over.wait(_LOOKS_EVERY):
                 shown.look()
@@ -284,13 +287,16 @@ def _joined(*parts: str) -> str:
     return ", ".join(filter(None, parts))
 
 
-def _says_left(remark: str) -> bool:
-    """Return True if a remark has an estimate of its own: of work that is resumed, or that may turn out to be more."""
+def _states_time_left(remark: str) -> bool:
+    """Return True if a remark states the time left itself: for resumed work, or work that may still grow."""
     return " left" in remark
 
 
 class _Bar:
-    """A stage on a terminal.  Its estimate of the last time stands until there is one of this time."""
+    """Progress bar of a stage on a terminal.
+
+    It shows the estimate from the previous run until this run is measured.
+    """
 
     def __init__(self, title: str, left: _TimeLeft) -> None:
         from tqdm import tqdm
@@ -312,30 +318,30 @@ class _Bar:
             self._bar.close()
 
     def advance(self, done: float, total: float, remark: str = "") -> None:
-        """Take how far it is."""
+        """Take the progress of the work."""
         with self._lock:
             share = 100.0 * done / total if total > 0 else 0.0
             self._bar.update(max(0.0, min(100.0, share) - self._bar.n))
             estimate = self._left.estimate(done, total)
             self._remark = remark
-            if estimate or _says_left(remark) or 0.0 < total <= done:
+            if estimate or _states_time_left(remark) or 0.0 < total <= done:
                 self._measured = True
             if not self._measured:
                 self._at_first = self._left.at_first(max(0.0, total - done))
                 estimate = self._at_first
-            self._bar.set_postfix_str(_joined(remark, "" if _says_left(remark) else estimate))
+            self._bar.set_postfix_str(_joined(remark, "" if _states_time_left(remark) else estimate))
 
     def look(self) -> None:
-        """Show how long it has taken so far, as long as nothing is measured."""
+        """Show the elapsed time until progress is measured."""
         with self._lock:
             if not self._measured and not self._bar.disable:
                 self._bar.set_postfix_str(_joined(self._remark, self._at_first, f"{self._left.elapsed():.0f} s so far"))
 
 
 class _Lines:
-    """A stage where no terminal is: a line when work begins, one now and then, and one when it is done.
+    """Progress lines of a stage without a terminal: one at the start, some at intervals, one at the end.
 
-    None for input that is refused before, within the first second.
+    Input that is refused within the first second gets no line.
     """
 
     def __init__(self, title: str, left: _TimeLeft) -> None:
@@ -354,28 +360,30 @@ class _Lines:
                 _say(f"{self._title}: done in {self._left.elapsed():.1f} s{end}")
 
     def advance(self, done: float, total: float, remark: str = "") -> None:
-        """Take how far it is."""
+        """Take the progress of the work."""
         with self._lock:
             self._remark = remark
             estimate = self._left.estimate(done, total)
             counted, self._counted = self._counted, self._counted or total > 0.0
-            at_first = "" if counted else remark if _says_left(remark) else self._left.at_first(max(0.0, total - done))
+            at_first = (
+                "" if counted else remark if _states_time_left(remark) else self._left.at_first(max(0.0, total - done))
+            )
             if not self._begun:
-                self._begin(at_first if _says_left(remark) else _joined(remark if total > 0.0 else "", at_first))
+                self._begin(at_first if _states_time_left(remark) else _joined(remark if total > 0.0 else "", at_first))
             elif total > 0.0 and not counted:
-                # It had been named before it knew how much there is.
-                self._tell(f"{self._title}: {_joined('' if _says_left(remark) else remark, at_first)}")
+                # The first line was printed before the total was known.
+                self._tell(f"{self._title}: {_joined('' if _states_time_left(remark) else remark, at_first)}")
             elif estimate and self._left.is_due():
-                self._tell(f"{self._title}: {_joined(remark, '' if _says_left(remark) else estimate)}")
+                self._tell(f"{self._title}: {_joined(remark, '' if _states_time_left(remark) else estimate)}")
 
     def look(self) -> None:
-        """Name a stage that reports nothing, and say now and then how long it has taken so far."""
+        """Name a stage that reports nothing, and print its elapsed time at intervals."""
         with self._lock:
             if self._over:
                 return
             if not self._begun:
                 self._begin(self._left.at_first(0.0))
-            elif self._left.elapsed() - self._told >= _REPORT_EVERY:
+            elif self._left.elapsed() - self._told >= _MAX_REPORT_INTERVAL_S:
                 self._tell(f"{self._title}: {_joined(self._remark, f'{self._left.elapsed():.0f} s so far')}")
 
     def _begin(self, estimate: str) -> None:
@@ -391,32 +399,35 @@ def _ignore(*_: object) -> None:
     pass
 
 
+# Receiver that shows progress on standard error.
 ON_STANDARD_ERROR = Receiver(progress, _say)
+# Receiver that shows nothing.
 SILENT = Receiver(lambda *_: contextlib.nullcontext(_ignore), _ignore)
 
 
 # ----------------------------------------------------------------------
-# Where a command's lines and its answer go: ``--json FILE``, ``--json -`` and ``--quiet``.
+# Destination of the lines and the answer of a command: ``--json FILE``, ``--json -`` and ``--quiet``.
 
 
 def answer_text(answer: object) -> str:
-    """Return an answer as the text of a file; what is no number is null."""
-    # Imported here: nobody else needs schemas.
+    """Return an answer as JSON text; NaN and infinity are null."""
+    # Imported here: only answers need schemas.
     from pydantic import TypeAdapter
 
     return TypeAdapter(type(answer)).dump_json(answer, indent=1).decode() + "\n"
 
 
+# File name that stands for standard output.
 STANDARD_OUTPUT = "-"
-# The standard output of the command under way, while what it prints goes elsewhere.
+# Standard output of the running command while its printed lines are redirected.
 _output: ContextVar[TextIO | None] = ContextVar("output", default=None)
 
 
 @contextlib.contextmanager
 def asked_output(args: argparse.Namespace) -> Iterator[None]:
-    """Print a command's lines where its options ask: nowhere, or beside standard output where the answer goes there.
+    """Redirect printed lines: to nowhere with --quiet, to standard error if stdout gets the answer.
 
-    Raises PlanflyError for a file to answer into that exists, or that the command reads.
+    Raises PlanflyError if the file for the answer exists, or is one that the command reads.
     """
     answer, quiet = getattr(args, "json", None), getattr(args, "quiet", False)
     for target in (answer, getattr(args, "junit", None)):
@@ -438,9 +449,9 @@ def asked_output(args: argparse.Namespace) -> Iterator[None]:
 
 
 def give_answer(args: argparse.Namespace, answer: Callable[[], object | str]) -> None:
-    """Write what a command answers, where it was asked for; it is made only then.
+    """Write the answer of a command if one was requested; it is computed only then.
 
-    answer: gives an instance of a class of `planfly.terminal.answers`, or its text.
+    answer: returns an instance of a class of `planfly.terminal.answers`, or its text.
     """
     target = getattr(args, "json", None)
     if target is None:
@@ -454,7 +465,7 @@ def give_answer(args: argparse.Namespace, answer: Callable[[], object | str]) ->
 
 
 def give_junit(args: argparse.Namespace, verdicts: Mapping[str, "Verdict"]) -> None:
-    """Write verdicts as JUnit XML, where that was asked for.  verdicts: by the name of what was judged."""
+    """Write verdicts as JUnit XML if requested.  verdicts: by the name of the judged mission or flight."""
     if args.junit is not None:
         from logs.verdict.junit import junit_text
 
@@ -462,7 +473,7 @@ def give_junit(args: argparse.Namespace, verdicts: Mapping[str, "Verdict"]) -> N
 
 
 def _refuse_inputs(target: Path, args: argparse.Namespace) -> None:
-    """Refuse to answer into a file that the command line names otherwise, too."""
+    """Refuse to write the answer to a file that another argument of the command line names."""
     named = [
         value for key, value in vars(args).items() if isinstance(value, str) and key not in ("json", "junit", "command")
     ]

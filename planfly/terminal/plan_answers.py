@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class PlanAnswer:
-    """planfly plan: the plan file, and what it comes to."""
+    """planfly plan: the plan file, and the properties of the plan."""
 
     schema: Literal["planfly.plan-answer/1"] = "planfly.plan-answer/1"
     exit_code: int
@@ -39,7 +39,7 @@ class PlanAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class FrontEntry:
-    """One plan of a front, and what it is compared by."""
+    """One plan of a front, and the criteria it is compared by."""
 
     file: str
     length_m: float
@@ -54,7 +54,7 @@ class FrontEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class FrontAnswer:
-    """planfly plan --front: the plans, the shortest first; none where there is no safe plan."""
+    """planfly plan --front: the plans, the shortest first; empty if there is no safe plan."""
 
     schema: Literal["planfly.front-answer/1"] = "planfly.front-answer/1"
     exit_code: int
@@ -72,11 +72,12 @@ class FrontAnswer:
     """What they are for."""
 
 
+# Answer of ``planfly plan``, without or with --front.
 PlanDocument = PlanAnswer | FrontAnswer
 
 
 def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
-    """Return the answer of a front in a folder."""
+    """Return the answer for a front in a folder."""
     from planfly.api.fronts import table_rows
     from planfly.api.planning import conditions_of_plan
 
@@ -99,7 +100,7 @@ def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
 
 
 def fewer_line(front: "Front") -> str:
-    """Why a front has fewer plans than were asked for."""
+    """Return the reason why a front has fewer plans than requested."""
     from planner.search.plan_front import NOTICED, NOTICED_CLEARANCE, NOTICED_EXPOSURE
 
     share, seen, height = f"{NOTICED:.1%}", f"{NOTICED_EXPOSURE:.0%}", f"{NOTICED_CLEARANCE:g} m"
@@ -111,7 +112,7 @@ def fewer_line(front: "Front") -> str:
 
 
 def front_lines(front: "Front", folder: Path) -> list[str]:
-    """Return a front on the terminal: a line a plan, and what was written."""
+    """Return the lines of a front for the terminal: one for each plan, and the written files."""
     from logs.verdict.conditions import autopilot_line, condition_lines
     from planfly.api.fronts import PICTURES
     from planfly.api.planning import conditions_of_plan

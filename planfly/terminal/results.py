@@ -1,4 +1,4 @@
-"""Verdicts and warnings that commands print."""
+"""Print verdicts and warnings of commands."""
 
 import sys
 from collections.abc import Iterable
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 
 def print_verdict(verdict: "Verdict", notes: Iterable[str]) -> None:
-    """The verdict on the terminal: the summary, then what fails, then what is closest to each rule's limit."""
-    # Imported here: --help prints none.
+    """Print a verdict: the summary, the failed rules, then the finding closest to the limit of each rule."""
+    # Imported here: --help prints no verdict.
     from planfly.terminal.verdict_lines import verdict_lines
 
     print("\n".join(verdict_lines(verdict, notes)))
@@ -26,13 +26,13 @@ def print_returns(line: str) -> None:
 
 
 def print_warnings(warnings: Iterable[str]) -> None:
-    """Warnings, on standard error."""
+    """Print warnings on standard error."""
     for warning in warnings:
         print(coloured("warning:", "warning", sys.stderr) + f" {warning}", file=sys.stderr)
 
 
 def warn_of_loss(log: "FlightLog") -> None:
-    """Print what an incomplete log lacks, on standard error."""
+    """Print the loss of an incomplete log on standard error."""
     from planfly.flight_logs import loss_text
 
     print_warnings([loss_text(log)])

@@ -29,7 +29,7 @@ class CauseEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ReturnEntry:
-    """Seconds in a row whose returns go to the same place and come to the same; numbers are of the worst of them."""
+    """Range of seconds whose returns have the same target and outcome; numbers are of the worst return."""
 
     first_s: float
     last_s: float
@@ -88,7 +88,7 @@ class MeasuredReturn:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ProgramReturnEntry:
-    """A return that ArduPlane's program flew, too."""
+    """A return that the ArduPlane program also flew."""
 
     at_s: float
     east_m: float
@@ -107,7 +107,7 @@ class ProgramReturnEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ByProgram:
-    """The worst returns by ArduPlane's program, the worst first."""
+    """The worst returns flown by the ArduPlane program, the worst first."""
 
     version: str
     """Empty where it flew none."""
@@ -116,7 +116,7 @@ class ByProgram:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class GlideEntry:
-    """Seconds in a row from which the same can be reached without the engine; numbers are of the one with the least."""
+    """Range of seconds with the same reachable place without engine; numbers are of the least height."""
 
     first_s: float
     last_s: float
@@ -143,7 +143,7 @@ class GlideEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class GlideSiteEntry:
-    """A place that can be glided to."""
+    """A place to glide to."""
 
     kind: str
     """home, rally or landing."""
@@ -210,7 +210,7 @@ class ReturnsAnswer:
 
 
 def suggestion_entry(found: ReturnsFound, one: Suggested) -> ReturnSuggestion:
-    """Return a suggestion as an answer has it."""
+    """Return the entry of a suggestion."""
     rally = None
     if one.remedy.rally is not None:
         rally = []
@@ -229,7 +229,7 @@ def suggestion_entry(found: ReturnsFound, one: Suggested) -> ReturnSuggestion:
 
 
 def program_entry(found: ReturnsFound) -> ByProgram | None:
-    """Return what ArduPlane's program flew as an answer has it."""
+    """Return the entry of the returns flown by the ArduPlane program, or None if it flew none."""
     if found.by_program is None:
         return None
     names = {log.name: str(log) for log in found.files}
@@ -257,12 +257,12 @@ def _measured(one: ReturnFlown) -> MeasuredReturn:
 
 
 def _tenths(value: float) -> float | None:
-    """Return a number as an answer has it; None for none."""
+    """Return a number rounded to tenths, or None if it is not finite."""
     return round(value, 1) if math.isfinite(value) else None
 
 
 def glides_entry(found: ReturnsFound) -> GlidesEntry:
-    """Return what can be reached without the engine as an answer has it."""
+    """Return the entry of the places reachable without the engine."""
     glides = found.glides
     entries = []
     for group in glides.ranges:
@@ -306,7 +306,7 @@ def glides_entry(found: ReturnsFound) -> GlidesEntry:
 
 
 def return_entry(found: ReturnsFound, group: ReturnRange) -> ReturnEntry:
-    """Return a range of returns as an answer has it."""
+    """Return the entry of a range of returns."""
     one, scenario, number = group.worst, found.setup.scenario, _tenths
 
     return ReturnEntry(

@@ -1,4 +1,4 @@
-"""SIGINT and SIGTERM end a command in time: in order where it comes to it, at once where it does not."""
+"""End a command on SIGINT or SIGTERM: in an orderly manner if it reacts in time, otherwise by force."""
 
 import contextlib
 import functools
@@ -15,56 +15,59 @@ from typing import NoReturn
 from world.files import remove_temporary_folders
 from world.interruption import Interrupted, interrupt, remove_unfinished
 
+# Signals that end a command.
 ENDING = (signal.SIGINT, signal.SIGTERM)
-# Time from a signal to the end of the process where its command has not ended by itself, s; time that it waited for a
-# processor does not count, up to so much in all.
+# Time from a signal to the forced end of the process if its command has not ended by itself, s, without the time that
+# the command waited for a processor.
 GRACE = 0.7
-_AT_LONGEST = 10.0
-# For which files are tried to be removed, s.
-_REMOVING = 0.5
-# Time from a signal that could not be heard to its next, and between two tries to remove files, s.
-_AGAIN = 0.02
+# Longest time from a signal to the forced end of the process, with the time waited for a processor, s.
+_MAX_GRACE_S = 10.0
+# Time for which the removal of files is retried, s.
+_REMOVAL_TIMEOUT_S = 0.5
+# Delay before a signal that could not be handled is raised again, and between two tries to remove files, s.
+_RETRY_INTERVAL_S = 0.02
+# Packages during whose code an exception must not be raised.
 _COMPILERS = ("numba", "llvmlite")
 
 
 @contextlib.contextmanager
 def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
-    """Raise `Interrupted` for SIGINT and SIGTERM, and end the process where that has not ended it ``grace`` s later.
+    """Raise `Interrupted` for SIGINT and SIGTERM, and end the process by force after another ``grace`` s.
 
     Compiled code and compilers can keep Python's signal handlers waiting, and a wait for others can be long: a thread
     then kills this process's children, removes its unfinished files and ends it with exit code 128 and the signal's
-    number.  It watches on beyond this block, until the process has ended: for a program's outermost block.
+    number.  It keeps watching after this block until the process has ended: use it for a program's outermost block.
 
-    Gives the list that holds the signal's number once one has come.
+    Yields the list that holds the number of a signal once it has arrived.
     """
     read, write = _signal_pipe()
     heard: list[int] = []
     ended = False
 
     def hear(number: int, frame: FrameType | None = None) -> None:
-        # The first interrupts; whatever ends the work then is not to be interrupted.
+        # The first signal interrupts the work; the code that then ends the work must not be interrupted.
         nonlocal ended
         if ended:
             return
         if _called_by_compiled_code(frame):
-            threading.Timer(_AGAIN, signal.raise_signal, (number,)).start()
+            threading.Timer(_RETRY_INTERVAL_S, signal.raise_signal, (number,)).start()
             return
         ended = True
         heard.append(number)
         interrupt(number)
 
     def hear_again(lost: "sys.UnraisableHookArgs") -> None:
-        # Raised where nobody could take it, in a library's callback: tried again, a little later.
+        # The exception was raised in a callback of a library, which dropped it: raise the signal again a little later.
         nonlocal ended
         if isinstance(lost.exc_value, Interrupted):
             ended = False
-            threading.Timer(_AGAIN, signal.raise_signal, (lost.exc_value.number,)).start()
+            threading.Timer(_RETRY_INTERVAL_S, signal.raise_signal, (lost.exc_value.number,)).start()
         else:
             sys.__unraisablehook__(lost)
 
     watcher = threading.Thread(target=_watch, args=(read, heard, grace), name="signals", daemon=True)
     watcher.start()
-    # Python's C code writes the signal's number there at once, whatever the main thread does.
+    # The C code of Python writes the number of the signal to the pipe at once, whatever the main thread does.
     signal.set_wakeup_fd(write, warn_on_full_buffer=False)
     for number in ENDING:
         signal.signal(number, hear)
@@ -72,15 +75,15 @@ def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
     try:
         yield heard
     finally:
-        # What a signal would interrupt from here on is the end itself.
+        # From here on a signal would only interrupt the end of the program.
         ended = True
 
 
 def _called_by_compiled_code(frame: FrameType | None) -> bool:
-    """Return True if Numba runs here: it compiles, reads a kernel from its cache, or boxes a kernel's results.
+    """Return True if Numba runs here: it compiles, reads a cached kernel, or boxes a kernel's results.
 
-    Compiled code goes on with a null pointer where an exception ends that, and the process dies.  A result that is a
-    named tuple is made by a module named after its class.
+    If an exception interrupts one of these, compiled code continues with a null pointer, and the process crashes.  A
+    result that is a named tuple is made by a module named after its class.
     """
     while frame is not None:
         module = str(frame.f_globals.get("__name__"))
@@ -91,12 +94,12 @@ def _called_by_compiled_code(frame: FrameType | None) -> bool:
 
 
 def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
-    """Return what reads the numbers of signals, and the handle that Python writes them to, which never blocks."""
+    """Return a function that reads signal numbers, and the non-blocking handle that Python writes them to."""
     if hasattr(os, "set_blocking"):
         read, write = os.pipe()
         os.set_blocking(write, False)
         return functools.partial(os.read, read), write
-    # Windows before Python 3.12: pipes always block there, sockets need not.
+    # On Windows before Python 3.12 pipes always block; sockets need not.
     import socket
 
     receiver, sender = socket.socketpair()
@@ -105,21 +108,21 @@ def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
 
 
 def _watch(read: Callable[[int], bytes], heard: list[int], grace: float) -> None:
-    """Wait for the first signal, give the command its time, and end the process."""
+    """Wait for the first signal, give the command its time to end, and end the process."""
     while (number := read(1)[0]) not in ENDING:
         pass
-    # Here too: a command may have handlers of its own.
+    # The number is also added here, because a command may have its own handlers.
     heard.append(number)
     begun, waited = time.monotonic(), _waited_for_processor()
-    while (passed := time.monotonic() - begun) < _AT_LONGEST and passed - _waited_for_processor() + waited < grace:
-        time.sleep(_AGAIN)
+    while (passed := time.monotonic() - begun) < _MAX_GRACE_S and passed - _waited_for_processor() + waited < grace:
+        time.sleep(_RETRY_INTERVAL_S)
     with contextlib.suppress(OSError):
         os.write(2, b"planfly: interrupted\n")
     _leave(128 + number)
 
 
 def _waited_for_processor() -> float:
-    """Return the total time that the main thread has waited for a processor, s; 0 on systems other than Linux."""
+    """Return the total time the main thread has waited for a processor, s; 0 on systems but Linux."""
     try:
         return int(Path("/proc/self/schedstat").read_text(encoding="ascii").split()[1]) * 1e-9
     except (OSError, IndexError, ValueError):
@@ -127,7 +130,7 @@ def _waited_for_processor() -> float:
 
 
 def end_process(code: int) -> NoReturn:
-    """End this process with an exit code, its children with it, and leave no unfinished file; what it said is kept."""
+    """Flush the output, end this process and its children with an exit code, and remove unfinished files."""
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):
             stream.flush()
@@ -135,15 +138,15 @@ def end_process(code: int) -> NoReturn:
 
 
 def _leave(code: int) -> NoReturn:
-    # Not imported here: there are no children where nobody has, and an import could wait for one under way.
+    # Not imported here: without an earlier import there are no children, and an import could wait for another one.
     multiprocessing = sys.modules.get("multiprocessing")
-    until = time.monotonic() + _REMOVING
+    until = time.monotonic() + _REMOVAL_TIMEOUT_S
     killed = set[int]()
     while True:
         for child in multiprocessing.active_children() if multiprocessing is not None else ():
             child.kill()
             killed.add(child.pid)
-        # A killed child that was in the middle of making a file makes it yet, and its folder stays at first.
+        # A killed child may still complete a file it was making, so its folder may be impossible to remove at first.
         if all([remove_unfinished(), *map(remove_temporary_folders, killed)]) or time.monotonic() > until:
             os._exit(code)
-        time.sleep(_AGAIN)
+        time.sleep(_RETRY_INTERVAL_S)

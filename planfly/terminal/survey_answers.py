@@ -15,7 +15,7 @@ from planfly.terminal.verdict_answers import STRICT
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class PhotoLineEntry:
-    """A photo line, as flown; all but its items null where it was not.  Shares are of its length."""
+    """A photo line, as flown; if it was not flown, all but its items are null.  Shares are of its length."""
 
     first_item: int
     last_item: int
@@ -35,7 +35,7 @@ class PhotoLineEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class SurveyRemedyEntry:
-    """A change with which the survey was flown, and all lines can be used."""
+    """A change with which the survey was flown so that all lines can be used."""
 
     kind: str
     """side, turn-around, every, course, parameter or airspeed."""
@@ -54,7 +54,7 @@ class SurveyRemedyEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class OverlapEntry:
-    """The least overlap of a survey's photos that can be used, as shares of a photo; null where it is not known."""
+    """The least overlap of the usable photos of a survey, as shares of a photo; null if unknown."""
 
     front: float | None
     """Of a photo and the next on its line."""
@@ -69,7 +69,7 @@ class OverlapEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class NearMissEntry:
-    """The trial that came nearest to passing."""
+    """The trial that came closest to passing."""
 
     what: str
     usable: int
@@ -99,7 +99,7 @@ class SurveyAnswer:
 
 
 def photo_line_entry(setup: FlightSetup, line: PhotoLine, one: LineMeasure | None) -> PhotoLineEntry:
-    """Return a photo line as an answer has it."""
+    """Return the entry of a photo line."""
     first, last = (int(setup.route.items[i]) for i in (line.first, line.last))
 
     def share(value: float | None) -> float | None:
@@ -121,7 +121,7 @@ def photo_line_entry(setup: FlightSetup, line: PhotoLine, one: LineMeasure | Non
 
 
 def overlap_entry(one: OverlapMeasure) -> OverlapEntry:
-    """Return a survey's overlap as an answer has it."""
+    """Return the entry of the overlap of a survey."""
     low, high = sorted(one.pair)
     return OverlapEntry(
         front=None if one.front is None else round(one.front, 4),
@@ -134,12 +134,12 @@ def overlap_entry(one: OverlapMeasure) -> OverlapEntry:
 
 
 def near_miss_entry(one: NearMiss) -> NearMissEntry:
-    """Return what came nearest as an answer has it."""
+    """Return the entry of the trial that came closest to passing."""
     return NearMissEntry(what=one.what, usable=one.usable, lines=one.lines, headline=one.verdict.headline)
 
 
 def survey_remedy_entry(one: SurveyRemedy) -> SurveyRemedyEntry:
-    """Return what would help as an answer has it."""
+    """Return the entry of a remedy."""
     return SurveyRemedyEntry(
         kind=one.kind,
         name=one.name,

@@ -7,12 +7,13 @@ from pydantic.dataclasses import dataclass
 
 from logs.verdict.document import VerdictDocument
 
+# Configuration of answers for pydantic.
 STRICT = ConfigDict(extra="forbid", use_attribute_docstrings=True, json_schema_serialization_defaults_required=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class VerdictsDocument:
-    """planfly check --for: whether a mission really flies, by each autopilot."""
+    """planfly check --for: the verdict on the mission for each autopilot."""
 
     schema: Literal["planfly.verdicts/1"] = "planfly.verdicts/1"
     exit_code: int
@@ -21,4 +22,5 @@ class VerdictsDocument:
     """By the name of the autopilot's law."""
 
 
+# Answer of ``planfly check``, without or with --for.
 CheckDocument = VerdictDocument | VerdictsDocument

@@ -1,4 +1,4 @@
-"""A verdict as lines for a terminal."""
+"""Lines of a verdict for a terminal."""
 
 from collections.abc import Iterable
 
@@ -13,12 +13,12 @@ from planfly.terminal.command_parser import coloured
 _LISTED = 6
 # Sources of a limit that are named after it; any other limit is a check of planfly's own.
 _LIMIT_SOURCES = ("scenario", "near the field", "aircraft", "autopilot", "mission")
-# Width of the column of rules.
+# Width of the column of rules, characters.
 _TITLES = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 
 
 def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
-    """Write the summary, what fails, what is closest to each rule's limit, and notes, in colour where wanted."""
+    """Return the summary, the failures, the closest finding of each rule, and notes, in colour if wanted."""
     shown = verdict.present()
     lines = [coloured(shown.headline, "good" if shown.state == "ok" else "bad"), *shown.details]
     for rule in shown.failed_rules:
@@ -34,7 +34,7 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
 
 
 def _failed_lines(rule: RuleFindings) -> list[str]:
-    """Describe the worst failed finding of a rule in full, with what would pass, and name the other places."""
+    """Describe the worst failed finding of a rule, with the suggested change, and name the other places."""
     worst, *others = rule.failed
     noun = rule.words.word
     where = f"{noun}, {len(rule.failed)} of {rule.judged}; the worst at" if others else f"{noun} at"

@@ -1,4 +1,4 @@
-"""The aircraft of a scenario and the limits it flies within: what a plan needs of it, without simulation and logs."""
+"""Aircraft of a scenario and its limits, as a plan needs them, without simulation and logs."""
 
 import math
 from collections.abc import Mapping
@@ -18,12 +18,12 @@ from world.scenario import Scenario
 
 @dataclass(frozen=True, slots=True)
 class Airframe:
-    """The aircraft of a scenario, loaded once for all that plan, fly and judge.
+    """Aircraft of a scenario, loaded once for planning, flying and judging.
 
     aircraft: its entry in the catalog.
     limits: of scenario and aircraft together; they hold the envelope.
     battery: energy carried, Wh.
-    autopilot: that flies it, with its settings.
+    autopilot: the autopilot that flies it, with its settings.
     """
 
     aircraft: Aircraft
@@ -43,9 +43,9 @@ class Airframe:
 
 
 def laid_from_the_ground(plan: Plan, airframe: Airframe, flown: Plan | None = None) -> Plan:
-    """A plan with the ways from and to the ground that its scenario asks for; the plan as it is where it asks for none.
+    """Return a plan with the departure and approach that its scenario requires, if any.
 
-    flown: the plan that is being flown, whose way up stays.
+    flown: the plan being flown, whose departure stays.
 
     >>> import numpy as np
     >>> from planner.plan import Certificate
@@ -67,7 +67,7 @@ def laid_from_the_ground(plan: Plan, airframe: Airframe, flown: Plan | None = No
 
 
 def choose_seed(scenario: Scenario, seed: int | None) -> int:
-    """Return the seed asked for, else the scenario's, else 1."""
+    """Return the requested seed, else the seed of the scenario, else 1."""
     if seed is not None:
         return seed
     return scenario.planner.seed if scenario.planner.seed is not None else 1
@@ -76,7 +76,7 @@ def choose_seed(scenario: Scenario, seed: int | None) -> int:
 def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = None) -> Airframe:
     """Return the scenario's aircraft, its envelope, and the limits that both set.
 
-    parameters: of its autopilot, by the autopilot's names and in its units, in place of those that its file states.
+    parameters: of its autopilot, by the autopilot's names and in its units, instead of the parameters in its file.
     Raises ScenarioError for an unknown aircraft or autopilot, or a speed that the aircraft cannot fly, and
     ParameterError for a bad file of an autopilot's parameters, or values that are not allowed.
 
@@ -89,7 +89,7 @@ def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = N
     aircraft, battery = find_airframe(scenario)
     autopilot = load_autopilot(scenario, aircraft)
     if parameters:
-        # What a log stores is checked as a file is.
+        # Stored parameters of a log are checked like a file.
         autopilot = autopilot.restore(autopilot.with_parameters(**parameters).store())
     airspeed = cruise_airspeed(scenario, aircraft, autopilot)
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
@@ -98,7 +98,7 @@ def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = N
 
 
 def airframe_of(setup: FlightSetup) -> Airframe:
-    """Return the airframe that a setup was made with.  Raises FlightError for an aircraft that is not there.
+    """Return the airframe that a setup was made with.  Raises FlightError if the aircraft is missing.
 
     >>> from logs.recording.example_log import example_log
     >>> airframe_of(example_log().setup).aircraft.name
@@ -114,7 +114,7 @@ def bank_limit(scenario: Scenario, autopilot: Autopilot) -> float:
 
 
 def with_tracking(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> Limits:
-    """Return limits that leave free what an autopilot strays from its legs in a scenario."""
+    """Return limits with room for the tracking error of an autopilot in a scenario."""
     table = scenario.flight
     tracking = autopilot.tracking_error(
         limits.airspeed, table.steering.nav, fly_over=table.fly_over, turbulence=scenario.wind.turbulence
@@ -123,7 +123,7 @@ def with_tracking(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> L
 
 
 def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
-    """Return the scenario's aircraft, and the energy it carries, Wh.  Raises ScenarioError for an unknown aircraft.
+    """Return the aircraft of a scenario and its energy, Wh; raise ScenarioError for an unknown aircraft.
 
     >>> from world.scenario import load_scenario
     >>> find_airframe(load_scenario("tight"))[0].name
@@ -139,9 +139,9 @@ def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
 
 
 def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot) -> float:
-    """Return the initial cruise airspeed, m/s, stated by (in this order) scenario, parameter file, or aircraft.
+    """Return the initial cruise airspeed, m/s, from (in order) scenario, parameter file, aircraft.
 
-    Raises ScenarioError for one that the aircraft cannot fly.
+    Raises ScenarioError for an airspeed that the aircraft cannot fly.
     """
     stated, parameters = autopilot.stated_airspeed, autopilot.parameters
     if (airspeed := scenario.flight.airspeed_mps) is not None:
@@ -157,7 +157,7 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
 
 
 def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:
-    """An airframe within the limits and the bank of a scenario that differs in nothing else of the aircraft's."""
+    """Return an airframe with the limits and the bank of a scenario that otherwise has the same aircraft."""
     old = airframe.limits
     limits = make_limits(scenario, old.envelope, old.airspeed, bank_limit(scenario, airframe.autopilot))
     return replace(airframe, limits=replace(limits, tracking=old.tracking))

@@ -69,7 +69,7 @@ def flight_text(setup: FlightSetup) -> str:
 
 
 def flight_kind(setup: FlightSetup) -> str:
-    """Return the autopilot as the kind of a flight: flights of one kind take about as long a kilometre."""
+    """Return the autopilot as the kind of a flight: flights of one kind take a similar time per kilometre."""
     return f"flying by {setup.autopilot.name}"
 
 

@@ -99,9 +99,12 @@ def with_parameters(sheet: DataSheet, stated: Mapping[str, float]) -> DataSheet:
 # ----------------------------------------------------------------------
 # Data sheet from user input: degrees, inches, volts and ampere hours.
 
+# Length of an inch, m.
 _METERS_PER_INCH = 0.0254
-_BATTERY = re.compile(r"([0-9.]+)\s*V\s*,\s*([0-9.]+)\s*(Ah|Wh|mAh)", re.IGNORECASE)
-_PROPELLER = re.compile(r"([0-9.]+)\s*[xX]\s*([0-9.]+)")
+# Voltage and capacity of a battery, as in 14.8V,5Ah.
+_BATTERY_PATTERN = re.compile(r"([0-9.]+)\s*V\s*,\s*([0-9.]+)\s*(Ah|Wh|mAh)", re.IGNORECASE)
+# Diameter and pitch of a propeller, inches, as in 12x6.
+_PROPELLER_PATTERN = re.compile(r"([0-9.]+)\s*[xX]\s*([0-9.]+)")
 # Accepted battery voltages, V.
 _VOLTAGE_RANGE_V = (3.0, 60.0)
 # Accepted battery capacities, Wh.
@@ -140,7 +143,7 @@ def parse_sheet(
 
 
 def _read_battery(text: str) -> tuple[float, float]:
-    match = _BATTERY.fullmatch(text.strip())
+    match = _BATTERY_PATTERN.fullmatch(text.strip())
     volts, amount = (_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     unit = match[3].lower() if match else ""
     hours = amount if unit == "wh" else volts * amount * (0.001 if unit == "mah" else 1.0)
@@ -156,7 +159,7 @@ def _read_battery(text: str) -> tuple[float, float]:
 
 
 def _read_propeller(text: str) -> tuple[float, float]:
-    match = _PROPELLER.fullmatch(text.strip())
+    match = _PROPELLER_PATTERN.fullmatch(text.strip())
     diameter, pitch = (_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     if not (_DIAMETER_IN[0] <= diameter <= _DIAMETER_IN[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
         allowed = (
@@ -199,6 +202,7 @@ GUESSED_CLIMB = math.radians(6.0)
 STATED_CLIMB = math.radians(3.0)
 # Standard deviation of the zero-lift drag if a sink without power is stated, as a fraction.
 STATED_DRAG = 0.15
+# Factors of the motor and the propeller.
 _PROPULSION = ("thrust", "motor-speed")
 
 
@@ -274,6 +278,7 @@ def change_of(more: Floats, less: Floats, middle: Floats) -> Floats:
 MIN_SPEED = 1.12
 # Largest airspeed that guidance may use, as a ratio to the fastest level flight.
 MAX_SPEED = 0.95
+# Largest pitch angle of a new aircraft, degrees.
 _MAX_PITCH_DEG = 25.0
 
 
@@ -491,6 +496,7 @@ value_deg = [{rudder:.1f}, 0.0, {-rudder:.1f}]
 # ----------------------------------------------------------------------
 # The README.
 
+# Rows of the table in the README.
 _README_ROWS = (
     ("mass", "mass", "kg", 1.0),
     ("span", "wing span", "m", 1.0),

@@ -1,4 +1,4 @@
-"""The autopilot of a flight: taken from its files, or compared with them where somebody names one."""
+"""Take the autopilot of a flight from its files, or compare a named autopilot with them."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,9 +13,9 @@ from world.scenario_tables import OWN_GUIDANCE
 def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> Scenario:
     """Return the scenario flown by the autopilot that its parameter file or its mission was written for.
 
-    An autopilot that somebody named stays, as planfly's own guidance does; where nothing says who flies, the scenario
-    stays as it is.  Raises ParameterError or MissionError for a file of another autopilot than the one that was named,
-    for two files of two autopilots, and for a parameter file with names of both.
+    An autopilot named by the user stays, and so does planfly's own guidance; if no file names an autopilot, the
+    scenario stays as it is.  Raises ParameterError or MissionError for a file of another autopilot than the named one,
+    for two files of different autopilots, and for a parameter file with names of both.
 
     >>> from world.scenario import load_scenario
     >>> made = with_file_autopilot(load_scenario("paper-07"), Mission(None, (), autopilot="px4", source="field.plan"))
@@ -45,7 +45,7 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
     return scenario
 
 
-# As a .plan states it.
+# Autopilot as stated in a .plan.
 _FIRMWARE = {ARDUPILOT: "firmwareType 3", PX4: "firmwareType 12"}
 
 
@@ -59,7 +59,7 @@ def _of_parameters(scenario: Scenario, params: str) -> Scenario:
 
 
 def _taken(scenario: Scenario, autopilot: str, file: str) -> Scenario:
-    """Return the scenario with an autopilot taken from a file; one that flies by default anyway is stated, too."""
+    """Return the scenario with an autopilot taken from a file; the default autopilot is also stated."""
     params = scenario.flight.params
     made = with_flight(scenario, autopilot=autopilot, params=params)
     table = made.flight.model_copy(update={"autopilot_from": file})

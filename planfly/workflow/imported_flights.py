@@ -1,4 +1,4 @@
-"""Imported flights: another program's log in a scenario, along its mission, in its wind: judged, and flown again."""
+"""Import logs of other programs, judge them in their scenario, mission and wind, fly them again."""
 
 import hashlib
 import math
@@ -41,17 +41,18 @@ from world.errors import LogError, MissionError
 from world.scenario import Scenario, load_scenario, with_flight, with_wind
 from world.scenario_tables import FlightTable
 
+# Size of the blocks in which a file is hashed, bytes.
 _BLOCK = 2**20
-# Items that a mission has at least.
-_FEWEST = 2
+# Least number of items of a mission.
+_MIN_ITEMS = 2
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class ImportedFlight:
-    """An imported flight, judged.
+    """Imported flight with its verdict.
 
-    setup: with its source.  track: its rows.  events: what the vehicle said.
-    ended: how the log shows that it ended.
+    setup: the setup, with its source.  track: rows of the flight.  events: messages of the vehicle.
+    ended: end of the flight according to the log.
     """
 
     setup: FlightSetup
@@ -74,10 +75,10 @@ class ImportedFlight:
 
 
 def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
-    """Read a log, set it into its world and judge it.
+    """Read a log, place the flight in its world and judge it.
 
-    Raises LogError for a file that is no log of an aeroplane's flight, MissionError if no mission is known, and for a
-    plan that is not the one flown.
+    Raises LogError for a file that is not the log of an aeroplane's flight, MissionError if no mission is known, and
+    for a plan that was not flown.
     """
     plan, fences = options.get("plan"), read_named_fences(options.get("fence") or ())
     flight = make_flight(open_log(path), options.get("flight"))
@@ -88,11 +89,11 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
         mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
     _refuse_other_autopilot(path, mission, flight.raw.program)
     scenario, placed = _world(mission, options, planned_in)
-    scenario, wind_source = _in_its_wind(fences.on_scenario(apply_options(scenario, options)), flight, options)
+    scenario, wind_source = _with_wind_of_log(fences.on_scenario(apply_options(scenario, options)), flight, options)
     named = (options.get("aircraft"), options.get("scenario"), planned_in)
     known = any(one is not None for one in named)
     logged = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
-    # A flight by an autopilot that planfly does not know says what the aircraft can.
+    # A flight by an unknown autopilot is judged with the guidance of planfly: it shows the ability of the aircraft.
     autopilot, refused = logged or (PlanflyGuidance(scenario.flight.steering.guidance), ())
     setup = _setup(scenario, placed, mission, autopilot, flight)
     heights = flight.heights
@@ -100,7 +101,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
         heights = replace(heights, datum=datum)
     notes = (
         *_edges(flight),
-        *_other_flights(flight),
+        *_describe_other_flights(flight),
         *refused,
         *mission.warnings,
         *_differing(flight, mission, options),
@@ -135,7 +136,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
 
 
 def _refuse_other_autopilot(path: Path, mission: Mission, program: str) -> None:
-    """Raise MissionError for a plan that was written for another autopilot than the one that wrote the log."""
+    """Raise MissionError for a plan written for another autopilot than the autopilot of the log."""
     flown = next((name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), "")
     if mission.autopilot and flown and mission.autopilot != flown:
         allowed = f"the flight of {path} is {program}'s: `plan` names the mission that was flown"
@@ -144,7 +145,7 @@ def _refuse_other_autopilot(path: Path, mission: Mission, program: str) -> None:
 
 
 def _mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
-    """Return the mission that was to be flown, where it is from, and the scenario that its plan was made in."""
+    """Return the mission to be flown, its source, and the scenario that its plan was made in."""
     if (named := options.get("plan")) is not None:
         plan_path, terrain = existing_mission(Path(named)), options.get("terrain")
         if plan_path.suffix.lower() != ".json":
@@ -156,7 +157,7 @@ def _mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mis
     if flight.mission is None:
         raise LogError(f"{path}: holds no mission: `plan` names the one that was to be flown", file=path)
     found = flight.mission
-    if found.missing is not None and len(found.mission.items) < _FEWEST:
+    if found.missing is not None and len(found.mission.items) < _MIN_ITEMS:
         lacking = [missing_text(found.missing), *found.mission.warnings[:1]]
         lacking.append("`plan` names the mission that was to be flown")
         raise LogError(f"{path}: {'; '.join(lacking)}", file=path)
@@ -165,13 +166,13 @@ def _mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mis
 
 
 def _world(mission: Mission, options: LogOptions, planned_in: Scenario | None) -> tuple[Scenario, PlacedMission]:
-    """Return the scenario that a flight is judged in, and the mission's places in it."""
+    """Return the scenario that a flight is judged in, and the mission placed in it."""
     scenario, named = planned_in, options.get("scenario")
     terrain = None if options.get("terrain") is None else str(options["terrain"])
     if named is not None:
         scenario = load_scenario(str(named), terrain)
     if scenario is None:
-        # As ArduPlane flies: so that a flight in the simulation can be held against it.
+        # Vertical legs as ArduPlane flies them, so that the flight can be compared with a simulated one.
         aircraft = flight_entries(options)["aircraft"]
         table = FlightTable() if aircraft is None else FlightTable(aircraft=str(aircraft))
         implied = implied_scenario(mission, terrain, table, vertical_legs=True)
@@ -179,8 +180,8 @@ def _world(mission: Mission, options: LogOptions, planned_in: Scenario | None) -
     return scenario, place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
 
 
-def _in_its_wind(scenario: Scenario, flight: LoggedFlight, options: LogOptions) -> tuple[Scenario, str]:
-    """Return the scenario in the mean wind of the stretches, and where that wind is from."""
+def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOptions) -> tuple[Scenario, str]:
+    """Return the scenario in the mean wind of the flight, and a description of the source of that wind."""
     if options.get("wind") is not None:
         return scenario, "as given"
     found = mean_wind(flight)
@@ -215,7 +216,7 @@ def _setup(
 
 
 def _limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, usual: float) -> Limits:
-    """Return limits at the speed that was to be flown: the autopilot's, the scenario's, or the one that was flown."""
+    """Return the limits at the airspeed stated by autopilot or scenario, or else at the flown airspeed."""
     aircraft, _ = find_airframe(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
     airspeed, bank = scenario.flight.airspeed_mps or usual, math.radians(scenario.flight.max_bank_deg)
@@ -237,7 +238,7 @@ def _sha256(path: Path) -> str:
 
 
 def _edges(flight: LoggedFlight) -> tuple[str, ...]:
-    """Describe the parts of the flight that the log lacks: before it, after it, between its rows."""
+    """Describe the parts of the flight missing in the log: before it, after it and between its rows."""
     notes = []
     if flight.begins:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
@@ -249,8 +250,8 @@ def _edges(flight: LoggedFlight) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _other_flights(flight: LoggedFlight) -> tuple[str, ...]:
-    """That a log holds other flights, in words."""
+def _describe_other_flights(flight: LoggedFlight) -> tuple[str, ...]:
+    """Describe the other flights that a log holds."""
     if flight.count == 1:
         return ()
     others = ", ".join(f"at {start:.0f} s ({along:.0f} s along its mission)" for start, along in flight.others)
@@ -258,7 +259,7 @@ def _other_flights(flight: LoggedFlight) -> tuple[str, ...]:
 
 
 def _differing(flight: LoggedFlight, mission: Mission, options: LogOptions) -> tuple[str, ...]:
-    """Say in words how the plan differs from the log's own mission."""
+    """Describe the difference between the plan and the mission of the log."""
     if options.get("plan") is None or flight.mission is None:
         return ()
     own = flight.mission.mission.items
@@ -272,7 +273,7 @@ def _differing(flight: LoggedFlight, mission: Mission, options: LogOptions) -> t
 
 
 def _events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
-    """Return what the vehicle said during the flight, and the modes it was in."""
+    """Return the messages of the vehicle during the flight, and its modes."""
     if not len(flight.time):
         return ()
     low, high = float(flight.time[0]), float(flight.time[-1])
@@ -293,18 +294,19 @@ def _end_of(verdict: Verdict) -> str:
 
 
 # ----------------------------------------------------------------------
-# The mission of an imported flight, flown again by the model of its aircraft.
+# Fly the mission of an imported flight again with the model of its aircraft.
 
 
 def fly_again(
     setup: FlightSetup, track: Track, aircraft: str | None, turbulence: str | None, advance: Advance, most: int = 9
 ) -> tuple[Reflight, ...]:
-    """Fly the legs of every stretch again, in the wind of the log, and hold the flights side by side: longest first.
+    """Fly the legs of every stretch again in the wind of the log, and compare the flights, longest first.
 
-    setup: with its source.  aircraft: that flies it, in place of the setup's.  turbulence: in place of the scenario's.
-    most: of the stretches, the longest.
+    setup: the setup, with its source.  aircraft: replaces the aircraft of the setup.
+    turbulence: replaces the turbulence of the scenario.
+    most: largest number of stretches, of which the longest are flown.
 
-    Raises LogError for a flight that followed none of its mission, and StartError where the model cannot begin.
+    Raises LogError for a flight that followed no part of its mission, and StartError if the model cannot begin.
     """
     return tuple(_one_again(setup, legs, aircraft, turbulence, advance) for legs in _stretches(setup, track)[:most])
 

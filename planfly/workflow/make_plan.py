@@ -18,12 +18,12 @@ from planner.search.search_state import StopCondition
 from planner.search.shared_budget import Search, SharedBudget
 from world.scenario import Scenario
 
-# Takes how far a stage is: done, total, a remark.
+# Function that takes the progress of a stage: done, total, a remark.
 Advance = Callable[[float, float, str], None]
 
 
 def planned_for(scenario: Scenario, airframe: Airframe) -> Conditions:
-    """Return what a plan of a scenario is for."""
+    """Return the conditions that a plan of a scenario is made for."""
     return conditions_of(scenario, airframe.aircraft.name, airframe.airspeed, airframe.autopilot)
 
 
@@ -38,21 +38,19 @@ def make_plan(
     flown: tuple[Plan, int] | None = None,
     onward: bool = False,
 ) -> Plan:
-    """Plan within the scenario's and the aircraft's limits, as far as these are known for certain.
+    """Plan within the limits of scenario and aircraft, as far as they are known for certain.
 
-    All commands plan by this, so that what one calls safe no other calls unsafe. Where gusts make the autopilot circle
-    at waypoints, the plan has as few of them as it can (`planfly.planning.gust_orbits`); where gusts take the aircraft
-    from its
-    height, the plan leaves as much below or above it (`planfly.planning.gust_altitude_margin`); the ways from and to
-    the ground are
-    laid; and where the autopilot circles at the mission's end, the certificate names what the circles may come too near
-    to.
+    All commands use this function, so that they agree on which plan is safe.  If gusts make the autopilot orbit at
+    waypoints, the plan has as few such waypoints as possible (`planfly.planning.gust_orbits`); if gusts change the
+    altitude of the aircraft, the plan keeps a margin for it (`planfly.planning.gust_altitude_margin`).  The departure
+    and the approach are added; and if the autopilot loiters at the end of the mission, the certificate names the
+    hazards that the loiter may come too close to.
 
     A plan may take several searches, which share the scenario's budget of evaluations.
 
     stop: as of `planner.search.plan_path.plan_path`.
-    flown: the plan that is being flown, and the leg to plan again from; None for a new plan.
-    onward: whether the mission that it becomes a part of goes on from its destination.
+    flown: the plan being flown, and the leg to plan again from; None for a new plan.
+    onward: True if the mission continues beyond the destination of the plan.
     """
     limits = airframe.limits.surely()
 
@@ -70,33 +68,33 @@ def make_plan(
         again = replan(
             scenario, limits, old, leg, seed=seed, algorithm=algorithm, progress=advance, stop=stop, settle=settle
         )
-        return _completed(again, airframe, old, onward=onward)
+        return _with_ground_phases(again, airframe, old, onward=onward)
 
     def search(world: Scenario, within: Limits) -> Plan:
         return plan_path(world, within, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
 
     searches = SharedBudget(search)
     plan = searches.total(settle(searches(scenario, limits), searches))
-    return _completed(plan, airframe, onward=onward)
+    return _with_ground_phases(plan, airframe, onward=onward)
 
 
 def finish_plan(plan: Plan, airframe: Airframe, *, onward: bool = False) -> Plan:
-    """Return a path that was found, with all that `make_plan` does after its search; nothing else is searched for."""
-    return _completed(keep_height(limit_waypoint_orbits(plan, airframe), airframe), airframe, onward=onward)
+    """Return a path with the steps that `make_plan` applies after its search, without another search."""
+    return _with_ground_phases(keep_height(limit_waypoint_orbits(plan, airframe), airframe), airframe, onward=onward)
 
 
-def _completed(plan: Plan, airframe: Airframe, old: Plan | None = None, *, onward: bool) -> Plan:
-    """Return the plan with its ways from and to the ground, and with what the circles at its end may come too near to.
+def _with_ground_phases(plan: Plan, airframe: Airframe, old: Plan | None = None, *, onward: bool) -> Plan:
+    """Return the plan with its departure and approach, and with the hazards near the loiter at its end.
 
-    old: the plan that is being flown.
+    old: the plan being flown.
     """
     plan = laid_from_the_ground(plan, airframe, old)
     if onward or not airframe.autopilot.loiter_rules.ends_in_circle:
         return plan
     setup = make_setup(plan.scenario, airframe, mission_of_plan(plan, airframe), plan.seed, plan=plan)
-    beside = end_loiter_hazards(route_requirements(setup))
-    if beside is None or not beside[1]:
+    hazards = end_loiter_hazards(route_requirements(setup))
+    if hazards is None or not hazards[1]:
         return plan
-    circles = f"{airframe.autopilot.title} circles about the destination, up to {beside[0]:.0f} m from it"
-    problems = (*plan.certificate.problems, f"{circles}: {', '.join(beside[1])}")
+    circles = f"{airframe.autopilot.title} circles about the destination, up to {hazards[0]:.0f} m from it"
+    problems = (*plan.certificate.problems, f"{circles}: {', '.join(hazards[1])}")
     return replace(plan, certificate=replace(plan.certificate, problems=problems))

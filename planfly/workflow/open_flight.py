@@ -1,4 +1,4 @@
-"""Open what is to be flown: a plan or a mission file with the options of its flight becomes a `FlightSetup`."""
+"""Open a plan or a mission file with the options of its flight as a `FlightSetup`."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +22,7 @@ from world.errors import MissionError
 from world.files import did_you_mean
 from world.scenario import Scenario
 
-# The source of the mission of a plan that is no file, as messages name it.
+# Source of the mission of a plan without a file, in messages.
 PLAN_FILE = "plan.json"
 
 
@@ -66,7 +66,7 @@ def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path
     mission, number = fences.on_mission(mission_of_plan(plan, airframe, file)), plan.seed if seed is None else seed
     if named is None:
         return make_setup(scenario, airframe, mission, number, plan=plan)
-    # The plan's waypoints are in the map of its own scenario: in another one its mission is flown, as a file.
+    # The waypoints of the plan are on the map of its own scenario: in another one its mission is flown, as a file.
     scenario = fences.on_scenario(named_scenario(named, options, program))
     return make_setup(scenario, load_airframe(scenario), mission, number)
 
@@ -77,7 +77,7 @@ def _terrain(options: MissionOptions) -> str | None:
 
 
 def existing_mission(path: Path) -> Path:
-    """Return the path of a file that exists.  Raises MissionError, with the most similar name in the folder."""
+    """Return the path of an existing file, or raise MissionError with the most similar name."""
     if not path.is_file():
         near = did_you_mean(path.name, _mission_names(path.parent))
         raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected{near}", file=path)
@@ -111,7 +111,7 @@ def for_fixed_wing(mission: Mission) -> Mission:
 
 
 def mission_of_plan(plan: Plan, airframe: Airframe, source: str = PLAN_FILE) -> Mission:
-    """Write the waypoints of a plan as the mission of an airframe, without fences; source: its file, for messages."""
+    """Return the waypoints of a plan as a mission without fences.  source: its file, for messages."""
     return plan_mission(plan, airframe.airspeed, airframe.max_bank, source, airframe.limits.tracking)
 
 
@@ -127,10 +127,10 @@ def make_setup(
 ) -> FlightSetup:
     """Fix everything that decides the flight of a mission in a scenario.
 
-    placed: the mission's places on the scenario's map if they are known already.  fdm_hz: JSBSim's steps a second.
+    placed: the mission's places on the map of the scenario if already known.  fdm_hz: step rate of JSBSim, Hz.
     Raises MissionError for a mission that cannot be laid out, and for a fence that makes no zones.
     """
-    # A fence that makes no zones is bad input, and the verdict could not judge it.
+    # A fence without valid zones is bad input, and the verdict could not judge it.
     fence_zones(mission.fences, scenario.origin, mission.source)
     limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
     autopilot = airframe.autopilot

@@ -7,9 +7,10 @@ from world.errors import PlanflyError
 
 # Default folder of results.
 RESULTS = Path("runs")
-# The same as a pattern: {name} and {seed} in a path stand for the name of the scenario or mission and the seed.
+# Default folder of a run as a pattern: {name} is the name of the scenario or mission, {seed} is the seed.
 RUN_FOLDER = "runs/{name}-seed{seed}"
 
+# Files of `planfly.run`.
 RUN_FILES = (
     "plan.json",
     "mission.waypoints",
@@ -27,14 +28,16 @@ RUN_FILES = (
     "envelope.png",
     "report.html",
 )
+# Names of the figures of a report.
 _FIGURES = ("map", "profile", "scene", "turns", "envelope")
 # Files of a report and a comparison, including figures as SVG.
 LOG_FIGURES = ("report.html", *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")))
+# Files of `planfly.compare`.
 COMPARE_FILES = (
     *(f"compare-{name}.{kind}" for kind in ("png", "svg") for name in ("map", "profile")),
     "compare.html",
 )
-# Files of `planfly.survey`: the picture of the lines, and missions and parameters that would help.
+# Files of `planfly.survey`: the picture of the lines, and the missions and parameters of the remedies.
 SURVEY_FILES = (
     "survey.png",
     *(f"{kind}.waypoints" for kind in ("side", "turn-around", "every", "course", "parameter", "airspeed")),
@@ -75,7 +78,7 @@ def refuse_existing(path: Path, overwrite: bool, source: Path | None = None) -> 
 
 
 def refuse_folder(folder: Path, overwrite: bool) -> None:
-    """Refuse a target folder that is a file or holds anything.  Raises PlanflyError."""
+    """Refuse a target folder that is a file or is not empty.  Raises PlanflyError."""
     if folder.exists() and not folder.is_dir():
         raise PlanflyError(f"{folder}: is a file; a folder is expected", file=folder)
     if not overwrite and folder.is_dir() and any(folder.iterdir()):

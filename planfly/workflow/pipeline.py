@@ -1,4 +1,4 @@
-"""Plan, export, fly, record, judge: the chain, stage by stage, as functions of frozen data."""
+"""Plan, export, fly, record and judge a mission: functions of frozen data, one for each stage."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,11 +30,12 @@ from planner.plan import Plan
 from world.errors import FlightError, StartError
 from world.scenario import Scenario
 
-# Seconds of flight that are written at a time: some thirty milliseconds of a simulated flight.
+# Flight time written at once, s; a simulated flight takes some 30 ms for it.
 BATCH = 60
-# A mission that by prediction takes this many times the energy carried is not flown: hours would show no more.
+# A mission predicted to need more than this many times the energy carried is not flown: it would show nothing more.
 MAX_ENERGY_RATIO = 2.0
-_USUAL_LIMITS = FlightLimits()
+# Limits of a flight unless others are given.
+_DEFAULT_LIMITS = FlightLimits()
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -43,8 +44,8 @@ class PlanThenFly:
 
     plan: the path, with its certificate.
     mission: the plan as mission items.
-    track: the flight, a row a guidance tick; None where there was no feasible plan to fly.
-    verdict: whether it flies, with a finding for every rule and place.
+    track: the flight, one row for each guidance tick; None if there was no feasible plan to fly.
+    verdict: whether the mission flies, with a finding for every rule and place.
 
     >>> from world.scenario import load_scenario
     >>> result = plan_then_fly(load_scenario("paper-07"), seed=1)
@@ -67,10 +68,10 @@ class PlanThenFly:
 
 @dataclass(frozen=True, slots=True)
 class OffNominal:
-    """Differences between the flight and what the plan and its guidance know.
+    """Differences between the flight and the assumptions of the plan and its guidance.
 
-    variation: of the aircraft from its model.
-    start_offset: east, north and up from the first waypoint to where the flight begins, m.
+    variation: deviation of the aircraft from its model.
+    start_offset: east, north and up from the first waypoint to the start of the flight, m.
     """
 
     variation: Variation
@@ -81,13 +82,13 @@ class OffNominal:
 class JudgedFlight:
     """A flight from its first tick to its verdict.
 
-    setup: with the program that flew, if one did.  requirements: the route requirements that it was judged by.
-    track: the rows that are recorded, all of them where there is no log; none of a flight that could not begin.
-    ended: how it ended, "completed" or the reason why not.
-    verdict: on these rows.
-    events: what the log holds beside them.
+    setup: the setup, with the program that flew, if any.  requirements: the route requirements it was judged by.
+    track: the recorded rows, or all rows if there is no log; empty for a flight that could not begin.
+    ended: "completed", or the reason for an early end.
+    verdict: the verdict on these rows.
+    events: entries of the log in addition to the rows.
     reference: the results of reference flights; None if none were flown.
-    returns: from a few places of it; None where they were not asked for.
+    returns: returns from a few places of the flight; None if they were not requested.
     """
 
     setup: FlightSetup
@@ -103,7 +104,8 @@ class JudgedFlight:
 def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | None = None) -> PlanThenFly:
     """Plan a path in a scenario, fly it and judge the flight.
 
-    seed: of planner and turbulence; None takes the scenario's, or 1.  log: where to write the flight, None for nowhere.
+    seed: of planner and turbulence; None takes the seed of the scenario, or 1.
+    log: file for the flight; None writes none.
     Raises a PlanflyError for bad input.  A plan that cannot be flown is a verdict, not an error.
     """
     number = choose_seed(scenario, seed)
@@ -128,25 +130,25 @@ def fly_and_judge(
     off_nominal: OffNominal | None = None,
     reference: FlyReference = "failed",
     returns: bool = False,
-    limits: FlightLimits = _USUAL_LIMITS,
+    limits: FlightLimits = _DEFAULT_LIMITS,
 ) -> JudgedFlight:
     """Fly a setup, record it if a log is named, and judge it.
 
-    every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
-    autopilot: the program of ArduPlane or PX4, which then flies; its own log is kept beside ours.
-    off_nominal: how the flight differs from what guidance knows; none of a program's.
-    reference: when reference flights are flown, as of
+    every: one row out of this many is recorded and judged, so that a check of the log gives the same verdict.
+    autopilot: the program of ArduPlane or PX4, which then flies; its own log is kept next to the flight log.
+    off_nominal: differences between the flight and the assumptions of guidance; not for a program.
+    reference: cases in which reference flights are flown, as of
     `planfly.workflow.reference_flights.judge_with_reference_flights`.
-    returns: whether returns from a few places are judged and drawn in the log, if one is named.
-    limits: how long it may fly, and how large its log may grow.
+    returns: True judges returns from a few places, and draws them in the log, if one is named.
+    limits: limits of the flight time and of the size of the log.
 
     A flight that cannot begin, or that needs more than `MAX_ENERGY_RATIO` times the energy carried, has no row and no
-    log: its verdict is its route's, and that it did not begin.  Raises FlightError for a program that does not fly it
-    to its end; no log is left then.
+    log; its verdict covers the route and says that the flight did not begin.  Raises FlightError for a program that
+    does not fly it to its end; then no log is left.
     """
     task = _Task(airframe, log, advance, every, limits, reference, returns=returns)
     requirements = route_requirements(setup)
-    stores = _stores_needed(requirements)
+    stores = _predicted_energy_ratio(requirements)
     if stores > MAX_ENERGY_RATIO:
         return _unflown(requirements, log, f"not started: it takes {stores:.0f} times the energy carried")
     try:
@@ -161,7 +163,7 @@ def fly_and_judge(
 
 @dataclass(frozen=True, slots=True)
 class _Task:
-    """Requests to `fly_and_judge` about a flight; the fields are its arguments."""
+    """Arguments of `fly_and_judge` that concern one flight."""
 
     airframe: Airframe
     log: Path | None
@@ -172,8 +174,11 @@ class _Task:
     returns: bool
 
 
-def _stores_needed(requirements: RouteRequirements) -> float:
-    """Predict how many times the energy carried a route takes; 0 if even full power throughout takes less than two."""
+def _predicted_energy_ratio(requirements: RouteRequirements) -> float:
+    """Return the predicted ratio of energy needed to energy carried.
+
+    0 if full power throughout needs less than `MAX_ENERGY_RATIO` times the energy carried.
+    """
     setup = requirements.setup
     seconds, full = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full
     full_energy = float(np.nanmax(full, initial=0.0)) * seconds / 3600.0
@@ -197,7 +202,7 @@ def _fly_program(task: _Task, setup: FlightSetup, program: ProgramAutopilot) -> 
 
 
 def autopilot_log(log: Path, program: Path) -> Path:
-    """Return where the log that an autopilot's program writes is kept, next to planfly's log.
+    """Return the path of the autopilot program's own log, next to the flight log of planfly.
 
     >>> autopilot_log(Path("runs/flight.mcap"), Path("arduplane")).name
     'flight.BIN'
@@ -206,7 +211,7 @@ def autopilot_log(log: Path, program: Path) -> Path:
 
 
 def _record_and_judge(task: _Task, requirements: RouteRequirements, flight: Airborne) -> JudgedFlight:
-    """Fly to the end, and judge the rows that are recorded."""
+    """Fly to the end, and judge the recorded rows."""
     flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
     if task.log is None:
         track, ended = _fly(task, flight, None)
@@ -216,14 +221,14 @@ def _record_and_judge(task: _Task, requirements: RouteRequirements, flight: Airb
         judged = _judged(task, requirements, thin_track(track, task.every), recorder.ended)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
-        beside = return_summary(flight.setup, judged.track) if task.returns else None
-        drawn = None if beside is None else beside.draw_returns_without_glides()
+        summary = return_summary(flight.setup, judged.track) if task.returns else None
+        drawn = None if summary is None else summary.draw_returns_without_glides()
         recorder.finish(judged.ended, judged.verdict, judged.reference, drawn)
-    return replace(judged, returns=beside)
+    return replace(judged, returns=summary)
 
 
 def _fly(task: _Task, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
-    """Fly to the end or until the log is full; record and report each block.  Return the track and how it ended."""
+    """Fly to the end or until the log is full, record each block, and return the track and the end."""
     blocks, ended, length = list[FlightBlock](), "", flight.path.length
     for block in simulate(flight):
         blocks.append(block)

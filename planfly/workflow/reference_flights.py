@@ -1,4 +1,4 @@
-"""Fly reference flights that explain an autopilot's flight: by planfly's guidance, and with other parameters."""
+"""Explain the flight of an autopilot by reference flights: planfly's guidance, and other parameters."""
 
 import contextlib
 import math
@@ -21,23 +21,24 @@ from logs.verdict.verdict import Verdict
 from world.errors import StartError
 
 # ----------------------------------------------------------------------
-# Which of an autopilot's parameters decides a flight that fails: found by flying with one changed at a time.
+# Find the autopilot parameter that decides a failed flight, by flying with one parameter changed at a time.
 
 
-# Rules that a height off the plan breaks before a track beside it does.
-_OF_HEIGHT = ("clearance", "height", "bounds", "slope", "energy", "stall", "speed")
+# Rules that are broken by an altitude error rather than by a cross-track error.
+_VERTICAL_RULES = ("clearance", "height", "bounds", "slope", "energy", "stall", "speed")
 
+# Function that flies with an autopilot and returns True if the flight passes.
 Passes = Callable[[Autopilot], bool]
 
 
 def deciding_parameter(autopilot: Autopilot, findings: tuple[Finding, ...], passes: Passes) -> DecidingParameter | None:
-    """Return the first candidate that passes with another value, and the nearest value that does; None where none does.
+    """Return the first candidate parameter with a passing value, and the nearest such value, or None.
 
     findings: of the flight that failed.
-    passes: flies the law with other parameters and says whether that flight passes; called about ten times.
+    passes: flies the law with other parameters and returns True if that flight passes; called about ten times.
 
-    The candidates of what failed come first, heights or sides.  Of each the farthest value is flown, and where that
-    passes the values between, by halves: the value that is named was flown and passed.
+    Candidates for the kind of the failure, vertical or lateral, are tried first.  For each candidate the farthest value
+    is flown, and if it passes, the values between by bisection: the returned value was flown and passed.
 
     >>> from flight.autopilots.arduplane.autopilot import ArduPlane
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -51,26 +52,26 @@ def deciding_parameter(autopilot: Autopilot, findings: tuple[Finding, ...], pass
     """
     failed = first_failed(findings)
     if failed is None or autopilot.parameters is None or failed.rule == "mission":
-        # A mission that is not taken is taken by none of what decides how it is flown.
+        # No flight parameter changes the rejection of a mission.
         return None
     values = {parameter.name: parameter.value for parameter in autopilot.parameters.values}
     heights, sides = autopilot.height_candidates, autopilot.side_candidates
-    for name, step, far, unit, least in (*heights, *sides) if failed.rule in _OF_HEIGHT else (*sides, *heights):
+    for name, step, far, unit, least in (*heights, *sides) if failed.rule in _VERTICAL_RULES else (*sides, *heights):
         current = values[name]
 
         def with_value(value: float, name: str = name) -> bool:
             return passes(autopilot.with_parameters(**{name: value}))
 
-        # A value below the documented range is none to suggest.
+        # Values below the documented range are not suggested.
         passing = _nearest(max(current, least - step), step, far, with_value)
         if passing is not None:
-            off = _off(failed, findings)
+            off = _deviation_at_failure(failed, findings)
             return DecidingParameter(name, current, passing, unit, failed.rule, failed.place, off)
     return None
 
 
 def _nearest(current: float, step: float, far: float, passes: Callable[[float], bool]) -> float | None:
-    """The value nearest to the current one, in steps towards the farthest, that passes; None where that fails."""
+    """Return the passing value nearest to the current one, in steps towards `far`; None if `far` fails."""
     steps = int(abs(far - current) / step + 1e-6)
     sign = 1.0 if far > current else -1.0
 
@@ -86,21 +87,22 @@ def _nearest(current: float, step: float, far: float, passes: Callable[[float], 
     return value(works)
 
 
-def _off(failed: Finding, findings: tuple[Finding, ...]) -> float | None:
-    """Return how far off (m) the flight was where it failed, as `DecidingParameter` has it."""
+def _deviation_at_failure(failed: Finding, findings: tuple[Finding, ...]) -> float | None:
+    """Return the deviation of the flight at its failure, m, as in `DecidingParameter`; None if unknown."""
     if failed.rule == "corridor":
         return failed.flown
     if failed.place.kind != "leg" or failed.rule not in ("clearance", "height"):
         return None
-    beside = [item for item in findings if item.rule == "slope" and item.place == failed.place]
-    errors = [fact.value for item in beside for fact in item.facts if fact.what == "height error"]
+    slopes = [item for item in findings if item.rule == "slope" and item.place == failed.place]
+    errors = [fact.value for item in slopes for fact in item.facts if fact.what == "height error"]
     return errors[0] if errors else None
 
 
-class _GivenUp(Exception):
-    """There is no time for reference flights."""
+class _ReferenceFlightsAborted(Exception):
+    """Reference flights are aborted in a hurry."""
 
 
+# Function that returns True if reference flights should be aborted.
 Hurry = Callable[[], bool]
 
 
@@ -111,7 +113,8 @@ def _never() -> bool:
 def airframe_answer(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry = _never) -> AirframeAnswer:
     """Fly a setup by planfly's guidance, which knows its exact position, and judge that flight.
 
-    It flies the same true airspeeds: those that ArduPlane takes for equivalent ones are higher the higher it flies.
+    It flies the same true airspeeds as ArduPlane, which takes airspeeds as equivalent airspeeds: at a higher altitude
+    they are higher true airspeeds.
     hurry: see `judge_with_reference_flights`.
     """
     same = true_route(setup)
@@ -121,7 +124,7 @@ def airframe_answer(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry = _neve
     except StartError as error:
         return AirframeAnswer(False, f"not flyable: not started: {error.reason}", (("completion", FLIGHT),))
     failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
-    # What is left open of ways from the ground is no matter of this flight.
+    # Undecided findings on the take-off and landing do not concern this flight.
     said = "flyable in the air" if verdict.flies and not verdict.flyable else verdict.headline
     return AirframeAnswer(verdict.flies, said, failed)
 
@@ -129,11 +132,11 @@ def airframe_answer(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry = _neve
 def find_deciding_parameter(
     setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, hurry: Hurry = _never
 ) -> DecidingParameter | None:
-    """Find a parameter with which, at another value, a flight that failed passes; None if there is none.
+    """Find a parameter that lets a failed flight pass with another value, or return None.
 
     verdict: on the flight with the setup's own parameters.  hurry: see `judge_with_reference_flights`.
-    Takes about ten flights, by the autopilot's law: they explain the flight of a program only if the law's own flight
-    fails, too.
+    Takes about ten flights by the law of the autopilot; they explain the flight of a program only if the flight of the
+    law fails, too.
     """
     if setup.autopilot.parameters is None or verdict.flies:
         return None
@@ -143,7 +146,7 @@ def find_deciding_parameter(
         if own.flies:
             return None
         findings = own.findings
-    # The corridor is as wide as it was, whatever radius is tried.
+    # The corridor keeps its width for every radius that is tried.
     scenario = setup.scenario
     limits = scenario.limits.model_copy(update={"corridor_m": setup.corridor})
     spec = scenario.spec.model_copy(update={"limits": limits})
@@ -156,17 +159,18 @@ def find_deciding_parameter(
     return deciding_parameter(setup.autopilot, findings, passes)
 
 
-# What a law is off its autopilot by: a share of how far it is off the legs (of ArduPlane's kept corners nine in ten are
-# within it), and a height, m (the least clearances of 20 climbs of ArduPlane's were met within it).
+# Cross-track error of a law against its autopilot, as a fraction of its distance from the legs; nine in ten corners
+# that ArduPlane kept are within it.
 STRAY_SHARE = 0.1
+# Altitude error of a law against its autopilot, m; the least clearances of 20 ArduPlane climbs are within it.
 HEIGHT_ERROR = 1.2
 
 
 def has_room(flown: Sequence[Finding], failed: Sequence[Finding]) -> bool:
-    """Return True if what failed passes with the margin that the law's own error asks for.
+    """Return True if each failed finding now passes with the margin that the error of the law requires.
 
-    flown: findings of a flight with another value of a parameter.  failed: of the one before.  Both are compared where
-    that failed: beside the legs, and low above ground.
+    flown: findings of a flight with another value of a parameter.  failed: findings of the flight before.  They are
+    compared for the failed rules and places: lateral distance from the legs, and height above ground.
     """
     wrong = {(item.rule, item.place) for item in failed if item.ok is False}
     for item in flown:
@@ -178,7 +182,7 @@ def has_room(flown: Sequence[Finding], failed: Sequence[Finding]) -> bool:
     return True
 
 
-# When reference flights are flown.
+# Cases in which reference flights are flown.
 FlyReference = Literal["never", "failed", "always"]
 
 
@@ -191,13 +195,13 @@ def judge_with_reference_flights(
     fly: FlyReference = "failed",
     hurry: Hurry = _never,
 ) -> tuple[Verdict, ReferenceFlights | None]:
-    """Judge a flight, and fly reference flights that explain its verdict; they do not decide whether it is flyable.
+    """Judge a flight, with reference flights that explain the verdict but do not decide it.
 
     requirements: the route requirements of the setup that was flown.  track, ended: the flight and its end.
-    fly: when the reference flights are flown: "failed" if a finding of the flight fails, "always" also if all pass.
-    A flight of planfly's own guidance has no reference flight.
-    hurry: called throughout the reference flights; once it returns True they are aborted, and the verdict holds what
-    they have shown by then.
+    fly: cases in which reference flights are flown: "failed" if a finding of the flight fails, "always" also if all
+    pass.  A flight of planfly's own guidance has no reference flight.
+    hurry: called throughout the reference flights; once it returns True they are aborted, and the verdict holds their
+    results up to then.
     """
     setup = requirements.setup
     verdict = judge_flight(setup, track, ended, requirements=requirements)
@@ -205,20 +209,20 @@ def judge_with_reference_flights(
         return verdict, None
     try:
         airframe = airframe_answer(setup, aircraft, hurry)
-    except _GivenUp:
+    except _ReferenceFlightsAborted:
         return verdict, None
     reference = ReferenceFlights(airframe)
     if airframe.flyable:
-        with contextlib.suppress(_GivenUp):
+        with contextlib.suppress(_ReferenceFlightsAborted):
             reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, hurry))
     return judge_flight(setup, track, ended, reference=reference, requirements=requirements), reference
 
 
 def _flown_verdict(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry) -> Verdict:
-    """Fly a setup and judge the flight.  Raises _GivenUp in a hurry."""
+    """Fly a setup and judge the flight.  Raises _ReferenceFlightsAborted in a hurry."""
     blocks = []
     for block in simulate(Flight(setup, aircraft)):
         blocks.append(block)
         if hurry():
-            raise _GivenUp
+            raise _ReferenceFlightsAborted
     return judge_flight(setup, track_of(blocks), blocks[-1].ended)

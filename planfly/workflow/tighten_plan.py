@@ -1,4 +1,4 @@
-"""Tighten the limits of a scenario by what a flight could not do, for the next round of planning.
+"""Tighten the limits of a scenario by the failures of a flight, for the next round of planning.
 
 Only the planning is tightened: every round is judged against the scenario as it was given.
 """
@@ -16,6 +16,7 @@ from logs.verdict.wording import threat_text
 from planner.evaluation.problem import CERTIFIED_ZONE_MARGIN
 from world.scenario import Scenario, from_spec
 
+# Content of a scenario file.
 Spec = dict[str, Any]
 
 # Added to the clearance by which a flight fell short, m.
@@ -31,6 +32,7 @@ MIN_BANK_DEG = 5.0
 # Remark on a round that is followed by another.
 GO_ON = "tightened and planned again"
 
+# Keys of the numbers that can be tightened.
 Tightened = Literal[
     "max_climb_deg",
     "max_dive_deg",
@@ -82,7 +84,7 @@ def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list
     failed = [item for item in verdict.findings if item.ok is False]
     changes = _slopes(spec, failed) + _turns(spec, scenario, failed)
     if not changes:
-        # A flight that cannot follow its plan also flies lower and closer: that is no separate cause.
+        # A flight that cannot follow its plan also flies lower and closer: this is not a separate cause.
         changes = _clearance(spec, scenario, failed) + _missiles(spec, failed)
         changes += _height(spec, scenario, failed) + _zones(spec, scenario, failed)
     if not changes:
@@ -184,7 +186,9 @@ def _distances(item: Finding) -> list[Change]:
     return [change for suggestion in item.suggestions for change in suggestion if change.what == "distance"]
 
 
+# Changes and results of each round.
 Rounds = list[dict[str, Any]]
+# Function that plans and flies one round.
 OneRound = Callable[[Scenario], tuple[Verdict, bool]]
 
 
