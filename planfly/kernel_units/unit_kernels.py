@@ -1,6 +1,7 @@
-"""The kernels that each unit of work calls from Python, which is what a first start counts.
+"""Kernels that each unit of work calls from Python, for the progress of a first start.
 
-Those that they call themselves are compiled with them.  `tests/planfly/kernel_units` holds this to what is called.
+Kernels that other kernels call are compiled with them.  `tests/planfly/kernel_units` compares these lists with the
+actual calls.
 """
 
 _FIELD = (
@@ -115,11 +116,11 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     ),
 }
 
-# What a default plan, a flight and its report's glides call.  First what the others call too, so that two processes do
-# not compile it at once; the first of it takes as long as the other two.  Then the longest first.
+# Units of a default plan, a flight and the glides of its report.  The shared units come first, so that two processes do
+# not compile the same kernels; the first of them takes as long as the other two.  The others follow, the longest first.
 _SHARED = ("problem", "tracking", "ranks")
 PLANNING = (*_SHARED, "scores", "shortening", "routes", "certificates", "paper", "sides")
-# What a choice of plans calls: all of a default plan's, and its own.
+# Units of a choice of plans: all units of a default plan, and its own.
 CHOOSING = (*_SHARED, "scores", "shortening", "routes", "certificates", "fronts", "paper", "sides")
 FLYING = ("tracking", "flight")
 GLIDING = ("glides",)
@@ -127,7 +128,7 @@ BOTH = (*_SHARED, "scores", "flight", "shortening", "routes", "certificates", "p
 
 
 def kernels_of(units: tuple[str, ...]) -> frozenset[str]:
-    """Return all kernels of units, each once.
+    """Return all kernels of units, without repetition.
 
     >>> len(kernels_of(("scores", "paper")))
     13
