@@ -54,7 +54,7 @@ def open_hgt(file: Path, _name: str) -> RasterFile:
     return _open(file, "SRTMHGT", f"not a readable SRTM tile: {expected}")
 
 
-def _dataset(file: Path, driver: str) -> Any:
+def _open_dataset(file: Path, driver: str) -> Any:
     """Open a file in GDAL with one driver; call it inside `GUARD` only."""
     import rasterio
 
@@ -69,7 +69,7 @@ def _open(file: Path, driver: str, unreadable: str) -> RasterFile:
         with warnings.catch_warnings(), rasterio.Env(**GUARD):
             # For a file without a place on Earth, GDAL would return columns and rows.
             warnings.simplefilter("error", NotGeoreferencedWarning)
-            with _dataset(file, driver) as source:
+            with _open_dataset(file, driver) as source:
                 _refuse_layout(file, source)
                 shape, grid = (source.height, source.width), tuple(source.transform)[:6]
                 scale, crs = (source.scales[0], source.offsets[0]), _crs_of(file, driver, source)
@@ -82,7 +82,7 @@ def _open(file: Path, driver: str, unreadable: str) -> RasterFile:
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
         try:
-            with rasterio.Env(**GUARD), _dataset(file, driver) as source:
+            with rasterio.Env(**GUARD), _open_dataset(file, driver) as source:
                 heights = _read_strips(source, (top, bottom, left, right), *scale)
                 if unwritten:
                     _clear_unwritten(source, heights, top, left)
@@ -128,7 +128,7 @@ def _crs_of(file: Path, driver: str, source: Any) -> str | None:
         return None
     found = source.crs.to_wkt(version="WKT2_2019")
     # GDAL drops the height axis of a three-dimensional system in a GeoTIFF 1.0 file, unless it takes EPSG's definition.
-    with rasterio.Env(GTIFF_SRS_SOURCE="EPSG"), _dataset(file, driver) as by_code:
+    with rasterio.Env(GTIFF_SRS_SOURCE="EPSG"), _open_dataset(file, driver) as by_code:
         has_height = "CS[ellipsoidal,3]" in by_code.crs.to_wkt(version="WKT2_2019")
     return wkt_of(found, with_height=has_height)
 
@@ -226,7 +226,7 @@ def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple
     top, bottom, left, right = window
     if top >= bottom or left >= right:
         return
-    with rasterio.Env(**GUARD), _dataset(file, "GTiff") as source:
+    with rasterio.Env(**GUARD), _open_dataset(file, "GTiff") as source:
         rows, cols = source.block_shapes[0]
         for down in range(top // rows, -(-bottom // rows)):
             for across in range(left // cols, -(-right // cols)):

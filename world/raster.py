@@ -274,7 +274,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
         )
     heights = raster.read(top, bottom, left, right)
     heights[~is_ground(heights)] = np.nan
-    _count_from_sea_level(heights, raster, top, left)
+    _convert_to_sea_level(heights, raster, top, left)
     to_pixel = fit_polymap(
         lambda e, n: _shifted(raster.to_source, origin, e, n, left, top),
         box + np.array([-buffer, buffer]),
@@ -308,7 +308,7 @@ def is_covered(raster: RasterFile, origin: GeoOrigin, box: Floats) -> bool:
     return not (e0 < -1e-6 or n0 < -1e-6 or e1 > cols - 1 + 1e-6 or n1 > rows - 1 + 1e-6)
 
 
-def _count_from_sea_level(heights: NDArray[np.float32], raster: RasterFile, top: int, left: int) -> None:
+def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top: int, left: int) -> None:
     """Convert the heights of a window to heights above mean sea level, in place.
 
     top, left: first row and column of the window in the file.

@@ -43,7 +43,7 @@ _TEMPORARY_STATUSES = (408, 425, 429, 500, 502, 503, 504)
 Fetched = Callable[[int], None]
 
 
-class _Unfinished(Exception):
+class _IncompleteAnswer(Exception):
     """An answer does not contain what was requested; the message says why."""
 
 
@@ -87,9 +87,11 @@ class RemoteFile:
                 try:
                     self._get(low, high, fetched)
                     break
-                except (_Unfinished, OSError, ValueError, http.client.HTTPException) as error:
-                    if attempt == _MAX_ATTEMPTS - 1 or not _may_pass(error):
-                        raise TerrainError(f"{self.url}: cannot be fetched: {_why(error)}", file=self.url) from error
+                except (_IncompleteAnswer, OSError, ValueError, http.client.HTTPException) as error:
+                    if attempt == _MAX_ATTEMPTS - 1 or not _is_temporary(error):
+                        raise TerrainError(
+                            f"{self.url}: cannot be fetched: {_error_text(error)}", file=self.url
+                        ) from error
                     time.sleep(_PAUSE * 2.0**attempt)
 
     def _get(self, begin: int, end: int, fetched: Fetched) -> None:
@@ -98,10 +100,10 @@ class RemoteFile:
             if answer.status == 200:
                 # A server without range requests sends the whole file; so does a server whose file has changed.
                 if _length(answer) != self.size or _version(answer) != self.version:
-                    raise _Unfinished("it has changed since it was begun: try again")
+                    raise _IncompleteAnswer("it has changed since it was begun: try again")
                 begin, end = 0, self.size
             elif answer.headers.get("Content-Range") != f"bytes {begin}-{end - 1}/{self.size}":
-                raise _Unfinished(f"the server answers with {answer.headers.get('Content-Range')!r}")
+                raise _IncompleteAnswer(f"the server answers with {answer.headers.get('Content-Range')!r}")
             with self.copy.open("r+b") as file:
                 file.seek(begin)
                 at, digest = begin, sha256()
@@ -117,7 +119,7 @@ class RemoteFile:
                 self.held[begin, at] = digest.hexdigest()
                 write_whole(_notes(self.copy), json.dumps([[*part, text] for part, text in self.held.items()]))
             if at < end:
-                raise _Unfinished(f"{at - begin:,} of {end - begin:,} bytes came")
+                raise _IncompleteAnswer(f"{at - begin:,} of {end - begin:,} bytes came")
 
     def forget(self) -> None:
         """Start over with an empty copy.  Raises OSError."""
@@ -143,11 +145,11 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
         except urllib.error.HTTPError as error:
             if error.code in _ABSENT_STATUSES:
                 return None
-            if attempt == _MAX_ATTEMPTS - 1 or not _may_pass(error):
-                raise TerrainError(f"{url}: cannot be fetched: {_why(error)}", file=url) from error
+            if attempt == _MAX_ATTEMPTS - 1 or not _is_temporary(error):
+                raise TerrainError(f"{url}: cannot be fetched: {_error_text(error)}", file=url) from error
         except (OSError, ValueError, http.client.HTTPException) as error:
-            if attempt == _MAX_ATTEMPTS - 1 or not _may_pass(error):
-                raise TerrainError(f"{url}: cannot be reached: {_why(error)}", file=url) from error
+            if attempt == _MAX_ATTEMPTS - 1 or not _is_temporary(error):
+                raise TerrainError(f"{url}: cannot be reached: {_error_text(error)}", file=url) from error
         time.sleep(_PAUSE * 2.0**attempt)
     if not 0 < size <= MAX_BYTES:
         allowed = f"1 to {MAX_BYTES:,} bytes are expected"
@@ -164,11 +166,11 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
 
 def _open(url: str, headers: dict[str, str], method: str = "GET") -> http.client.HTTPResponse:
     request = urllib.request.Request(url, headers={"User-Agent": "planfly"} | headers, method=method)
-    return _opener().open(request, timeout=_ANSWER_TIMEOUT_S)
+    return _make_opener().open(request, timeout=_ANSWER_TIMEOUT_S)
 
 
 @cache
-def _opener() -> urllib.request.OpenerDirector:
+def _make_opener() -> urllib.request.OpenerDirector:
     """Return an opener for http and https only, redirects included."""
     opener = urllib.request.OpenerDirector()
     for handler in (
@@ -211,11 +213,11 @@ def _version(answer: http.client.HTTPResponse) -> str:
     return tag if tag and not tag.startswith("W/") else str(answer.headers.get("Last-Modified") or "")
 
 
-def _may_pass(error: Exception) -> bool:
+def _is_temporary(error: Exception) -> bool:
     return not isinstance(error, urllib.error.HTTPError) or error.code in _TEMPORARY_STATUSES
 
 
-def _why(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     if isinstance(error, urllib.error.HTTPError):
         return f"the server answers {error.code} {error.reason}"
     reason = getattr(error, "reason", None) or error

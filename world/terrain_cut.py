@@ -174,8 +174,8 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, told: Told, *
             fetched += came
             told(len(there) + 9.0 * done, 10.0 * len(there), f"{name}: {fetched / 1e6:.1f} MB")
 
-        tiles.append(_placed(_fetched_tile(remote, wide, count), degree, box))
-    heights, grid = _on_one_grid(tiles, box)
+        tiles.append(_placed(_fetch_tile(remote, wide, count), degree, box))
+    heights, grid = _merge_tiles(tiles, box)
     absent = tuple(degree for degree, remote in found.items() if remote is None)
     if sea:
         _fill_sea(heights, grid, absent)
@@ -185,15 +185,15 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, told: Told, *
     return CutTerrain(out, (rows, cols), names, absent, _empty(heights), fetched)
 
 
-def _fetched_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) -> RasterFile:
+def _fetch_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) -> RasterFile:
     """Return the copy of a tile with the blocks that cover an area.  Raises TerrainError.
 
     A copy that cannot be read, for example after a power cut or because of a proxy, is fetched a second time.
     """
     for is_last in (not remote.held, True):
         try:
-            tile = _opened_copy(remote, count, (_DIRECTORY_BYTES, remote.size) if is_last else (_DIRECTORY_BYTES,))
-            window = _touched(tile, box)
+            tile = _open_copy(remote, count, (_DIRECTORY_BYTES, remote.size) if is_last else (_DIRECTORY_BYTES,))
+            window = _padded_window(tile, box)
             for begin, end in block_spans(remote.copy, window):
                 remote.fetch(begin, end, count)
             if window[0] < window[1] and window[2] < window[3]:
@@ -211,7 +211,7 @@ class _UnreadableError(Exception):
     """A copy is not a GeoTIFF, or has a block that cannot be unpacked."""
 
 
-def _opened_copy(remote: RemoteFile, count: Callable[[int], None], sizes: Sequence[int]) -> RasterFile:
+def _open_copy(remote: RemoteFile, count: Callable[[int], None], sizes: Sequence[int]) -> RasterFile:
     """Fetch the directory of a tile, and open its copy.  Raises TerrainError and _UnreadableError.
 
     sizes: numbers of bytes to fetch from the beginning, tried in turn.  The directory may be longer than in a
@@ -234,7 +234,7 @@ def _opened_copy(remote: RemoteFile, count: Callable[[int], None], sizes: Sequen
     raise _UnreadableError
 
 
-def _touched(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
+def _padded_window(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
     """Return rows and columns of a tile in an area, with a margin that interpolation to another grid may need."""
     col, row = tile.to_source(*_outline(box))
     rows, cols = tile.shape
@@ -253,7 +253,7 @@ _MAX_TILE_OFFSET_DEG = 0.02
 _PIXEL_TOLERANCE = 1e-3
 
 
-class _Placed(NamedTuple):
+class _PlacedTile(NamedTuple):
     """Tile with its grid of longitudes and latitudes.
 
     west, north: outer edges, deg; the longitude is in the same turn as the area.  dx, dy: size of a pixel, deg.
@@ -266,7 +266,7 @@ class _Placed(NamedTuple):
     dy: float
 
 
-def _placed(tile: RasterFile, degree: tuple[int, int], box: Box) -> _Placed:
+def _placed(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
     """Place a tile on its degree, in the same turn of longitude as the area.  Raises TerrainError."""
     dx, turn, west, other_turn, dy, north = tile.grid
     if turn or other_turn or not dx > 0.0 > dy:
@@ -280,10 +280,10 @@ def _placed(tile: RasterFile, degree: tuple[int, int], box: Box) -> _Placed:
         allowed = f"the degree from {degree[0]} N {degree[1]} E on is expected"
         raise TerrainError(f"{tile.name}: another place: {allowed}", file=tile.name, allowed=allowed)
     turns = round(((box.west + box.east) / 2.0 - (west + dx * tile.shape[1] / 2.0)) / 360.0)
-    return _Placed(tile, west + 360.0 * turns, north, dx, -dy)
+    return _PlacedTile(tile, west + 360.0 * turns, north, dx, -dy)
 
 
-def _on_one_grid(tiles: list[_Placed], box: Box) -> tuple[Heights, tuple[float, ...]]:
+def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[float, ...]]:
     """Return heights of an area on the grid of the finest tile, NaN where there is no tile, and the grid."""
     finest = min(tiles, key=lambda tile: tile.dx)
     # First and last pixels whose centres enclose the area, relative to the first pixel of the finest tile.
@@ -303,7 +303,7 @@ def _on_one_grid(tiles: list[_Placed], box: Box) -> tuple[Heights, tuple[float, 
     return heights, (finest.dx, 0.0, west, 0.0, -finest.dy, north)
 
 
-def _put(heights: Heights, lat: Floats, lon: Floats, tile: _Placed) -> None:
+def _put(heights: Heights, lat: Floats, lon: Floats, tile: _PlacedTile) -> None:
     """Fill the empty places of a grid of latitudes and longitudes from a tile, interpolated between its pixels."""
     rows, cols = tile.raster.shape
     col, row = (lon - tile.west) / tile.dx - 0.5, (tile.north - lat) / tile.dy - 0.5

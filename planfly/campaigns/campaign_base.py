@@ -233,7 +233,7 @@ def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> Varie
     values = draw.values
     scenario = _in_wind(base.scenario, values, wind)
     if values["terrain_height"] and scenario.terrain is not None:
-        scenario = replace(scenario, terrain=_raised(scenario.terrain, values["terrain_height"]))
+        scenario = replace(scenario, terrain=_raise_terrain(scenario.terrain, values["terrain_height"]))
     battery = base.airframe.battery * values["battery"]
     draws = base.dispersions.draws
     limits = _limits(base.airframe, scenario, drawn=draws is not None)
@@ -261,7 +261,7 @@ def _in_wind(scenario: Scenario, values: dict[str, float], mean: GivenWind | Non
     return replace(scenario, spec=scenario.spec.model_copy(update={"wind": table}), wind=wind)
 
 
-def _raised(terrain: Terrain, by: float) -> Terrain:
+def _raise_terrain(terrain: Terrain, by: float) -> Terrain:
     return replace(terrain, heights=(terrain.heights + np.float32(by)).astype(np.float32))
 
 

@@ -254,7 +254,7 @@ def _varying(quantity: Quantity, table: Any, name: str) -> Varying:
             f"{100.0 * share:.1f} % of it lies within {quantity.low:g}..{quantity.high:g}"
             f" {quantity.unit or 'of the nominal'}; at least {100.0 * INSIDE:.0f} % has to"
         )
-        raise SpreadError.at(name, quantity.name, _call(varying), allowed)
+        raise SpreadError.at(name, quantity.name, _call_text(varying), allowed)
     return varying
 
 
@@ -294,11 +294,11 @@ def _share_inside(varying: Varying, name: str) -> float:
     share = varying.share_inside
     if math.isnan(share):
         allowed = f"no parameters that {varying.distribution} may have"
-        raise SpreadError.at(name, varying.quantity.name, _call(varying), allowed)
+        raise SpreadError.at(name, varying.quantity.name, _call_text(varying), allowed)
     return share
 
 
-def _call(varying: Varying) -> str:
+def _call_text(varying: Varying) -> str:
     return f"{varying.distribution}({', '.join(f'{key}={value:g}' for key, value in varying.parameters)})"
 
 
@@ -352,7 +352,7 @@ def standard_draws(dispersions: Dispersions, seed: int, start: int, stop: int) -
     """
     uniform = np.array([_drawn(seed, index)[0] for index in range(start, stop)]).reshape(-1, len(QUANTITIES))
     columns = [QUANTITIES.index(one.quantity) for one in dispersions.varying]
-    return _standardised(dispersions, uniform[:, columns])
+    return _standardise(dispersions, uniform[:, columns])
 
 
 def standard_population(dispersions: Dispersions, count: int) -> Floats:
@@ -369,7 +369,7 @@ def standard_population(dispersions: Dispersions, count: int) -> Floats:
 
     quantities = len(dispersions.varying)
     shares = qmc.Sobol(quantities, scramble=False).random(count) if quantities else np.zeros((count, 0))
-    return _standardised(dispersions, shares + 0.5 / count)
+    return _standardise(dispersions, shares + 0.5 / count)
 
 
 def _drawn(seed: int, index: int) -> tuple[Floats, int]:
@@ -378,7 +378,7 @@ def _drawn(seed: int, index: int) -> tuple[Floats, int]:
     return random.random(len(QUANTITIES)), int(random.integers(2**63))
 
 
-def _standardised(dispersions: Dispersions, shares: Floats) -> Floats:
+def _standardise(dispersions: Dispersions, shares: Floats) -> Floats:
     """Convert shares (n, v) of the varying quantities' distributions to standard deviations from the mean, (n, d)."""
     middles = (np.arange(_QUANTILES) + 0.5) / _QUANTILES
     columns = []

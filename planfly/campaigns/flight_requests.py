@@ -45,7 +45,7 @@ class Flown(NamedTuple):
 
 # Packages whose version may change a flight in its last bits.
 _PACKAGES = ("jsbsim", "numba", "numpy", "scipy")
-_OURS = ("aircraft", "flight", "logs", "planfly", "planner", "world")
+_OWN_PACKAGES = ("aircraft", "flight", "logs", "planfly", "planner", "world")
 
 
 class WorkerError(PlanflyError):
@@ -56,7 +56,7 @@ class WorkerError(PlanflyError):
 def code_hash() -> str:
     """Return a hash of planfly's own sources, as installed here."""
     digest = hashlib.sha256()
-    for package in _OURS:
+    for package in _OWN_PACKAGES:
         root = Path(str(resources.files(package)))
         for file in sorted(root.rglob("*.py")):
             digest.update(str(file.relative_to(root)).encode())

@@ -54,13 +54,13 @@ def narrow_passes(findings: Iterable[Finding], scenario: Scenario, track: Track)
         share = max(0.0, item.margin + (item.tolerance or 0.0)) / scale
         if share < 1.0:
             shares[at] = min(share, shares.get(at, share))
-    for place, distance in _outside_spheres(scenario, track):
+    for place, distance in _distances_outside_spheres(scenario, track):
         if ("threat", place) not in failed and distance < SPHERE_SCALE:
             shares["threat", place] = max(0.0, distance) / SPHERE_SCALE
     return tuple((rule, place, share) for (rule, place), share in shares.items())
 
 
-def _outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, float]]:
+def _distances_outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, float]]:
     """Return how far outside each missile's sphere the track stays, m."""
     threats = scenario.threats
     if scenario.external or len(track) < 2:

@@ -83,20 +83,22 @@ def examine(connection: sqlite3.Connection, columns: Sequence[str], asked: int, 
     query = f"SELECT {', '.join(columns)}, checksum FROM flights"
     try:
         if connection.execute("PRAGMA quick_check(1)").fetchone() == ("ok",):
-            return _by_checksum(connection.execute(f"{query} ORDER BY flight"))
+            return _check_rows(connection.execute(f"{query} ORDER BY flight"))
     except sqlite3.Error as error:
         _refuse_held(error)
     rows = (row for number in range(most) if (row := _row_of(connection, query, number)) is not None)
-    whole, damaged = _by_checksum(rows)[:2]
+    whole, damaged = _check_rows(rows)[:2]
     # In a broken file, a missing row may have been lost with its page.  A number without a valid checksum is accepted
     # if it is in the range of requested flights, which are numbered from 0.
-    numbers = (number for number in (*damaged, *_seen(connection)) if isinstance(number, int) and number < asked)
+    numbers = (
+        number for number in (*damaged, *_readable_numbers(connection)) if isinstance(number, int) and number < asked
+    )
     last = max([-1, *whole, *numbers])
     missing = set(range(last + 1)) - set(whole)
     return Examined(whole, sorted(missing), sound=False, after=last if last + 1 < asked else None)
 
 
-def _seen(connection: sqlite3.Connection) -> list[Any]:
+def _readable_numbers(connection: sqlite3.Connection) -> list[Any]:
     """Return the flight numbers, some perhaps corrupt, that can be read up to the damaged part of the file."""
     seen: list[Any] = []
     with contextlib.suppress(sqlite3.Error):
@@ -105,7 +107,7 @@ def _seen(connection: sqlite3.Connection) -> list[Any]:
     return seen
 
 
-def _by_checksum(rows: Iterable[tuple[Any, ...]]) -> Examined:
+def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examined:
     found = Examined([], [])
     for *values, kept in rows:
         (found.whole if kept == checksum(values) else found.damaged).append(values[0])

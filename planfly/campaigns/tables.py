@@ -564,10 +564,10 @@ def read_shapes(path: Path) -> dict[str, NDArray[np.float32]]:
     Raises StoreError for a file that planfly did not write, or that another process holds.
     """
     with _opened(path) as connection:
-        return {name: _singles(connection, name, FIELDS[name].entry) for name in SHAPES}
+        return {name: _read_arrays(connection, name, FIELDS[name].entry) for name in SHAPES}
 
 
-def _singles(connection: sqlite3.Connection, name: str, entry: tuple[int, ...]) -> NDArray[np.float32]:
+def _read_arrays(connection: sqlite3.Connection, name: str, entry: tuple[int, ...]) -> NDArray[np.float32]:
     """Return the arrays of a column, (n, m, *entry), where m is the length of the longest one."""
     count, size = connection.execute(f"SELECT COUNT(*), MAX(LENGTH({name})) FROM flights").fetchone()
     found = np.full((count, (size or 0) // np.dtype(np.float32).itemsize), np.nan, dtype=np.float32)
