@@ -36,6 +36,7 @@ MAX_BLOCK_PIXELS = 32 * 2**20
 # Number of pixels of a window read in one step: reading takes several times the memory of the heights.
 PIXELS_AT_ONCE = 2**22
 
+# Names of a unit that mean metres.
 METRES = ("m", "metre", "metres", "meter", "meters")
 # Names of a unit that mean feet.
 _FOOT_NAMES = {"ft", "feet", "foot", "ftus", "usft"}

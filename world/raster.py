@@ -39,6 +39,7 @@ from world.terrain import Terrain
 
 # Largest number of pixels of a window, or of a file that is read as one array; more are refused.
 MAX_PIXELS = 120_000_000
+# Folder of the embedded elevation files.
 _OWN_FILES = Path(__file__).parent / "elevation"
 # Errors that zipfile raises for a damaged file, among others.
 _UNZIP_ERRORS = (zipfile.BadZipFile, zlib.error, lzma.LZMAError)

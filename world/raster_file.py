@@ -20,8 +20,9 @@ ReadWindow = Callable[[int, int, int, int], NDArray[np.float32]]
 
 # Values that mark missing data in files that do not state one.
 UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
-# Range of the heights of ground on Earth, m; heights outside it are missing data.
+# Lower end of the range of ground on Earth, m; heights outside the range are missing data.
 LOWEST_GROUND_M = -12_000.0
+# Upper end of this range, m.
 HIGHEST_GROUND_M = 9000.0
 
 

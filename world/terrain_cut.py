@@ -25,6 +25,7 @@ from world.remote_files import RemoteFile, find_remote
 
 Floats = NDArray[Any]
 
+# Server of the Copernicus GLO-30 tiles.
 COPERNICUS = "https://copernicus-dem-30m.s3.amazonaws.com"
 # Largest number of tiles for an area: 100 would be about 3 GB.
 MAX_FETCHED = 25
@@ -34,6 +35,7 @@ _MARGIN_PIXELS = 5
 _DIRECTORY_BYTES = 2**16
 # WGS 84 with heights above EGM2008.
 _SYSTEM = "EPSG:4326+3855"
+# Value that marks missing data in written files.
 _NODATA = -32768.0
 
 # Progress callback: the work done, the expected total, and a remark.

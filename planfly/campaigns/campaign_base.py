@@ -203,7 +203,9 @@ def _with_own_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions
 
 # Levels in order of increasing turbulence.
 LEVELS: tuple[Literal["none", "light", "moderate"], ...] = ("none", "light", "moderate")
+# Largest wind speed of a varied flight, m/s.
 MAX_WIND = 40.0
+# Largest wind gradient of a varied flight, 1/s.
 MAX_GRADIENT = 0.05
 
 

@@ -29,6 +29,7 @@ from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from world.errors import PlanflyError
 from world.interruption import Interrupted
 
+# Timeout for the connection to a scheduler, s.
 _CONNECT_SECONDS = 20
 # Number of task names used in turn: dask keeps the last 100,000 tasks, and an old name is free again in time.
 _NAMES = 4096

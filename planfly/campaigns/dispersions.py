@@ -71,7 +71,9 @@ QUANTITIES = (
     Quantity("start_north", "added", "m", -200.0, 200.0, "start, north"),
     Quantity("start_up", "added", "m", -100.0, 100.0, "start, height"),
 )
+# Quantities by name.
 BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
+# Names of the quantities, in the order of the draws.
 NAMES = tuple(BY_NAME)
 
 
@@ -83,6 +85,7 @@ _AIRCRAFT = "aircraft"
 INSIDE = 0.99
 # Largest size of a dispersions file, bytes.
 MAX_BYTES = 100_000
+# Name of the default dispersions in messages and reports.
 DEFAULT = "planfly's default dispersions"
 
 

@@ -45,6 +45,7 @@ class Flown(NamedTuple):
 
 # Packages whose version may change a flight in its last bits.
 _PACKAGES = ("jsbsim", "numba", "numpy", "scipy")
+# Top-level packages of planfly, whose sources are hashed.
 _OWN_PACKAGES = ("aircraft", "flight", "logs", "planfly", "planner", "world")
 
 

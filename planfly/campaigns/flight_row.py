@@ -170,9 +170,13 @@ def failed_of(text: str) -> tuple[tuple[str, Place], ...]:
     return tuple((entry.pop("rule"), Place(**entry)) for entry in entries)
 
 
+# Column of a text.
 _TEXT = Column("TEXT NOT NULL")
+# Column of a number.
 _REAL = Column("REAL NOT NULL")
+# Column of an array stored as bytes.
 _BLOB = Column("BLOB NOT NULL")
+# Column of the failed findings, as JSON.
 _FAILED = Column("TEXT NOT NULL", _failed_text, failed_of)
 
 
@@ -229,6 +233,7 @@ def _fields() -> dict[str, Column]:
     return {name: args[-1] for name, args in found.items() if args and isinstance(args[-1], Column)}
 
 
+# Fields of `FlightRow` that are columns, by name.
 FIELDS = _fields()
 
 

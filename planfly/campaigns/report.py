@@ -294,6 +294,7 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
 # ----------------------------------------------------------------------
 # Write the files of a go/no-go chart: data, picture and page.
 
+# Schema of ``winds.json``.
 SCHEMA = "planfly.winds/1"
 
 

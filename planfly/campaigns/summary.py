@@ -18,6 +18,7 @@ from planfly.campaigns.flight_row import FlightRow, scaled
 from planfly.campaigns.statistics.decision import Estimate, Goal, first_order, rank_slope
 from planfly.campaigns.tables import Store
 
+# Schema of ``summary.json``.
 SCHEMA = "planfly.campaign-summary/1"
 # Smallest share of a margin's variance for a quantity to be named as explaining it.
 _MIN_NAMED_FRACTION = 0.05

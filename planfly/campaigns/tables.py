@@ -361,9 +361,13 @@ class translated_errors:
 # ----------------------------------------------------------------------
 # The table of a campaign: one row per flight, read by its index.
 
+# Name of the file with the table of a campaign.
 DATABASE = "campaign.sqlite"
+# Kind of the table of a campaign.
 CAMPAIGN_KIND = TableKind("planfly.campaign", {"flight": "INTEGER PRIMARY KEY", **ROW_COLUMNS})
+# Columns of the table of a campaign.
 COLUMNS = tuple(CAMPAIGN_KIND.columns)
+# Query for whole rows.
 _SELECT = f"SELECT {', '.join(COLUMNS)} FROM flights"
 
 
@@ -438,9 +442,11 @@ def _row(values: tuple[Any, ...]) -> FlightRow:
 # ----------------------------------------------------------------------
 # The table of a search for the largest winds: one row per flight, numbered in the order of requests.
 
+# Name of the file with the table of a search.
 WINDS_DATABASE = "winds.sqlite"
 # Settings that determine the requested flights; the number of flights only determines where the sequence ends.
 FIXED = ("target", "confidence", "directions", "most")
+# Kind of the table of a search.
 WINDS_KIND = TableKind(
     "planfly.winds-flights",
     {
@@ -526,6 +532,7 @@ def _narrow_pass(rule: str, margin: float, **place: Any) -> NarrowPass:
 
 # Number of rows converted to arrays in one step.
 _CHUNK = 1000
+# Array type of each kind of column.
 _TYPES: dict[str, type] = {"INTEGER": np.int64, "REAL": np.float64, "TEXT": object}
 
 

@@ -31,6 +31,7 @@ from world.scenario import Scenario, from_spec
 # ----------------------------------------------------------------------
 # Units of work: each calls kernels that no other unit calls, with the argument types that all commands use.
 
+# Scenario of the units, as TOML.
 FIELD = """
 name = "field"
 [terrain]
@@ -62,6 +63,7 @@ turbulence = "light"
 [limits]
 min_clearance_m = 50
 """
+# Mission of the units, as a .waypoints file.
 MISSION = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t46.0\t8.0\t0.0\t1
 1\t0\t3\t16\t0\t0\t0\t0\t46.0\t8.0\t100.0\t1
@@ -117,6 +119,7 @@ def _glide() -> None:
     return_summary(setup, None).drawn()
 
 
+# Function of each unit by name.
 UNITS: dict[str, Callable[[], None]] = {
     "problem": _make_problem,
     "tracking": _track,

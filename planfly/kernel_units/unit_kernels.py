@@ -4,26 +4,34 @@ Kernels that other kernels call are compiled with them.  `tests/planfly/kernel_u
 actual calls.
 """
 
+# Kernels of terrain and map projection.
 _FIELD = (
     "world.least_squares._least_squares",
     "world.frames._polymap_many",
     "world.terrain._heights_many",
 )
+# Kernel of the tracking error.
 _TRACKING_KERNELS = ("flight.autopilots.arduplane.tracking_error._fill",)
+# Kernels of a scenario.
 _WORLD_KERNELS = (*_FIELD, *_TRACKING_KERNELS)
+# Kernel of the ranking of candidates.
 _RANK_KERNELS = ("planner.optimisers.preference._rank_rows",)
+# Kernels of the arrays of a planning problem.
 _ARRAY_KERNELS = (
     "world.terrain.steepest_slopes",
     "planner.airspace.zone_limits._reduce_margins",
     "planner.evaluation.threat_index._fill_cells",
     "planner.evaluation.threat_index._lists",
 )
+# Kernels of a planning problem.
 _PROBLEM_KERNELS = (*_WORLD_KERNELS, *_ARRAY_KERNELS)
+# Prefixes of kernel names.
 _CERTIFY_MODULE = "planner.evaluation.certify_kernels."
 _SIDES = "planner.seeding.side_routes."
 _LAYOUT = "logs.recording.mcap_writer."
 _GLIDES_MODULE = "logs.verdict.returns."
 
+# Kernels that each unit calls from Python, by name of the unit.
 UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     "problem": (*_FIELD, *_ARRAY_KERNELS),
     "tracking": _TRACKING_KERNELS,
@@ -119,11 +127,15 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
 # Units of a default plan, a flight and the glides of its report.  The shared units come first, so that two processes do
 # not compile the same kernels; the first of them takes as long as the other two.  The others follow, the longest first.
 _SHARED = ("problem", "tracking", "ranks")
+# Units of a plan.
 PLANNING = (*_SHARED, "scores", "shortening", "routes", "certificates", "paper", "sides")
 # Units of a choice of plans: all units of a default plan, and its own.
 CHOOSING = (*_SHARED, "scores", "shortening", "routes", "certificates", "fronts", "paper", "sides")
+# Units of a flight.
 FLYING = ("tracking", "flight")
+# Units of glides without the engine.
 GLIDING = ("glides",)
+# Units of a plan and its flights.
 BOTH = (*_SHARED, "scores", "flight", "shortening", "routes", "certificates", "paper", "sides")
 
 
