@@ -88,7 +88,7 @@ class DaskPool:
     def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
         """Fly requests as `following` returns them, and yield each when it is done, in any order.
 
-        following: returns the next request, or None if there is none at present; called again after each flight.
+        following: returns the next request, or None for the time being; called again after each flight.
         Raises the `world.errors.PlanflyError` of a flight, and OSError if the scheduler is lost.
         """
         flying: dict[tuple[str, int], FlightRequest] = {}

@@ -383,10 +383,10 @@ def _drawn(seed: int, index: int) -> tuple[Floats, int]:
 
 def _standardise(dispersions: Dispersions, shares: Floats) -> Floats:
     """Convert shares (n, v) of the varying quantities' distributions to standard deviations from the mean, (n, d)."""
-    middles = (np.arange(_QUANTILES) + 0.5) / _QUANTILES
+    quantiles = (np.arange(_QUANTILES) + 0.5) / _QUANTILES
     columns = []
     for k, one in enumerate(dispersions.varying):
-        values = one.values(middles)
+        values = one.values(quantiles)
         if (deviation := float(values.std())) > 0.0:
             columns.append((one.values(shares[:, k]) - values.mean()) / deviation)
     return np.column_stack(columns) if columns else np.zeros((len(shares), 0))

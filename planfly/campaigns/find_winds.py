@@ -141,7 +141,7 @@ class _Search:
         self.directions = [Direction(goal.most, goal.target, numbers, goal.confidence) for _ in range(goal.directions)]
         self.open = list(range(goal.directions))
         # Number of flights of each direction at which it is checked next.
-        self._looked_at = [FEWEST] * goal.directions
+        self._next_check = [FEWEST] * goal.directions
         self.flown: list[tuple[int, float, bool]] = []
         self.lost: list[int] = []
 
@@ -158,16 +158,16 @@ class _Search:
     def _is_open(self, number: int) -> bool:
         direction = self.directions[number]
         count = len(direction.speeds)
-        if count < self._looked_at[number]:
+        if count < self._next_check[number]:
             return True
-        self._looked_at[number] = math.ceil(_CHECK_GROWTH_RATIO * count)
+        self._next_check[number] = math.ceil(_CHECK_GROWTH_RATIO * count)
         return needs_more(direction.boundary(), count, ACCURACY, FEWEST)
 
     def take(self, asked: AskedFlight, flown: FlownFlight) -> None:
         """Add a flight; flights are added in the order in which they were requested."""
         flyable = flown.outcome == "flyable"
-        ways: set[Hashable] = {_way(rule, place) for rule, place in flown.failed} or {flown.outcome}
-        failed = frozenset() if flyable else frozenset(ways)
+        failures: set[Hashable] = {_way(rule, place) for rule, place in flown.failed} or {flown.outcome}
+        failed = frozenset() if flyable else frozenset(failures)
         margin: dict[Hashable, float] | None = {_way(rule, place): share for rule, place, share in flown.narrow}
         if flown.outcome == "lost" or any(rule == "completion" for rule, _ in flown.failed):
             # It is not known which rules the flight would have passed if it had continued.

@@ -36,7 +36,7 @@ class _Book:
             self.decided = self.goal.stops and self.estimator.decides(self.tally)
 
     def following(self) -> FlightRequest | None:
-        """Return the next flight to send, or None if there is none."""
+        """Return the next flight to send, or None if no flight is left."""
         self.sent = max(self.sent, self.tally.flown)
         while self.sent in self.beyond:
             self.sent += 1

@@ -373,11 +373,11 @@ def _interval_text(low: float, high: float, most: float) -> str:
 def _open_lines(found: WindsFound) -> list[str]:
     """Return a line about directions with too few flights, if there are any."""
     counts = Counter(direction for direction, _, _ in found.flights)
-    wanting = [k for k, one in enumerate(found.boundaries) if needs_more(one, counts[k], ACCURACY, FEWEST)]
-    if not wanting:
+    short = [k for k, one in enumerate(found.boundaries) if needs_more(one, counts[k], ACCURACY, FEWEST)]
+    if not short:
         return []
     return [
-        f"not settled: {len(wanting)} of {len(found.boundaries)} directions, for want of flights: each takes"
+        f"not settled: {len(short)} of {len(found.boundaries)} directions, for want of flights: each takes"
         f" {FEWEST} at least, and an interval of {2.0 * ACCURACY:g} m/s; with fewer the interval is mostly assumption"
     ]
 

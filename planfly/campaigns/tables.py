@@ -218,10 +218,10 @@ class LockedTable:
         examined = examine(self._connection, tuple(self._kind.columns), asked, max(asked, self._last() + 1))
         if examined.sound and not examined.damaged:
             return
-        mended = self.path.with_name(f".{self.path.name}.mended")
-        copy_whole(self._connection, mended, self._create(), examined.whole, known)
+        repaired = self.path.with_name(f".{self.path.name}.mended")
+        copy_whole(self._connection, repaired, self._create(), examined.whole, known)
         self._connection.close()
-        mended.replace(self.path)
+        repaired.replace(self.path)
         for ending in ("-wal", "-shm"):
             Path(f"{self.path}{ending}").unlink(missing_ok=True)
         self._connection = sqlite3.connect(self.path, timeout=1.0, isolation_level=None)

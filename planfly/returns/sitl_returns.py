@@ -186,7 +186,7 @@ def fly_by_program(
 ) -> ProgramReturns:
     """Fly at most `points` of the worst returns by ArduPlane, in the mean wind, with exact navigation.
 
-    folder: target of the flight logs, both planfly's and the program's; None writes none.
+    folder: folder for the flight logs of planfly and of the program; None writes no logs.
     Raises FlightError if the program does not start or breaks off.
     """
     flown, version = [], ""
