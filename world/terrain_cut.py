@@ -31,7 +31,7 @@ COPERNICUS = "https://copernicus-dem-30m.s3.amazonaws.com"
 MAX_FETCHED = 25
 # Number of pixels fetched beyond each edge of an area.
 _MARGIN_PIXELS = 5
-# Size of the directory at the beginning of a tile, bytes; the directory of a GLO-30 tile takes 6 kB.
+# Number of bytes fetched first from a tile, which hold its directory; the directory of a GLO-30 tile takes 6 kB.
 _DIRECTORY_BYTES = 2**16
 # WGS 84 with heights above EGM2008.
 _SYSTEM = "EPSG:4326+3855"
