@@ -1,8 +1,8 @@
-"""Several elevation files as one: the tiles of a folder, of a GDAL virtual raster (.vrt), or of a list.
+"""Join several elevation files into one raster: tiles of a folder, a GDAL virtual raster (.vrt), or a list.
 
 All tiles lie on one grid: the same reference system, the same pitch, and pixels that coincide where tiles overlap.
-Ground that no tile covers is a gap.  Of a virtual raster only the names of its files are read: GDAL's own driver would
-open whatever it names, servers and commands included, by any of GDAL's drivers.
+Ground that no tile covers is a gap.  This module only reads the names of the files of a virtual raster: GDAL's driver
+would open everything that it names, including servers and commands, with any driver.
 """
 
 import hashlib
@@ -20,11 +20,11 @@ from world.elevation_formats import MAX_TILES, SUFFIXES, VIRTUAL
 from world.errors import TerrainError
 from world.raster_file import RasterFile, is_ground, moved_grid
 
-# Bytes of a virtual raster at most.
+# Largest size of the file of a virtual raster, bytes.
 _MAX_BYTES = 4 * 2**20
-# Elements by which a virtual raster makes other heights of those of its files.
-_COMPUTING = ("ScaleRatio", "ScaleOffset", "LUT", "Kernel", "PixelFunctionType")
-# Pixels by which a tile may lie off the grid of the first.
+# Elements with which a virtual raster changes the heights of its files.
+_ALTERING_ELEMENTS = ("ScaleRatio", "ScaleOffset", "LUT", "Kernel", "PixelFunctionType")
+# Largest offset of a tile from the grid of the first tile, pixels.
 OFF_GRID = 0.01
 
 
@@ -48,25 +48,25 @@ def tile_files(path: Path) -> list[Path] | None:
 
 
 def _virtual_files(path: Path) -> list[Path]:
-    """Return the files that a virtual raster is made of, all in its folder or below."""
+    """Return the files of a virtual raster; all must be in its folder or below."""
     try:
         if path.stat().st_size > _MAX_BYTES:
             raise TerrainError(f"{path}: a virtual raster has at most {_MAX_BYTES:,} bytes", file=path)
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise TerrainError(f"{path}: cannot be read: {error}", file=path) from error
-    # Entities could name other files, and grow a small file without end.
+    # Entities could name other files, or expand a small file without limit.
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise TerrainError(f"{path}: a document type is declared: not allowed in a virtual raster", file=path)
     try:
-        root = ElementTree.fromstring(text)  # what could grow was refused above
+        root = ElementTree.fromstring(text)  # entities, which could expand, were refused above
     except ElementTree.ParseError as error:
         raise TerrainError(f"{path}: not a virtual raster: {error}", file=path) from error
     sources = [element for element in root.iter("SourceFilename") if element.text]
     if root.tag != "VRTDataset" or not sources:
         raise TerrainError(f"{path}: not a virtual raster of other files: SourceFilename is missing", file=path)
     for element in root.iter():
-        computes = element.get("subClass") or (element.tag if element.tag in _COMPUTING else None)
+        computes = element.get("subClass") or (element.tag if element.tag in _ALTERING_ELEMENTS else None)
         if computes is not None:
             raise TerrainError(f"{path}: {computes} computes its pixels: only a mosaic of files is read", file=path)
     found, folder = [], os.path.normpath(path.parent.absolute())
@@ -84,9 +84,9 @@ def _virtual_files(path: Path) -> list[Path]:
 
 
 def joined(tiles: Sequence[RasterFile], name: str) -> RasterFile:
-    """Join tiles into one raster.  name: in messages.
+    """Join tiles into one raster.  name: used in messages.
 
-    Where tiles overlap, the first that has data counts.  Raises TerrainError for tiles that are not on one grid.
+    Where tiles overlap, the first tile with data is used.  Raises TerrainError for tiles that are not on one grid.
     """
     first = tiles[0]
     if len(tiles) == 1:

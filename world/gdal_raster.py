@@ -1,7 +1,7 @@
-"""Elevation files that GDAL reads through rasterio, GeoTIFF and SRTM tiles, and GeoTIFF files that it writes.
+"""Read GeoTIFF and SRTM tiles with GDAL through rasterio, and write GeoTIFF files.
 
-GDAL knows some 150 formats, among them lists of other files and addresses of servers.  Each file here is opened by the
-one driver that it is for, by its absolute path, and with `GUARD`: GDAL then reads this file and no other.
+GDAL knows some 150 formats, among them lists of other files and addresses of servers.  This module opens
+each file with one driver only, by its absolute path, and with `GUARD`: GDAL then reads this file and no other.
 """
 
 import math
@@ -20,27 +20,28 @@ from world.errors import TerrainError
 from world.frames import crs_transformer, height_unit, is_geographic, transform_points, wkt_of
 from world.raster_file import Grid, RasterFile, file_sha256, longitude_near, one_line, outline, refuse_few_pixels
 
-# Options of GDAL: read the one file, and nothing that lies beside it or is named in it.
+# Options of GDAL: read this file alone, no file next to it, and no file that is named in it.
 GUARD: dict[str, Any] = {
     "GDAL_PAM_ENABLED": "NO",
     "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
     "GTIFF_GEOREF_SOURCES": "INTERNAL",
     "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
-    # The vertical part of the reference system too, for its unit and its datum.
+    # Report the vertical part of the reference system too, for its unit and its datum.
     "GTIFF_REPORT_COMPD_CS": "YES",
-    # Unpacked blocks that are kept, bytes; the default is a share of the machine's memory.
+    # Cache for unpacked blocks, bytes; the default is a share of the machine's memory.
     "GDAL_CACHEMAX": 16 * 2**20,
 }
-# A block is unpacked whole, however small the window: larger ones (here, 128 MiB of float32) are refused.
+# Largest number of pixels of a block (128 MiB of float32): GDAL unpacks whole blocks, even for a small window.
 MAX_BLOCK_PIXELS = 32 * 2**20
-# Pixels of a window that are read at a time: numbers and masks take several times the memory of the heights.
+# Number of pixels of a window read in one step: reading takes several times the memory of the heights.
 PIXELS_AT_ONCE = 2**22
 
+# Names of a unit that mean metres.
 METRES = ("m", "metre", "metres", "meter", "meters")
-# Words of a unit that are feet.
-_FEET = {"ft", "feet", "foot", "ftus", "usft"}
-# Words in the name of a tag whose unit is one of distances, not of heights.
-_HORIZONTAL = re.compile(r"horiz|linear|planar|xy", re.IGNORECASE)
+# Names of a unit that mean feet.
+_FOOT_NAMES = {"ft", "feet", "foot", "ftus", "usft"}
+# Words in the name of a tag with the unit of distances, not of heights.
+_HORIZONTAL_TAG = re.compile(r"horiz|linear|planar|xy", re.IGNORECASE)
 
 
 def open_geotiff(file: Path, _name: str) -> RasterFile:
@@ -54,8 +55,8 @@ def open_hgt(file: Path, _name: str) -> RasterFile:
     return _open(file, "SRTMHGT", f"not a readable SRTM tile: {expected}")
 
 
-def _dataset(file: Path, driver: str) -> Any:
-    """Open a file in GDAL, by one driver; in `GUARD` alone."""
+def _open_dataset(file: Path, driver: str) -> Any:
+    """Open a file in GDAL with one driver; call it inside `GUARD` only."""
     import rasterio
 
     return rasterio.open(os.fspath(file.resolve()), driver=driver)
@@ -67,9 +68,9 @@ def _open(file: Path, driver: str, unreadable: str) -> RasterFile:
 
     try:
         with warnings.catch_warnings(), rasterio.Env(**GUARD):
-            # Of a file without a place GDAL would give columns and rows.
+            # For a file without a place on Earth, GDAL would return columns and rows.
             warnings.simplefilter("error", NotGeoreferencedWarning)
-            with _dataset(file, driver) as source:
+            with _open_dataset(file, driver) as source:
                 _refuse_layout(file, source)
                 shape, grid = (source.height, source.width), tuple(source.transform)[:6]
                 scale, crs = (source.scales[0], source.offsets[0]), _crs_of(file, driver, source)
@@ -78,30 +79,30 @@ def _open(file: Path, driver: str, unreadable: str) -> RasterFile:
     except NotGeoreferencedWarning:
         _refuse_unplaced(file)
     except (RasterioError, ValueError, TypeError, OSError) as error:
-        raise TerrainError(f"{file}: {unreadable}: {_cause(error)}", file=file) from error
+        raise TerrainError(f"{file}: {unreadable}: {_first_error_line(error)}", file=file) from error
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
         try:
-            with rasterio.Env(**GUARD), _dataset(file, driver) as source:
+            with rasterio.Env(**GUARD), _open_dataset(file, driver) as source:
                 heights = _read_strips(source, (top, bottom, left, right), *scale)
                 if unwritten:
                     _clear_unwritten(source, heights, top, left)
                 return heights
         except (RasterioError, OSError) as error:
-            raise TerrainError(f"{file}: cannot be read: {_cause(error)}", file=file) from error
+            raise TerrainError(f"{file}: cannot be read: {_first_error_line(error)}", file=file) from error
 
     return _place(file, shape, grid, crs, unit, read)
 
 
-def _cause(error: BaseException) -> str:
-    """Return the first error's text in a line: rasterio's own says to see the previous one."""
+def _first_error_line(error: BaseException) -> str:
+    """Return the text of the first error in a line: the text of the last one only refers to the previous error."""
     while error.__cause__ is not None:
         error = error.__cause__
     return one_line(error)
 
 
 def _refuse_layout(file: Path, source: Any) -> None:
-    """Raise TerrainError for other than one band of real numbers in blocks that can be unpacked."""
+    """Raise TerrainError unless the file has one band of real numbers in blocks that are small enough to unpack."""
     kind = np.dtype(source.dtypes[0]).kind
     if source.count != 1 or kind not in "iuf":
         allowed = "an elevation file has 1 band of numbers"
@@ -121,25 +122,29 @@ def _refuse_unplaced(file: Path) -> NoReturn:
 
 
 def _crs_of(file: Path, driver: str, source: Any) -> str | None:
-    """Return the reference system of an open file as WKT; None where it has none."""
+    """Return the reference system of an open file as WKT; None if it has none."""
     import rasterio
 
     if source.crs is None:
         return None
     found = source.crs.to_wkt(version="WKT2_2019")
-    # Of a three-dimensional system in a file of GeoTIFF 1.0 GDAL drops the height, but for EPSG's own definition.
-    with rasterio.Env(GTIFF_SRS_SOURCE="EPSG"), _dataset(file, driver) as by_code:
+    # GDAL drops the height axis of a three-dimensional system in a GeoTIFF 1.0 file, unless it takes EPSG's definition.
+    with rasterio.Env(GTIFF_SRS_SOURCE="EPSG"), _open_dataset(file, driver) as by_code:
         has_height = "CS[ellipsoidal,3]" in by_code.crs.to_wkt(version="WKT2_2019")
     return wkt_of(found, with_height=has_height)
 
 
 def _unit_of(unit: str, tags: Iterable[tuple[str, str]]) -> str:
-    """Return the unit of a file's heights: its band's, or feet that a tag of file or band names; "" for none.
+    """Return the unit of a file's heights: the unit of its band, or feet if a tag says so; "" if not stated.
 
-    GDAL takes what other programs write as a tag for a remark, and gives the heights in metres, which they are not.
+    GDAL treats the tags of other programs as remarks, and would report such heights as metres although they are feet.
     """
     for key, value in tags:
-        if "unit" in key.lower() and not _HORIZONTAL.search(key) and _FEET & set(re.split("[^a-z]+", value.lower())):
+        if (
+            "unit" in key.lower()
+            and not _HORIZONTAL_TAG.search(key)
+            and _FOOT_NAMES & set(re.split("[^a-z]+", value.lower()))
+        ):
             return f"{value} (tag {key})"
     return unit
 
@@ -172,7 +177,7 @@ def _place(file: Path, shape: tuple[int, int], grid: Grid, crs: str | None, unit
         lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")
         return np.asarray(lon), np.asarray(lat)
 
-    # A damaged place may be larger than numbers are.
+    # The coordinates of a damaged file may overflow.
     with np.errstate(all="ignore"):
         corners = np.stack(to_place(*outline(cols, rows)), axis=1)
     if not (np.isfinite(corners).all() and np.abs(corners[:, 1]).max() <= 90.0):
@@ -185,21 +190,21 @@ def _place(file: Path, shape: tuple[int, int], grid: Grid, crs: str | None, unit
 
 
 def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, offset: float) -> NDArray[np.float32]:
-    """Return the heights of a window (top, bottom, left, right), some rows at a time; NaN where it has no data."""
+    """Return the heights of a window (top, bottom, left, right), read a few rows at a time; NaN without data."""
     top, bottom, left, right = window
     heights = np.empty((bottom - top, right - left), dtype=np.float32)
     at_once = max(1, PIXELS_AT_ONCE // (right - left))
     for row in range(top, bottom, at_once):
         rows = min(at_once, bottom - row)
         strip = source.read(1, window=((row, row + rows), (left, right)), masked=True)
-        # Numbers that a damaged file holds need not fit.
+        # Numbers in a damaged file may overflow.
         with np.errstate(all="ignore"):
             heights[row - top : row - top + rows] = np.ma.filled(strip.astype(np.float64), np.nan) * scale + offset
     return heights
 
 
 def _clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: int) -> None:
-    """Put NaN where a GeoTIFF has no block: GDAL reads 0 there if the file states no value for missing data."""
+    """Set missing blocks of a GeoTIFF to NaN: GDAL reads 0 there if the file states no value for missing data."""
     rows, cols = source.block_shapes[0]
     bottom, right = top + len(heights), left + heights.shape[1]
     for down in range(top // rows, -(-bottom // rows)):
@@ -222,7 +227,7 @@ def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple
     top, bottom, left, right = window
     if top >= bottom or left >= right:
         return
-    with rasterio.Env(**GUARD), _dataset(file, "GTiff") as source:
+    with rasterio.Env(**GUARD), _open_dataset(file, "GTiff") as source:
         rows, cols = source.block_shapes[0]
         for down in range(top // rows, -(-bottom // rows)):
             for across in range(left // cols, -(-right // cols)):
@@ -235,7 +240,7 @@ def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple
 
 
 def geotiff_bytes(heights: NDArray[np.float32], grid: Grid, crs: str, nodata: float) -> bytes:
-    """Return a GeoTIFF of heights in metres, packed by deflate.  crs: as PROJ takes it."""
+    """Return a GeoTIFF of heights in metres, packed by deflate.  crs: a definition that PROJ accepts."""
     import rasterio
     from rasterio.io import MemoryFile
 

@@ -1,8 +1,8 @@
-"""Elevation files: opened and checked, and read as a window at source resolution.
+"""Open and check elevation files, and read a window of them at source resolution.
 
-`world.elevation_formats.FORMATS` lists the formats.  One is chosen by the file's first bytes or by its suffix, and its
-driver is explicit, so that nothing that merely names another file (VRT, a URL, a `/vsi` path) is ever opened.
-`world.height_datum` says what its heights count from; as terrain they count from mean sea level.
+`world.elevation_formats.FORMATS` lists the formats.  The format is chosen by the file's first bytes or by its suffix,
+and its driver is explicit, so that nothing that merely names another file (VRT, a URL, a `/vsi` path) is ever opened.
+`world.height_datum` determines the vertical datum of a file; the heights of a terrain are above mean sea level.
 """
 
 import lzma
@@ -37,21 +37,22 @@ from world.raster_file import (
 )
 from world.terrain import Terrain
 
-# A window with more pixels than this, or a file of more that is read as one array, is refused.
+# Largest number of pixels of a window, or of a file that is read as one array; more are refused.
 MAX_PIXELS = 120_000_000
+# Folder of the embedded elevation files.
 _OWN_FILES = Path(__file__).parent / "elevation"
-# What zipfile raises, beside others, for a damaged file.
+# Errors that zipfile raises for a damaged file, among others.
 _UNZIP_ERRORS = (zipfile.BadZipFile, zlib.error, lzma.LZMAError)
 
 
 # ----------------------------------------------------------------------
-# What every format has to be.
+# Checks for all formats.
 
 
 def grid_in_degrees(
     file: Path, name: str, heights: NDArray[np.generic], edges: tuple[float, float, float, float]
 ) -> RasterFile:
-    """A file whose heights were read as one array, rows from north to south, on a grid of longitudes and latitudes.
+    """Make a raster of heights in one array, rows from north to south, on a grid of longitudes and latitudes.
 
     edges: west, east, south and north edge of the outermost pixels, deg.
 
@@ -84,19 +85,20 @@ def grid_in_degrees(
 
 
 # ----------------------------------------------------------------------
-# The .npz form.
+# The .npz format.
 
-# Rows of the tile that we ship (matplotlib does, too), and what it states as xmin, xmax, ymin and ymax, deg; a copy of
-# it under another name is known by them, to a hundredth of a pixel.
-_TILE_ROWS = 344
-_TILE_EDGES = (-84.41375, -84.07791667, 36.73291667, 36.44625)
-_SAME_EDGE = 1e-5
+# Number of rows of the tile that planfly ships (matplotlib ships it, too).
+_SHIPPED_TILE_ROWS = 344
+# The values of xmin, xmax, ymin and ymax in that tile, deg; they identify a copy of it under another name.
+_SHIPPED_TILE_EDGES_DEG = (-84.41375, -84.07791667, 36.73291667, 36.44625)
+# Tolerance of these values: about a hundredth of a pixel, deg.
+_SHIPPED_TILE_TOLERANCE_DEG = 1e-5
 
 
 def open_npz(file: Path, name: str) -> RasterFile:
     """Open an .npz with `elevation` (rows from north to south) and xmin, xmax, ymin, ymax: pixel edges in degrees.
 
-    The order within each pair does not matter, but for the tile that we ship: see `_edges`.
+    The order within each pair does not matter, except in the tile that planfly ships: see `_edges`.
     Raises TerrainError.
     """
     heights, edges = _read_npz(file, name)
@@ -108,17 +110,20 @@ def open_npz(file: Path, name: str) -> RasterFile:
 
 
 def _edges(stated: list[float], rows: int) -> tuple[float, float, float, float]:
-    """West, east, south and north edge, deg, of what a file states as xmin, xmax, ymin, ymax.
+    """Return the west, east, south and north edges, deg, from a file's xmin, xmax, ymin, ymax.
 
-    In the tile of 344 rows that we ship ymax, 36.44625, is the north edge, and ymin, 36.73292, is that plus the tile's
-    height where it should be less: read as south and north edge the tile stands 0.28667 degrees too far north.  So the
-    ground says: the highest pixel lies 0.2479 degrees south of the tile's north edge, and Cross Mountain, as high, at
+    In the shipped tile of 344 rows, ymax, 36.44625, is the north edge.  Its ymin, 36.73292, is the north edge plus the
+    tile's extent in latitude; it should be the north edge minus that extent.  Read as south and north edge, they place
+    the tile 0.28667 degrees too far north.  The ground confirms this.
+    The highest pixel lies 0.2479 degrees south of the tile's north edge, and Cross Mountain, of the same height, at
     36.1983 N; the lake ends 0.2208 degrees south of it, and Norris Dam stands at 36.2242 N (both places:
     https://en.wikipedia.org/wiki/Cross_Mountain_(Tennessee), https://en.wikipedia.org/wiki/Norris_Dam).
     """
     west, east = sorted(stated[:2])
     south, north = sorted(stated[2:])
-    if rows == _TILE_ROWS and np.allclose(stated, _TILE_EDGES, rtol=0.0, atol=_SAME_EDGE):
+    if rows == _SHIPPED_TILE_ROWS and np.allclose(
+        stated, _SHIPPED_TILE_EDGES_DEG, rtol=0.0, atol=_SHIPPED_TILE_TOLERANCE_DEG
+    ):
         south, north = south - (north - south), south
     return west, east, south, north
 
@@ -128,7 +133,7 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
     edges = ("xmin", "xmax", "ymin", "ymax")
     try:
         with zipfile.ZipFile(file) as archive:
-            # A few kilobytes of zeros unpack to gigabytes: ask before unpacking.
+            # A few kilobytes of zeros unpack to gigabytes: check the size before unpacking.
             size = max((entry.file_size for entry in archive.infolist()), default=0)
         if size > 8 * MAX_PIXELS:
             allowed = f"at most {8 * MAX_PIXELS:,} are read"
@@ -152,16 +157,16 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
 
 
 # ----------------------------------------------------------------------
-# A file of any format.
+# Open a file of any format.
 
-# Functions that open a file by its path and the path as it was given.
+# Function for each format that opens a file, from its path and the path as the user gave it.
 _OPENERS: dict[str, Callable[[Path, str], RasterFile]] = {".tif": open_geotiff, ".hgt": open_hgt, ".npz": open_npz}
 
 
 def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None = None) -> RasterFile:
-    """Open an elevation file, a folder or .vrt of tiles, or an embedded name.  Relative paths count from ``base``.
+    """Open an elevation file, a folder or .vrt of tiles, or an embedded name.  Relative paths start at ``base``.
 
-    datum: what its heights count from, where that is stated; None takes what the file says.
+    datum: the vertical datum of the heights; None takes the datum that the file states.
     Raises TerrainError for anything that is not a file of one band in one of `world.elevation_formats.FORMATS`, and for
     heights above an ellipsoid that this machine cannot convert.
 
@@ -199,9 +204,9 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
 
 
 def open_tiles(paths: Sequence[str], base: Path | None = None, datum: StatedDatum | None = None) -> RasterFile:
-    """Open one elevation file, as `open_raster` does, or several on one grid as one.
+    """Open one elevation file, as `open_raster` does, or join several files on one grid.
 
-    Where they overlap, the first that has data counts.  Raises TerrainError as `open_raster` does.
+    Where they overlap, the first file with data is used.  Raises TerrainError as `open_raster` does.
 
     >>> open_tiles(["jacksboro", "jacksboro"]).name
     'jacksboro and 1 more'
@@ -230,19 +235,19 @@ def _listed(words: Sequence[str]) -> str:
 # ----------------------------------------------------------------------
 # Windows of a raster as terrain.
 
-# Worst error allowed for the polynomial from map to pixels, in pixels.
+# Largest allowed error of the polynomial from map to pixels, in pixels.
 PIXEL_TOLERANCE = 1e-3
-# Places along each side of a window at which mean sea level is looked up.
-_SEA_LEVELS = 200
-# Pixels without data that are looked at before the next ones: one inside the area is enough.
-_HOLES_AT_ONCE = 2**16
+# Number of places along each side of a window at which mean sea level is sampled.
+_SEA_LEVEL_SAMPLES = 200
+# Number of pixels without data checked in one step: one inside the area is enough to refuse it.
+_HOLES_PER_STEP = 2**16
 
 
 def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffer: float) -> Terrain:
-    """Read the window of ``raster`` over map bounds [[e0, e1], [n0, n1]] and a buffer about them, m, as `Terrain`.
+    """Read the window of ``raster`` over map bounds [[e0, e1], [n0, n1]] and a buffer around them, m, as `Terrain`.
 
-    Raises TerrainError where the bounds reach beyond the tile, where data is missing inside them, or where
-    the window is too large.  The buffer is cut at the tile's edge in silence.
+    Raises TerrainError if the bounds reach beyond the tile, if data is missing inside them, or if the window is too
+    large.  The buffer is cut at the tile's edge without a message.
 
     >>> raster = open_raster("jacksboro")
     >>> terrain = read_terrain(raster, raster.centre, [[-500.0, 500.0], [-500.0, 500.0]], 100.0)
@@ -270,7 +275,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
         )
     heights = raster.read(top, bottom, left, right)
     heights[~is_ground(heights)] = np.nan
-    _count_from_sea_level(heights, raster, top, left)
+    _convert_to_sea_level(heights, raster, top, left)
     to_pixel = fit_polymap(
         lambda e, n: _shifted(raster.to_source, origin, e, n, left, top),
         box + np.array([-buffer, buffer]),
@@ -304,16 +309,17 @@ def is_covered(raster: RasterFile, origin: GeoOrigin, box: Floats) -> bool:
     return not (e0 < -1e-6 or n0 < -1e-6 or e1 > cols - 1 + 1e-6 or n1 > rows - 1 + 1e-6)
 
 
-def _count_from_sea_level(heights: NDArray[np.float32], raster: RasterFile, top: int, left: int) -> None:
-    """Convert a window's heights in place; it begins at this row and column of the file.
+def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top: int, left: int) -> None:
+    """Convert the heights of a window to heights above mean sea level, in place.
 
-    Mean sea level is taken at places between which it is as good as a plane.
-    Raises TerrainError where it is not known.
+    top, left: first row and column of the window in the file.
+    Mean sea level is sampled at places so close together that it is nearly a plane between them.
+    Raises TerrainError if mean sea level is not known there.
     """
     if raster.datum.sea_level is None:
         return
     rows, cols = (begin + np.arange(size) for begin, size in zip((top, left), heights.shape, strict=True))
-    row, col = (np.linspace(every[0], every[-1], min(len(every), _SEA_LEVELS)) for every in (rows, cols))
+    row, col = (np.linspace(every[0], every[-1], min(len(every), _SEA_LEVEL_SAMPLES)) for every in (rows, cols))
     across, down = np.meshgrid(col, row)
     lon, lat = raster.to_place(across.ravel(), down.ravel())
     level = raster.datum.sea_level(lon, lat)
@@ -333,20 +339,20 @@ def _count_from_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
 
 
 def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
-    """Raise TerrainError if a pixel without data takes part in a height inside the box.
+    """Raise TerrainError if a pixel without data contributes to a height inside the box.
 
-    per_metre: (2, 2) columns and rows per metre of the map, in the middle of the box.
+    per_metre: (2, 2) columns and rows per metre of the map, in the center of the box.
     """
     rows, cols = np.nonzero(np.isnan(terrain.heights))
     if not rows.size:
         return
     to_map_metres = np.linalg.inv(per_metre)
-    # A height is made of the four pixels around it.
+    # Each height is interpolated from the four pixels around it.
     footprint = np.abs(to_map_metres).sum(axis=1)[:, None]
-    for first in range(0, rows.size, _HOLES_AT_ONCE):
-        part = slice(first, first + _HOLES_AT_ONCE)
+    for first in range(0, rows.size, _HOLES_PER_STEP):
+        part = slice(first, first + _HOLES_PER_STEP)
         wanted = np.stack([cols[part], rows[part]]).astype(np.float64)
-        # Newton's method with one slope: the map is affine but for a few metres over the box.
+        # Newton's method with a constant slope: the map deviates from an affine map by only a few metres over the box.
         place = np.repeat(box.mean(axis=1)[:, None], wanted.shape[1], axis=1)
         for _ in range(8):
             place += to_map_metres @ (wanted - np.stack(terrain.to_pixel(place[0], place[1])))
@@ -363,7 +369,7 @@ def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
 def _outline_window(
     raster: RasterFile, origin: GeoOrigin, box: Floats, buffer: float
 ) -> tuple[float, float, float, float]:
-    """Range of cols and rows that the outline of a map box takes: (col0, col1, row0, row1)."""
+    """Return the range of columns and rows that the outline of a map box covers: (col0, col1, row0, row1)."""
     ramp = np.linspace(0.0, 1.0, 41)
     (w, e), (s, n) = box + np.array([-buffer, buffer])
     east = np.concatenate([w + ramp * (e - w), w + ramp * (e - w), np.full(41, w), np.full(41, e)])
@@ -383,7 +389,7 @@ def _shifted(
 def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
     """Return the largest upright map box inside the tile, [[e0, e1], [n0, n1]] m, to half a percent.
 
-    Raises TerrainError where there is none.
+    Raises TerrainError if no box fits.
 
     >>> raster = open_raster("jacksboro")
     >>> tile_bounds(raster, raster.centre).round(-2).tolist()
@@ -407,7 +413,7 @@ def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
 
 
 def cover_text(raster: RasterFile) -> str:
-    """Return which degrees the tile reaches from and to, for messages.
+    """Return the range of latitude and longitude of the tile, for messages.
 
     >>> cover_text(open_raster("jacksboro"))
     'latitude 36.160..36.446, longitude -84.413..-84.078'

@@ -1,4 +1,4 @@
-"""An elevation file that was opened and checked: its grid, its place on Earth and its heights, read as windows."""
+"""Opened and checked elevation file: its grid, its place on Earth and its heights, read as windows."""
 
 import hashlib
 from collections.abc import Callable
@@ -18,25 +18,26 @@ ToSource = Callable[[Floats, Floats], tuple[Floats, Floats]]
 Grid = tuple[float, ...]
 ReadWindow = Callable[[int, int, int, int], NDArray[np.float32]]
 
-# Values that stand for missing data where a file states none.
+# Values that mark missing data in files that do not state one.
 UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
-# Range of ground on Earth; heights beyond it are missing data.
+# Lower end of the range of ground on Earth, m; heights outside the range are missing data.
 LOWEST_GROUND_M = -12_000.0
+# Upper end of this range, m.
 HIGHEST_GROUND_M = 9000.0
 
 
 @dataclass(frozen=True, slots=True)
 class RasterFile:
-    """An elevation file that was opened and understood, not yet read.
+    """Elevation file that was opened and checked; its heights are not read yet.
 
-    to_source: longitude, latitude (deg) to fractional (col, row) of pixel centres; to_place: the other way.
+    to_source: from longitude, latitude (deg) to fractional (col, row) of pixel centres; to_place: the inverse.
     shape: (rows, cols).
     corners: (n, 2) longitude, latitude along the outline of the pixel centres, deg.
-    grid: affine coefficients (a, b, c, d, e, f) from columns and rows of pixel corners to the reference system, degrees
-    where there is none.
+    grid: affine coefficients (a, b, c, d, e, f) from columns and rows of pixel corners to the reference
+        system; to degrees if the file has none.
     read: rows and columns (top, bottom, left, right), half-open, to a float32 block with NaN for missing data, heights
-    as the file has them.
-    crs: the file's reference system as WKT; None where it has none.
+    as stored in the file.
+    crs: the file's reference system as WKT; None if it has none.
     datum: the surface that the heights are measured from.
     """
 
@@ -53,7 +54,7 @@ class RasterFile:
 
     @property
     def centre(self) -> GeoOrigin:
-        """The middle of the tile, its longitude in -180..180 also where the tile lies across the 180th meridian."""
+        """The center of the tile, with a longitude in -180..180 even if the tile lies across the 180th meridian."""
         lat = (self.corners[:, 1].min() + self.corners[:, 1].max()) / 2
         lon = longitude_near(self.corners[:, 0], float(self.corners[0, 0]))
         return GeoOrigin(float(lat), float(longitude_near((lon.min() + lon.max()) / 2, 0.0)))
@@ -70,7 +71,7 @@ def is_ground(heights: NDArray[np.float32]) -> NDArray[np.bool_]:
 
 
 def longitude_near(lon: NDArray[np.float64] | float, middle: float) -> Floats:
-    """Return the same longitudes (deg) within 180 degrees of ``middle``; one that is there already is unchanged."""
+    """Shift longitudes (deg) to within 180 degrees of ``middle``; longitudes within that range are unchanged."""
     return np.asarray(lon - 360.0 * np.round((np.asarray(lon) - middle) / 360.0))
 
 
@@ -84,7 +85,7 @@ def outline(cols: int, rows: int) -> tuple[Floats, Floats]:
 
 
 def moved_grid(grid: Grid, rows: int, cols: int) -> Grid:
-    """Return the grid whose first pixel lies ``rows`` and ``cols`` further on.
+    """Return the grid with its first pixel moved by ``rows`` and ``cols``.
 
     >>> moved_grid((30.0, 0.0, 400.0, 0.0, -30.0, 900.0), 1, 2)
     (30.0, 0.0, 460.0, 0.0, -30.0, 870.0)
@@ -94,7 +95,7 @@ def moved_grid(grid: Grid, rows: int, cols: int) -> Grid:
 
 
 def refuse_few_pixels(name: str | Path, shape: tuple[int, int]) -> None:
-    """Raise TerrainError for fewer rows or columns than heights can be interpolated between."""
+    """Raise TerrainError for too few rows or columns to interpolate heights."""
     if min(shape) < 2:
         raise TerrainError.at(name, "rows, columns", shape, "at least 2 x 2 pixels are expected")
 
@@ -106,5 +107,5 @@ def file_sha256(path: Path) -> str:
 
 
 def one_line(error: BaseException) -> str:
-    """Return the first line of an error's text, or its type where it has none."""
+    """Return the first line of an error's text, or its type if the text is empty."""
     return str(error).splitlines()[0] if str(error) else type(error).__name__

@@ -1,10 +1,11 @@
-"""Parts of a file on a web server, kept on this machine: what was fetched once is not fetched again.
+"""Fetch parts of a file on a web server, and keep them on this machine so that each is fetched only once.
 
-The copy has the file's full size and holes where nothing was fetched yet; which bytes it holds stands in a file beside
-it.  A part counts when as many bytes have come as were asked for, of the version of the file that was met first.
+The copy has the full size of the file, with holes where nothing was fetched yet; a notes file next to it lists the
+bytes that it holds.  A part is complete when all requested bytes have arrived, from the version of the file that was
+found first.
 
-GDAL can read such files itself (``/vsicurl``), and does not take the place of this: it keeps nothing for the next
-command, does not tell that a file has changed, and does not end with Ctrl-C while a server is silent.
+GDAL can read such files itself (``/vsicurl``), but cannot replace this module: it keeps nothing for the next
+command, does not report that a file has changed, and does not stop on Ctrl-C while a server is silent.
 """
 
 import http.client
@@ -24,32 +25,34 @@ from pathlib import Path
 from world.errors import TerrainError
 from world.files import write_whole
 
-# s without an answer; tries of a request, and the pause before the second, which doubles.
-_PATIENCE = 30.0
-_TRIES = 3
+# Timeout for an answer, s.
+_ANSWER_TIMEOUT_S = 30.0
+# Number of attempts of a request.
+_MAX_ATTEMPTS = 3
+# Pause before the second attempt, s; it doubles with each further one.
 _PAUSE = 0.5
-# Bytes that are written at a time.
-_AT_ONCE = 2**18
-# A file is refused beyond this, bytes: a tile of GLO-30 has some 40 MB.
+# Number of bytes written in one step.
+_CHUNK_BYTES = 2**18
+# Largest size of a file, bytes; larger files are refused.  A GLO-30 tile has about 40 MB.
 MAX_BYTES = 2**29
-# Answers of a server that say that there is no such file.  403 is none: a proxy or a limit of requests says so, too.
-_ABSENT = (404, 410)
-# Of these a server may have recovered the next time.
-_PASSING = (408, 425, 429, 500, 502, 503, 504)
+# Status codes that mean that there is no such file; not 403, which proxies and request limits send, too.
+_ABSENT_STATUSES = (404, 410)
+# Status codes of temporary errors: the next attempt may succeed.
+_TEMPORARY_STATUSES = (408, 425, 429, 500, 502, 503, 504)
 
 Fetched = Callable[[int], None]
 
 
-class _Unfinished(Exception):
-    """An answer that is not what was asked for; the text says how."""
+class _IncompleteAnswer(Exception):
+    """An answer does not contain what was requested; the message says why."""
 
 
 @dataclass(slots=True)
 class RemoteFile:
-    """A file on a server, and its copy.
+    """File on a server, and its copy.
 
-    size: bytes.  version: its ETag, or when it was changed; "" where the server says neither.
-    held: parts of the copy that are there, [begin, end), and the SHA-256 of each.
+    size: bytes.  version: its ETag, or when it was changed; "" if the server states neither.
+    held: the parts that the copy holds, [begin, end), and the SHA-256 of each.
     """
 
     url: str
@@ -59,7 +62,7 @@ class RemoteFile:
     held: dict[tuple[int, int], str] = field(default_factory=dict)
 
     def missing(self, begin: int, end: int) -> list[tuple[int, int]]:
-        """Return parts of [begin, end) that are not there yet.
+        """Return the parts of [begin, end) that the copy does not hold yet.
 
         >>> RemoteFile("", 100, "", Path("a"), {(10, 20): "", (30, 40): ""}).missing(15, 50)
         [(20, 30), (40, 50)]
@@ -74,73 +77,79 @@ class RemoteFile:
         return [(low, high) for low, high in found if low < high]
 
     def fetch(self, begin: int, end: int, fetched: Fetched = lambda _: None) -> None:
-        """Have [begin, end) in the copy.  fetched: told of bytes as they come.  Raises TerrainError."""
+        """Fetch the missing parts of [begin, end).
+
+        fetched: called with the number of bytes of each chunk.
+        Raises TerrainError.
+        """
         for low, high in self.missing(begin, min(end, self.size)):
-            for attempt in range(_TRIES):
+            for attempt in range(_MAX_ATTEMPTS):
                 try:
                     self._get(low, high, fetched)
                     break
-                except (_Unfinished, OSError, ValueError, http.client.HTTPException) as error:
-                    if attempt == _TRIES - 1 or not _may_pass(error):
-                        raise TerrainError(f"{self.url}: cannot be fetched: {_why(error)}", file=self.url) from error
+                except (_IncompleteAnswer, OSError, ValueError, http.client.HTTPException) as error:
+                    if attempt == _MAX_ATTEMPTS - 1 or not _is_temporary(error):
+                        raise TerrainError(
+                            f"{self.url}: cannot be fetched: {_error_text(error)}", file=self.url
+                        ) from error
                     time.sleep(_PAUSE * 2.0**attempt)
 
     def _get(self, begin: int, end: int, fetched: Fetched) -> None:
         headers = {"Range": f"bytes={begin}-{end - 1}"} | ({"If-Range": self.version} if self.version else {})
         with _open(self.url, headers) as answer:
             if answer.status == 200:
-                # A server that gives no parts gives all; one whose file has changed, too.
+                # A server without range requests sends the whole file; so does a server whose file has changed.
                 if _length(answer) != self.size or _version(answer) != self.version:
-                    raise _Unfinished("it has changed since it was begun: try again")
+                    raise _IncompleteAnswer("it has changed since it was begun: try again")
                 begin, end = 0, self.size
             elif answer.headers.get("Content-Range") != f"bytes {begin}-{end - 1}/{self.size}":
-                raise _Unfinished(f"the server answers with {answer.headers.get('Content-Range')!r}")
+                raise _IncompleteAnswer(f"the server answers with {answer.headers.get('Content-Range')!r}")
             with self.copy.open("r+b") as file:
                 file.seek(begin)
                 at, digest = begin, sha256()
-                while at < end and (part := answer.read(min(_AT_ONCE, end - at))):
+                while at < end and (part := answer.read(min(_CHUNK_BYTES, end - at))):
                     file.write(part)
                     digest.update(part)
                     at += len(part)
                     fetched(len(part))
                 file.flush()
-                # What is noted as there is there, also after a power cut.
+                # The bytes are on the disk before the notes list them, even if the power fails.
                 os.fsync(file.fileno())
             if at > begin:
                 self.held[begin, at] = digest.hexdigest()
                 write_whole(_notes(self.copy), json.dumps([[*part, text] for part, text in self.held.items()]))
             if at < end:
-                raise _Unfinished(f"{at - begin:,} of {end - begin:,} bytes came")
+                raise _IncompleteAnswer(f"{at - begin:,} of {end - begin:,} bytes came")
 
     def forget(self) -> None:
-        """Begin again with an empty copy.  Raises OSError."""
+        """Start over with an empty copy.  Raises OSError."""
         _notes(self.copy).unlink(missing_ok=True)
         self.held = {}
-        # A file of its own, so that another process that reads the old one keeps that.
+        # A new file, so that another process that reads the old one can go on.
         with tempfile.NamedTemporaryFile(dir=self.copy.parent, delete=False) as file:
             os.truncate(file.fileno(), self.size)
         Path(file.name).replace(self.copy)
 
 
 def find_remote(url: str, folder: Path) -> RemoteFile | None:
-    """Return a file on a server and what the cache has of it; None where the server has no such file.
+    """Return a file on a server with its copy in the cache; None if the server has no such file.
 
-    Raises TerrainError where the server cannot be reached, and OSError where the cache cannot be written.
+    Raises TerrainError if the server cannot be reached, and OSError if the cache cannot be written.
     """
     answer: http.client.HTTPResponse | None = None
-    for attempt in range(_TRIES):
+    for attempt in range(_MAX_ATTEMPTS):
         try:
             with _open(url, {}, "HEAD") as answer:
                 size, version = _length(answer), _version(answer)
             break
         except urllib.error.HTTPError as error:
-            if error.code in _ABSENT:
+            if error.code in _ABSENT_STATUSES:
                 return None
-            if attempt == _TRIES - 1 or not _may_pass(error):
-                raise TerrainError(f"{url}: cannot be fetched: {_why(error)}", file=url) from error
+            if attempt == _MAX_ATTEMPTS - 1 or not _is_temporary(error):
+                raise TerrainError(f"{url}: cannot be fetched: {_error_text(error)}", file=url) from error
         except (OSError, ValueError, http.client.HTTPException) as error:
-            if attempt == _TRIES - 1 or not _may_pass(error):
-                raise TerrainError(f"{url}: cannot be reached: {_why(error)}", file=url) from error
+            if attempt == _MAX_ATTEMPTS - 1 or not _is_temporary(error):
+                raise TerrainError(f"{url}: cannot be reached: {_error_text(error)}", file=url) from error
         time.sleep(_PAUSE * 2.0**attempt)
     if not 0 < size <= MAX_BYTES:
         allowed = f"1 to {MAX_BYTES:,} bytes are expected"
@@ -157,12 +166,12 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
 
 def _open(url: str, headers: dict[str, str], method: str = "GET") -> http.client.HTTPResponse:
     request = urllib.request.Request(url, headers={"User-Agent": "planfly"} | headers, method=method)
-    return _opener().open(request, timeout=_PATIENCE)
+    return _make_opener().open(request, timeout=_ANSWER_TIMEOUT_S)
 
 
 @cache
-def _opener() -> urllib.request.OpenerDirector:
-    """Return what speaks http and https, wherever it is led, and nothing else."""
+def _make_opener() -> urllib.request.OpenerDirector:
+    """Return an opener for http and https only, redirects included."""
     opener = urllib.request.OpenerDirector()
     for handler in (
         urllib.request.ProxyHandler,
@@ -200,15 +209,15 @@ def _length(answer: http.client.HTTPResponse) -> int:
 
 def _version(answer: http.client.HTTPResponse) -> str:
     tag = str(answer.headers.get("ETag") or "")
-    # A weak tag may stand for other bytes, and does not go with parts.
+    # A weak ETag may match different bytes, and is not allowed in range requests.
     return tag if tag and not tag.startswith("W/") else str(answer.headers.get("Last-Modified") or "")
 
 
-def _may_pass(error: Exception) -> bool:
-    return not isinstance(error, urllib.error.HTTPError) or error.code in _PASSING
+def _is_temporary(error: Exception) -> bool:
+    return not isinstance(error, urllib.error.HTTPError) or error.code in _TEMPORARY_STATUSES
 
 
-def _why(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     if isinstance(error, urllib.error.HTTPError):
         return f"the server answers {error.code} {error.reason}"
     reason = getattr(error, "reason", None) or error
@@ -220,7 +229,7 @@ def _notes(copy: Path) -> Path:
 
 
 def _read_notes(copy: Path, size: int) -> dict[tuple[int, int], str]:
-    """Return parts that a copy holds as they were fetched; none where the note of them is damaged."""
+    """Return the parts that a copy holds unchanged; an empty mapping if the notes are damaged."""
     try:
         noted = json.loads(_notes(copy).read_text(encoding="ascii"))
         parts = {(int(low), int(high)): str(digest) for low, high, digest in noted}

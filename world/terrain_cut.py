@@ -1,8 +1,8 @@
-"""The ground of an area as one GeoTIFF: from a folder of tiles, or from a server of Copernicus GLO-30 tiles.
+"""Write the terrain of an area as one GeoTIFF, from a folder of tiles or a server of Copernicus GLO-30 tiles.
 
-The server's layout is that of the Copernicus DEM in the registry of open data of AWS: a folder for each degree, with a
-cloud-optimised GeoTIFF in it, of which only the blocks that the area needs are fetched.  A degree
-without a tile is open sea, or land of which none is published: the Copernicus DEM lacks some.
+The server has the layout of the Copernicus DEM in the AWS registry of open data: a folder for each degree, with a
+cloud-optimised GeoTIFF in it.  Only the blocks that cover the area are fetched.  A degree without a tile is open sea,
+or land that is not published: the Copernicus DEM lacks some tiles.
 Heights are above EGM2008 (Copernicus DEM Product Handbook, GEO.2018-1988-2, "Vertical datum").
 """
 
@@ -25,23 +25,25 @@ from world.remote_files import RemoteFile, find_remote
 
 Floats = NDArray[Any]
 
+# Server of the Copernicus GLO-30 tiles.
 COPERNICUS = "https://copernicus-dem-30m.s3.amazonaws.com"
-# Tiles of an area at most: 100 would be some 3 GB.
+# Largest number of tiles for an area: 100 would be about 3 GB.
 MAX_FETCHED = 25
-# Pixels that are fetched about an area.
-_MORE = 5
-# What a tile's directory takes at its beginning, bytes: that of a GLO-30 tile takes 6 kB.
-_DIRECTORY = 2**16
+# Number of pixels fetched beyond each edge of an area.
+_MARGIN_PIXELS = 5
+# Number of bytes fetched first from a tile, which hold its directory; the directory of a GLO-30 tile takes 6 kB.
+_DIRECTORY_BYTES = 2**16
 # WGS 84 with heights above EGM2008.
 _SYSTEM = "EPSG:4326+3855"
+# Value that marks missing data in written files.
 _NODATA = -32768.0
 
-# Told of bytes, how many are expected, and a remark.
+# Progress callback: the work done, the expected total, and a remark.
 Told = Callable[[float, float, str], None]
 
 
 class Box(NamedTuple):
-    """Degrees."""
+    """Area in degrees."""
 
     south: float
     west: float
@@ -52,9 +54,9 @@ class Box(NamedTuple):
 class CutTerrain(NamedTuple):
     """Summary of the written file.
 
-    file: the GeoTIFF.  shape: its rows and columns.  tiles: names of those it is from.
-    absent: degrees (south-west corners) of which the server has no tile.
-    empty: pixels without data.  fetched: bytes that came from the server.
+    file: the GeoTIFF.  shape: its rows and columns.  tiles: names of its source tiles.
+    absent: degrees (south-west corners) for which the server has no tile.
+    empty: pixels without data.  fetched: bytes received from the server.
     """
 
     file: Path
@@ -66,13 +68,13 @@ class CutTerrain(NamedTuple):
 
 
 # ----------------------------------------------------------------------
-# From a folder, a file or a virtual raster.
+# Cut from a folder, a file or a virtual raster.
 
 
 def cut_from_files(source: Path, box: Box, out: Path) -> CutTerrain:
-    """Write the part of local tiles that an area needs, in their own reference system and on their own grid.
+    """Write the part of local tiles that covers an area, in their own reference system and on their own grid.
 
-    Raises TerrainError where the tiles do not reach beyond the area, have no data in it, or cannot be read.
+    Raises TerrainError if the tiles do not reach beyond the area, have no data in it, or cannot be read.
     """
     raster = open_raster(str(source))
     top, bottom, left, right = _window(raster, box)
@@ -82,7 +84,7 @@ def cut_from_files(source: Path, box: Box, out: Path) -> CutTerrain:
 
 
 def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
-    """Rows and columns (top, bottom, left, right) about an area.  Raises TerrainError where the raster ends in it."""
+    """Return rows and columns (top, bottom, left, right) of an area.  Raises TerrainError if not covered."""
     col, row = raster.to_source(*_outline(box))
     rows, cols = raster.shape
     if not (col.min() >= 0.0 and row.min() >= 0.0 and col.max() <= cols - 1 and row.max() <= rows - 1):
@@ -94,7 +96,7 @@ def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
 
 
 def _outline(box: Box) -> tuple[Floats, Floats]:
-    """Longitudes and latitudes along the edge of an area."""
+    """Return longitudes and latitudes along the edge of an area."""
     ramp = np.linspace(0.0, 1.0, 41)
     across, up = box.west + ramp * (box.east - box.west), box.south + ramp * (box.north - box.south)
     lon = np.concatenate([across, across, np.full(41, box.west), np.full(41, box.east)])
@@ -107,7 +109,7 @@ def _empty(heights: Heights) -> int:
 
 
 def _write(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None:
-    """Write a GeoTIFF, whole or not at all.  grid: affine coefficients, from columns and rows to the system."""
+    """Write a GeoTIFF atomically.  grid: affine coefficients from columns and rows to the reference system."""
     if heights.size > MAX_PIXELS:
         allowed = f"{heights.size:,} pixels; at most {MAX_PIXELS:,} are written"
         raise TerrainError(f"{out}: {allowed}", file=out, value=heights.size, allowed=allowed)
@@ -118,11 +120,11 @@ def _write(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None
 
 
 # ----------------------------------------------------------------------
-# From a server.
+# Cut from a server.
 
 
 def tile_name(lat: int, lon: int) -> str:
-    """Return name of a GLO-30 tile by its south-west corner, degrees.
+    """Return the name of a GLO-30 tile with this south-west corner, degrees.
 
     >>> tile_name(46, 8), tile_name(-34, -71)
     ('Copernicus_DSM_COG_10_N46_00_E008_00_DEM', 'Copernicus_DSM_COG_10_S34_00_W071_00_DEM')
@@ -132,7 +134,7 @@ def tile_name(lat: int, lon: int) -> str:
 
 
 def degrees_of(box: Box) -> list[tuple[int, int]]:
-    """South-west corners of the degrees that an area touches; longitudes in -180..179.
+    """Return the south-west corners of the degrees that an area touches; longitudes in -180..179.
 
     >>> degrees_of(Box(46.9, 8.2, 47.1, 8.3)), degrees_of(Box(-0.1, 179.9, 0.0, 180.1))
     ([(46, 8), (47, 8)], [(-1, 179), (-1, -180), (0, 179), (0, -180)])
@@ -143,15 +145,15 @@ def degrees_of(box: Box) -> list[tuple[int, int]]:
 
 
 def cut_from_server(server: str, box: Box, out: Path, cache: Path, told: Told, *, sea: bool) -> CutTerrain:
-    """Fetch what an area needs of a server's tiles, and write it as one GeoTIFF.
+    """Fetch the part of a server's tiles that covers an area, and write it as one GeoTIFF.
 
-    server: the address of the folder of tiles.  cache: keeps what was fetched.  told: of the progress.
-    sea: whether degrees without a tile are sea, at 0 m; they have no data otherwise.
-    Where tiles of different pitch meet (at 50, 60, 70, 75, 80 and 85 degrees of latitude they do), the coarser are
-    interpolated to the grid of the finest.
-    Raises TerrainError where the server cannot be reached or does not answer as such a server does.
+    server: the address of the folder of tiles.  cache: folder for the fetched parts.  told: progress callback.
+    sea: True if degrees without a tile are sea, at 0 m; otherwise they have no data.
+    Where tiles of different pitch meet (at latitudes of 50, 60, 70, 75, 80 and 85 degrees), the coarser tiles are
+    interpolated to the grid of the finest tile.
+    Raises TerrainError if the server cannot be reached or does not answer as expected.
     """
-    # The edge of a tile is half a pixel off its degree: neighbours are needed within one.
+    # The edge of a tile is half a pixel off its degree: an area close to that edge needs the neighbouring tile, too.
     wide = Box(box.south - 0.001, box.west - 0.001, box.north + 0.001, box.east + 0.001)
     degrees = degrees_of(wide)
     if len(degrees) > MAX_FETCHED:
@@ -174,8 +176,8 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, told: Told, *
             fetched += came
             told(len(there) + 9.0 * done, 10.0 * len(there), f"{name}: {fetched / 1e6:.1f} MB")
 
-        tiles.append(_placed(_fetched_tile(remote, wide, count), degree, box))
-    heights, grid = _on_one_grid(tiles, box)
+        tiles.append(_placed(_fetch_tile(remote, wide, count), degree, box))
+    heights, grid = _merge_tiles(tiles, box)
     absent = tuple(degree for degree, remote in found.items() if remote is None)
     if sea:
         _fill_sea(heights, grid, absent)
@@ -185,15 +187,15 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, told: Told, *
     return CutTerrain(out, (rows, cols), names, absent, _empty(heights), fetched)
 
 
-def _fetched_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) -> RasterFile:
-    """Return a tile's copy with the blocks that an area needs.  Raises TerrainError.
+def _fetch_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) -> RasterFile:
+    """Return the copy of a tile with the blocks that cover an area.  Raises TerrainError.
 
-    A copy that cannot be read, which a power cut or a proxy may have spoilt, is fetched once more.
+    A copy that cannot be read, for example after a power cut or because of a proxy, is fetched a second time.
     """
     for is_last in (not remote.held, True):
         try:
-            tile = _opened_copy(remote, count, (_DIRECTORY, remote.size) if is_last else (_DIRECTORY,))
-            window = _touched(tile, box)
+            tile = _open_copy(remote, count, (_DIRECTORY_BYTES, remote.size) if is_last else (_DIRECTORY_BYTES,))
+            window = _padded_window(tile, box)
             for begin, end in block_spans(remote.copy, window):
                 remote.fetch(begin, end, count)
             if window[0] < window[1] and window[2] < window[3]:
@@ -208,14 +210,14 @@ def _fetched_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) ->
 
 
 class _UnreadableError(Exception):
-    """A copy that is no GeoTIFF, or has a block that cannot be unpacked."""
+    """A copy is not a GeoTIFF, or has a block that cannot be unpacked."""
 
 
-def _opened_copy(remote: RemoteFile, count: Callable[[int], None], sizes: Sequence[int]) -> RasterFile:
-    """Return a tile of which the directory is there.  Raises TerrainError, and _UnreadableError.
+def _open_copy(remote: RemoteFile, count: Callable[[int], None], sizes: Sequence[int]) -> RasterFile:
+    """Fetch the directory of a tile, and open its copy.  Raises TerrainError and _UnreadableError.
 
-    sizes: bytes of the beginning to try with.  The directory may be longer than that of a cloud-optimised file, or
-    stand at the end.
+    sizes: numbers of bytes to fetch from the beginning, tried in turn.  The directory may be longer than in a
+    cloud-optimised file, or at the end.
     """
     for size in sizes:
         remote.fetch(0, size, count)
@@ -234,25 +236,29 @@ def _opened_copy(remote: RemoteFile, count: Callable[[int], None], sizes: Sequen
     raise _UnreadableError
 
 
-def _touched(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
-    """Rows and columns of a tile in an area, and as many more on each side as its neighbours' grids may ask for."""
+def _padded_window(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
+    """Return rows and columns of a tile in an area, with a margin that interpolation to another grid may need."""
     col, row = tile.to_source(*_outline(box))
     rows, cols = tile.shape
-    ends = (row.min() - _MORE, row.max() + _MORE + 2.0), (col.min() - _MORE, col.max() + _MORE + 2.0)
+    ends = (
+        (row.min() - _MARGIN_PIXELS, row.max() + _MARGIN_PIXELS + 2.0),
+        (col.min() - _MARGIN_PIXELS, col.max() + _MARGIN_PIXELS + 2.0),
+    )
     top, bottom = (int(np.clip(value, 0, rows)) for value in ends[0])
     left, right = (int(np.clip(value, 0, cols)) for value in ends[1])
     return top, bottom, left, right
 
 
-# Degrees by which a tile may lie off its own; pixels that are none.
-_OFF = 0.02
-_HAIR = 1e-3
+# Largest offset of a tile from its degree, deg.
+_MAX_TILE_OFFSET_DEG = 0.02
+# Rounding tolerance for positions on a grid, pixels.
+_PIXEL_TOLERANCE = 1e-3
 
 
-class _Placed(NamedTuple):
-    """A tile on its grid of longitudes and latitudes.
+class _PlacedTile(NamedTuple):
+    """Tile with its grid of longitudes and latitudes.
 
-    west, north: of its outer edge, longitude counted as those of the area.  dx, dy: degrees of a pixel.
+    west, north: outer edges, deg; the longitude is in the same turn as the area.  dx, dy: size of a pixel, deg.
     """
 
     raster: RasterFile
@@ -262,27 +268,31 @@ class _Placed(NamedTuple):
     dy: float
 
 
-def _placed(tile: RasterFile, degree: tuple[int, int], box: Box) -> _Placed:
-    """Return a tile beside others.  Raises TerrainError for one that does not lie on its degree."""
+def _placed(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
+    """Place a tile on its degree, in the same turn of longitude as the area.  Raises TerrainError."""
     dx, turn, west, other_turn, dy, north = tile.grid
     if turn or other_turn or not dx > 0.0 > dy:
         raise TerrainError(f"{tile.name}: a grid of longitudes and latitudes is expected", file=tile.name)
     off = max(abs(north - degree[0] - 1.0), abs((west - degree[1] + 180.0) % 360.0 - 180.0))
-    if off > _OFF or abs(dx * tile.shape[1] - 1.0) > _OFF or abs(-dy * tile.shape[0] - 1.0) > _OFF:
+    if (
+        off > _MAX_TILE_OFFSET_DEG
+        or abs(dx * tile.shape[1] - 1.0) > _MAX_TILE_OFFSET_DEG
+        or abs(-dy * tile.shape[0] - 1.0) > _MAX_TILE_OFFSET_DEG
+    ):
         allowed = f"the degree from {degree[0]} N {degree[1]} E on is expected"
         raise TerrainError(f"{tile.name}: another place: {allowed}", file=tile.name, allowed=allowed)
     turns = round(((box.west + box.east) / 2.0 - (west + dx * tile.shape[1] / 2.0)) / 360.0)
-    return _Placed(tile, west + 360.0 * turns, north, dx, -dy)
+    return _PlacedTile(tile, west + 360.0 * turns, north, dx, -dy)
 
 
-def _on_one_grid(tiles: list[_Placed], box: Box) -> tuple[Heights, tuple[float, ...]]:
-    """Return heights of an area on the grid of the finest tile, NaN where no tile is, and the grid."""
+def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[float, ...]]:
+    """Return heights of an area on the grid of the finest tile, NaN where there is no tile, and the grid."""
     finest = min(tiles, key=lambda tile: tile.dx)
-    # Pixels between whose centres the area lies, counted from the finest tile's first; a hair is none.
-    left = math.floor((box.west - finest.west) / finest.dx - 0.5 + _HAIR)
-    right = math.ceil((box.east - finest.west) / finest.dx - 0.5 - _HAIR) + 1
-    top = math.floor((finest.north - box.north) / finest.dy - 0.5 + _HAIR)
-    bottom = math.ceil((finest.north - box.south) / finest.dy - 0.5 - _HAIR) + 1
+    # First and last pixels whose centres enclose the area, relative to the first pixel of the finest tile.
+    left = math.floor((box.west - finest.west) / finest.dx - 0.5 + _PIXEL_TOLERANCE)
+    right = math.ceil((box.east - finest.west) / finest.dx - 0.5 - _PIXEL_TOLERANCE) + 1
+    top = math.floor((finest.north - box.north) / finest.dy - 0.5 + _PIXEL_TOLERANCE)
+    bottom = math.ceil((finest.north - box.south) / finest.dy - 0.5 - _PIXEL_TOLERANCE) + 1
     if (right - left) * (bottom - top) > MAX_PIXELS:
         allowed = f"at most {MAX_PIXELS:,} are written: a smaller area is expected"
         count = (right - left) * (bottom - top)
@@ -295,17 +305,17 @@ def _on_one_grid(tiles: list[_Placed], box: Box) -> tuple[Heights, tuple[float, 
     return heights, (finest.dx, 0.0, west, 0.0, -finest.dy, north)
 
 
-def _put(heights: Heights, lat: Floats, lon: Floats, tile: _Placed) -> None:
-    """Fill what is still empty of a grid, by its latitudes and longitudes, from a tile: at its pixels, or between."""
+def _put(heights: Heights, lat: Floats, lon: Floats, tile: _PlacedTile) -> None:
+    """Fill the empty places of a grid of latitudes and longitudes from a tile, interpolated between its pixels."""
     rows, cols = tile.raster.shape
     col, row = (lon - tile.west) / tile.dx - 0.5, (tile.north - lat) / tile.dy - 0.5
-    # A tile of another pitch reaches half a pixel of its own beyond its centres.
+    # A tile of another pitch reaches half of its own pixel beyond the centres of its outermost pixels.
     over, down = np.flatnonzero((col > -0.5) & (col < cols - 0.5)), np.flatnonzero((row > -0.5) & (row < rows - 0.5))
     if not over.size or not down.size:
         return
-    # On the tile's own grid no height is touched, and none beside it is needed.
+    # Snap to the tile's own grid: heights there stay unchanged, and need no neighbouring pixel.
     col, row = (
-        np.where(np.abs(at - np.round(at)) < _HAIR, np.round(at), at)
+        np.where(np.abs(at - np.round(at)) < _PIXEL_TOLERANCE, np.round(at), at)
         for at in (np.clip(col[over], 0.0, cols - 1.0), np.clip(row[down], 0.0, rows - 1.0))
     )
     left, top = int(col[0]), int(row[0])
@@ -318,7 +328,7 @@ def _put(heights: Heights, lat: Floats, lon: Floats, tile: _Placed) -> None:
 
 
 def _between(read: Heights, row: Floats, col: Floats) -> Heights:
-    """Return heights between pixels, bilinear, at rows (m,) and columns (n,): (m, n)."""
+    """Interpolate heights (m, n) bilinearly at rows (m,) and columns (n,)."""
     r0, c0 = np.floor(row).astype(int), np.floor(col).astype(int)
     r1, c1 = np.minimum(r0 + 1, read.shape[0] - 1), np.minimum(c0 + 1, read.shape[1] - 1)
     v, u = (row - r0)[:, None], (col - c0)[None, :]
@@ -332,11 +342,11 @@ def _between(read: Heights, row: Floats, col: Floats) -> Heights:
 
 
 def _fill_sea(heights: Heights, grid: Sequence[float], sea: Sequence[tuple[int, int]]) -> None:
-    """Put 0 m where there is no tile, in degrees that have none."""
+    """Set missing heights to 0 m in the degrees ``sea``, which have no tile."""
     dx, _, west, _, dy, north = grid
     lon, lat = west + (np.arange(heights.shape[1]) + 0.5) * dx, north + (np.arange(len(heights)) + 0.5) * dy
     for south, left in sea:
-        # By half a pixel: a tile's pixels lie about its degree.
+        # Tiles reach half a pixel beyond their degree; one pixel is added.
         over = np.abs((lon - left - 0.5 + 180.0) % 360.0 - 180.0) <= 0.5 + abs(dx)
         down = np.abs(lat - south - 0.5) <= 0.5 + abs(dy)
         part = heights[np.ix_(down, over)]

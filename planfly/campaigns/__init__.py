@@ -1,1 +1,1 @@
-"""Campaigns: many flights of one mission, each with its own draw of what varies, and the probability that it flies."""
+"""Campaigns: many flights of one mission, each with its own draw of the dispersions, and the probability of success."""

@@ -1,4 +1,4 @@
-"""Mission, world, aircraft and dispersions that all flights of a campaign share, and the variation by a draw."""
+"""Mission, world, aircraft and dispersions shared by all flights of a campaign, and their variation by a draw."""
 
 import hashlib
 import json
@@ -37,14 +37,14 @@ from world.wind import Wind
 
 @dataclass(frozen=True)
 class CampaignBase:
-    """One mission, and what varies about it.
+    """Mission of a campaign, and the dispersions around it.
 
-    scenario: as planned in; `mission` is flown in it by every flight, in the flight's own wind.
-    airframe: of that scenario.
-    placed: the mission on the terrain that its planner knows, whatever the terrain of a flight is.
-    plan: the mission's; None for one that a person brought.
-    seed: of the draws.
-    name: a stem for file names.
+    scenario: the planned scenario; every flight flies `mission` in it, in its own wind.
+    airframe: the airframe in that scenario.
+    placed: the mission on the terrain that its planner knows, even if a flight has another terrain.
+    plan: the plan of the mission; None for a mission that was not planned here.
+    seed: seed of the draws.
+    name: stem of file names.
     """
 
     scenario: Scenario
@@ -57,15 +57,15 @@ class CampaignBase:
     name: str
 
     def nominal_setup(self) -> FlightSetup:
-        """Return the flight with nothing drawn.  Raises PlanflyError for a mission that cannot be laid out."""
+        """Return the setup without any draw.  Raises PlanflyError for a mission that cannot be laid out."""
         return make_setup(self.scenario, self.airframe, self.mission, self.seed, plan=self.plan, placed=self.placed)
 
     def conditions(self) -> Conditions:
-        """Return what flights are drawn about: whose they are, in which weather and world, and who flies."""
+        """Return the nominal conditions of the flights: aircraft, weather, world and autopilot."""
         return setup_conditions(self.nominal_setup())
 
     def world_hash(self) -> str:
-        """Hash of what decides flight k beside the code: scenario, mission, model, dispersions and seed."""
+        """Return the hash of all inputs of flight k except the code: scenario, mission, model, dispersions and seed."""
         model = self.airframe.aircraft
         terrain = self.scenario.terrain
         parts = (
@@ -82,7 +82,7 @@ class CampaignBase:
 
 
 def is_mission_file(target: str) -> bool:
-    """Return True if a target is a plan's or a mission's file, by its name, and no scenario.
+    """Return True if the name of a target is the name of a plan or mission file, not of a scenario.
 
     >>> is_mission_file("a/plan.json"), is_mission_file("jacksboro"), is_mission_file("valley.toml")
     (True, False, False)
@@ -98,17 +98,17 @@ def open_campaign(
     planned: Path | None = None,
     advance: Advance | None = None,
 ) -> CampaignBase:
-    """Open the base of a campaign of a scenario, which is planned here, or of a plan or mission file.
+    """Open the base of a campaign for a plan or mission file, or for a scenario, which is planned here.
 
     target: an embedded scenario's name, a scenario's TOML file, a plan, or a plan.json, .waypoints or .plan.
-    options: how it is flown; zones are planned around, and the seed is of plan and draws.
-    planned: where a scenario's plan is kept: it is read from there if it exists, else written.
-    Raises a PlanflyError for bad input, a plan that is not feasible, and dispersions whose middle is no aircraft
-    that flies.
+    options: options of the flights; the plan avoids their zones, and their seed is used for the plan and the draws.
+    planned: file of a scenario's plan: it is read if it exists, otherwise written.
+    Raises a PlanflyError for bad input, for a plan that is not feasible, and for dispersions whose medians give an
+    aircraft that cannot fly.
     """
     if isinstance(target, Plan) or is_mission_file(target):
         setup = open_flight(target, options)
-        # By its name alone: the folder that it lies in does not decide the flight.
+        # The name alone, without the folder, which does not affect the flight.
         base = _of_setup(setup, dispersions, Path(setup.mission.source).name)
     else:
         fences, seed = read_named_fences(options.get("fence") or ()), options.get("seed")
@@ -121,7 +121,7 @@ def open_campaign(
             write_whole(planned, plan_json(plan))
         base = _of_plan(plan, fences, dispersions, choose_seed(scenario, seed))
     check_middle(base)
-    # A mission that cannot be laid out is refused here, not by a worker.
+    # Refuse a mission that cannot be laid out here, before a worker does.
     base.nominal_setup()
     return base
 
@@ -153,7 +153,7 @@ def _of_setup(setup: FlightSetup, dispersions: Dispersions, source: str) -> Camp
 
 
 def check_middle(base: CampaignBase) -> None:
-    """Refuse dispersions with whose medians the aircraft holds no level flight.  Raises SpreadError."""
+    """Raise SpreadError if the aircraft cannot hold level flight at the medians of the dispersions."""
     medians = {one.quantity.name: one.value(0.5) for one in base.dispersions.varying}
     variation = Variation(
         mass=medians.get("mass", 1.0), drag=medians.get("drag", 1.0), control=medians.get("control_power", 1.0)
@@ -175,7 +175,7 @@ def check_middle(base: CampaignBase) -> None:
 
 
 def _check_draws(base: CampaignBase) -> None:
-    """Refuse draws of properties that the aircraft's model has not.  Raises SpreadError."""
+    """Raise SpreadError for draws of properties that the aircraft's model does not have."""
     draws = base.dispersions.draws
     if draws is None:
         return
@@ -187,9 +187,9 @@ def _check_draws(base: CampaignBase) -> None:
 
 
 def _with_own_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
-    """Dispersions with the draws that stand beside an aircraft's model, where there are any.
+    """Return the dispersions with the draws stored next to the aircraft's model, if there are any.
 
-    A file of dispersions that names other draws, or says itself how drag or control power vary, is left as it is.
+    A dispersions file that names other draws, or states how drag or control power vary, is used unchanged.
     """
     file = aircraft.folder / DRAWS_FILE
     stated = dispersions.name != DEFAULT and any(one.quantity.name in DRAWN for one in dispersions.varying)
@@ -199,16 +199,18 @@ def _with_own_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions
 
 
 # ----------------------------------------------------------------------
-# A flight of a campaign, varied by its draw: the setup that is flown, and how it differs from what guidance knows.
+# A flight varied by its draw: the flown setup, and its differences from what the guidance knows.
 
-# In the order in which turbulence grows.
+# Levels in order of increasing turbulence.
 LEVELS: tuple[Literal["none", "light", "moderate"], ...] = ("none", "light", "moderate")
+# Largest wind speed of a varied flight, m/s.
 MAX_WIND = 40.0
+# Largest wind gradient of a varied flight, 1/s.
 MAX_GRADIENT = 0.05
 
 
 class GivenWind(NamedTuple):
-    """A mean wind that takes the place of a scenario's: speed in m/s, and where it comes from, degrees."""
+    """Mean wind that replaces the wind of a scenario: speed, m/s, and direction that it blows from, degrees."""
 
     speed: float
     from_deg: float
@@ -216,7 +218,7 @@ class GivenWind(NamedTuple):
 
 @dataclass(frozen=True)
 class VariedFlight:
-    """A setup in its own wind, over its own terrain, and the rest of its draw."""
+    """Setup with its own wind and terrain, and the rest of its draw."""
 
     setup: FlightSetup
     airframe: Airframe
@@ -224,15 +226,16 @@ class VariedFlight:
 
 
 def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
-    """Return the flight of a draw; wind: about which it varies, None for the scenario's.
+    """Return the flight of a draw.
 
-    Scenario and limits are in the flight's wind, as `planfly fly --wind` has them; mass, drag, control power, the
-    drawn aircraft and the start's place are unknown to the autopilot.
+    wind: mean wind that the draw varies; None for the wind of the scenario.
+    Scenario and limits are adapted to the flight's wind, as in `planfly fly --wind`; mass, drag, control power, the
+    drawn aircraft and the start position are unknown to the autopilot.
     """
     values = draw.values
     scenario = _in_wind(base.scenario, values, wind)
     if values["terrain_height"] and scenario.terrain is not None:
-        scenario = replace(scenario, terrain=_raised(scenario.terrain, values["terrain_height"]))
+        scenario = replace(scenario, terrain=_raise_terrain(scenario.terrain, values["terrain_height"]))
     battery = base.airframe.battery * values["battery"]
     draws = base.dispersions.draws
     limits = _limits(base.airframe, scenario, drawn=draws is not None)
@@ -247,7 +250,7 @@ def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> Varie
 
 
 def _in_wind(scenario: Scenario, values: dict[str, float], mean: GivenWind | None) -> Scenario:
-    """Return the scenario in the wind of a draw; gusts have the flight's seed, whatever the scenario states."""
+    """Return the scenario in the wind of a draw; gusts use the flight's seed instead of the scenario's seed."""
     old = scenario.wind
     about = mean or GivenWind(old.speed, math.degrees(old.from_course))
     speed = min(MAX_WIND, max(0.0, about.speed + values["wind_speed"]))
@@ -260,14 +263,14 @@ def _in_wind(scenario: Scenario, values: dict[str, float], mean: GivenWind | Non
     return replace(scenario, spec=scenario.spec.model_copy(update={"wind": table}), wind=wind)
 
 
-def _raised(terrain: Terrain, by: float) -> Terrain:
+def _raise_terrain(terrain: Terrain, by: float) -> Terrain:
     return replace(terrain, heights=(terrain.heights + np.float32(by)).astype(np.float32))
 
 
 def _limits(airframe: Airframe, scenario: Scenario, *, drawn: bool) -> Limits:
-    """Return the airframe's limits in another wind; drawn: whether the flight's aircraft is one of several draws."""
+    """Return the airframe's limits in another wind; drawn: True if the flight's aircraft is a draw."""
     old = airframe.limits
-    # A drawn aircraft is one that is known: each of its flights is decided.
+    # The performance of a drawn aircraft is known exactly: it has no standard deviations.
     known = replace(old.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
     envelope = known if drawn else old.envelope
     limits = make_limits(scenario, envelope, old.airspeed, bank_limit(scenario, airframe.autopilot))

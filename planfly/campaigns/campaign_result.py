@@ -18,14 +18,14 @@ from world.errors import ArgumentError
 from world.html_table import html_table
 
 # ----------------------------------------------------------------------
-# The command line that repeats a campaign or a search for winds, for its page.
+# The command line that repeats a campaign or a search for winds, shown on its page.
 
-# What the command line takes by itself: nothing is said of these values.
-_USUAL = {"confidence": 0.95, "directions": 16, "most": 20.0}
+# Default values of the command line, which are omitted.
+_DEFAULTS = {"confidence": 0.95, "directions": 16, "most": 20.0}
 
 
 def campaign_line(target: str, goal: Goal, options: Mapping[str, object]) -> str:
-    """``planfly campaign`` with the goal and with options by name, of which those that are None or empty are not given.
+    """Return the ``planfly campaign`` command with a goal and options by name; omit options that are None or empty.
 
     >>> campaign_line("my plan.json", Goal(0.99, True, 5000), {"seed": 3, "wind": (8.0, 270.0), "fence": ["a", "b"]})
     "planfly campaign 'my plan.json' --prove 0.99 --flights 5000 --seed 3 --wind 8,270 --fence a --fence b"
@@ -37,7 +37,7 @@ def campaign_line(target: str, goal: Goal, options: Mapping[str, object]) -> str
 
 
 def winds_line(target: str, goal: WindsGoal, options: Mapping[str, object]) -> str:
-    """``planfly winds``, as `campaign_line`.
+    """Return the ``planfly winds`` command, as `campaign_line` does.
 
     >>> winds_line("jacksboro-air", WindsGoal(0.9, 0.95, 8, 20.0, 5000), {"seed": 1})
     'planfly winds jacksboro-air --prove 0.9 --directions 8 --seed 1'
@@ -50,7 +50,7 @@ def winds_line(target: str, goal: WindsGoal, options: Mapping[str, object]) -> s
 def _line(command: str, target: str, options: Mapping[str, object]) -> str:
     words = ["planfly", command, shlex.quote(target)]
     for name, value in options.items():
-        if value is None or value == _USUAL.get(name):
+        if value is None or value == _DEFAULTS.get(name):
             continue
         for one in value if isinstance(value, list) else [value]:
             words += [f"--{name.replace('_', '-')}", shlex.quote(_text(one))]
@@ -63,8 +63,9 @@ def _text(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
-# Flights of a campaign that says no number, and the most of one that stops by itself.
+# Default number of flights of a campaign with a fixed number.
 USUAL_FLIGHTS = 300
+# Default largest number of flights of a campaign that stops by itself.
 MAX_FLIGHTS = 5000
 
 
@@ -73,7 +74,7 @@ class CampaignResult:
     """Result of `planfly.campaign`.
 
     columns: the table of flights, (n,) each.
-    table: its file; None where none was kept.
+    table: its file; None if it was not kept.
     """
 
     summary: CampaignSummary
@@ -82,32 +83,32 @@ class CampaignResult:
 
     @property
     def probability(self) -> float:
-        """Share of flights that are flyable."""
+        """Share of flyable flights."""
         return self.summary.estimate.tally.share
 
     @property
     def interval(self) -> Interval:
-        """Two-sided, with the confidence asked for."""
+        """Two-sided interval of the probability, with the requested confidence."""
         return self.summary.estimate.interval
 
     @property
     def bounds(self) -> Interval:
-        """The lower and the upper bound, each with the confidence asked for: what `answer` rests on."""
+        """Lower and upper bound, each with the requested confidence; `answer` is based on them."""
         return Interval(self.summary.estimate.lower, self.summary.estimate.upper)
 
     @property
     def answer(self) -> Answer:
-        """True if the target is reached, missed, or undecided."""
+        """Answer to the goal: target reached, missed, or undecided."""
         return self.summary.estimate.answer
 
     @property
     def by_rule(self) -> dict[str, int]:
-        """In how many flights each rule failed, of those that did."""
+        """Number of flights that failed each rule, for rules that failed at all."""
         return {one.rule: one.flights for one in self.summary.by_rule}
 
     @property
     def flights(self) -> Any:
-        """The table of flights: a pandas DataFrame where pandas is there, else its columns as arrays by name."""
+        """Table of flights: a pandas DataFrame if pandas is installed, otherwise its columns as arrays by name."""
         try:
             import pandas as pd
         except ImportError:
@@ -115,11 +116,11 @@ class CampaignResult:
         return pd.DataFrame(dict(self.columns))
 
     def shapes(self) -> dict[str, NDArray[np.float32]]:
-        """Each flight's way, read from the campaign's folder at every call; a row a flight, NaN where none is known.
+        """Return the path data of each flight, read from the campaign's folder; one row per flight, NaN if unknown.
 
-        "clearance": (n, 150) least height above ground on each equal piece of the route's length, m.
-        "crossings": (n, s, 2) distance right of and above each stop of the route at its nearest, m.
-        Raises ValueError for a campaign that kept no folder.
+        "clearance": (n, 150) least height above ground on each of 150 equal pieces of the route, m.
+        "crossings": (n, s, 2) distance to the right of and above each stop of the route at closest approach, m.
+        Raises ValueError for a campaign without a kept folder.
         """
         if self.table is None:
             raise ValueError("shapes: the campaign kept no folder; give it one by out")
@@ -132,12 +133,12 @@ class CampaignResult:
         )
 
     def _repr_html_(self) -> str:
-        """Return how a notebook shows it."""
+        """Return the HTML for a notebook."""
         return html_table(campaign_lines(self.summary)[0], self.by_rule.items(), ("rule", "flights that it fails"))
 
 
 def make_goal(flights: int | None, prove: float | None, at_least: float | None, confidence: float | None) -> Goal:
-    """Return the goal that keywords come to.  Raises ArgumentError for numbers out of their ranges.
+    """Return the goal for keyword arguments.  Raises ArgumentError for numbers outside their ranges.
 
     >>> make_goal(None, 0.99, None, None)
     Goal(target=0.99, stops=True, flights=5000, confidence=0.95, changed=False)

@@ -1,7 +1,7 @@
-"""Workers of a running dask cluster that fly a campaign.  Nothing else of planfly imports dask.
+"""Workers of a running dask cluster that fly a campaign; no other module of planfly imports dask.
 
-Each worker proves by its fingerprint that it flies what this process would, takes the campaign once, and is sent as
-many flights at a time as it has threads.
+Each worker proves by its fingerprint that it would fly exactly like this process, receives the campaign once, and gets
+at most as many flights at a time as it has threads.
 """
 
 import contextlib
@@ -29,26 +29,27 @@ from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from world.errors import PlanflyError
 from world.interruption import Interrupted
 
+# Timeout for the connection to a scheduler, s.
 _CONNECT_SECONDS = 20
-# Names of tasks, of which dask keeps the last 100,000: so many that one is long forgotten when it comes again.
+# Number of task names used in turn: dask keeps the last 100,000 tasks, and an old name is free again in time.
 _NAMES = 4096
 
 
 def connect(address: str) -> Any:
-    """Return a `distributed.Client` of a scheduler, with the security of dask's own configuration.
+    """Return a `distributed.Client` of a scheduler, with the security settings of dask's configuration.
 
-    Raises OSError and ValueError where no scheduler answers.
+    Raises OSError and ValueError if no scheduler answers.
     """
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    # It states no types.
+    # distributed has no type annotations.
     client: Any = distributed.Client
     return client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
 
 
 class CampaignPlugin(WorkerPlugin):
-    """A campaign on a worker: on each, also on one that comes late or takes a dead one's place.
+    """Campaign on a worker; dask installs it on every worker, including late ones and replacements.
 
-    name: of the campaign on its scheduler.
+    name: name of the campaign on its scheduler.
     """
 
     def __init__(self, name: str, copy: CampaignCopy) -> None:
@@ -56,7 +57,7 @@ class CampaignPlugin(WorkerPlugin):
 
 
 def fly_task(campaign: str, request: FlightRequest) -> FlightRow:
-    """Fly a flight on the worker that this runs on."""
+    """Fly a flight on the worker that runs this task."""
     worker = get_worker()
     plugin = worker.plugins[campaign]
     if not isinstance(plugin, CampaignPlugin):
@@ -75,27 +76,27 @@ class DaskPool:
         client.register_plugin(CampaignPlugin(self._name, copy))
 
     def close(self) -> None:
-        """Let the workers forget the campaign; one that dies meanwhile has nothing to forget."""
+        """Remove the campaign from the workers; errors of workers that die meanwhile are ignored."""
         with contextlib.suppress(OSError):
             self._client.unregister_worker_plugin(self._name)
 
     def _threads(self) -> int:
-        """Return the number of flights that the workers can fly at a time, at least 1."""
+        """Return the number of flights that the workers can fly at the same time, at least 1."""
         threads: dict[str, int] = self._client.nthreads()
         return max(1, sum(threads.values()))
 
     def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
-        """Fly requests as they are asked for, and yield each when it is done, in any order.
+        """Fly requests as `following` returns them, and yield each when it is done, in any order.
 
-        following: gives the next request, None for none at present; asked again after each flight.
-        Raises the `world.errors.PlanflyError` of a flight, and OSError where the scheduler is lost.
+        following: returns the next request, or None for the time being; called again after each flight.
+        Raises the `world.errors.PlanflyError` of a flight, and OSError if the scheduler is lost.
         """
         flying: dict[tuple[str, int], FlightRequest] = {}
         given_up: Counter[FlightRequest] = Counter()
         done: Any = cast("Any", distributed.as_completed)(loop=self._client.loop)
 
         def send(request: FlightRequest) -> None:
-            # A tuple: dask takes its first word for the kind of task, and keeps something of each kind for good.
+            # A tuple: dask takes its first word as the kind of task, and keeps a record of each kind permanently.
             key = next(key for number in self._numbers if (key := (self._name, number)) not in flying)
             flying[key] = request
             done.add(self._client.submit(fly_task, self._name, request, key=key, pure=False))
@@ -117,10 +118,10 @@ class DaskPool:
                 else:
                     yield Flown(request, row or lost_row(self._base, request.index, LOST))
                     send_following()
-                # After the next was sent: of a kind without any task dask makes a new record with the next one.
+                # Released after the next task was sent: dask makes a new record for a kind that had no task left.
                 future.release()
         except Interrupted:
-            # No time to wait for an answer: these flights end with the client.
+            # Do not wait for an answer: these flights end with the client.
             flying.clear()
             raise
         finally:
@@ -128,12 +129,13 @@ class DaskPool:
                 self._client.cancel(list(done.futures), force=True)
 
     def _row(self, future: Any, request: FlightRequest) -> FlightRow | None:
-        """Return the row of a flight; None where dask gave it up, as workers died on it.
+        """Return the row of a flight, or None if dask gave it up because workers died on it.
 
-        Raises OSError where the scheduler is lost.
+        Raises OSError if the scheduler is lost.
         """
         if future.status == "finished":
-            # A result goes with its worker until it is fetched, and is made again: that may be given up, too.
+            # A result is lost with its worker until it is fetched; dask then repeats the flight, and may give that up,
+            # too.
             with contextlib.suppress(KilledWorker, CancelledError):
                 return future.result()
         elif future.status == "error":
@@ -142,7 +144,7 @@ class DaskPool:
                 raise error
             if not isinstance(error, KilledWorker):
                 raise RuntimeError(f"flight {request.index}: {type(error).__name__}: {error}") from error
-        # On a loaded machine dask was seen to cancel a flight whose worker was killed.
+        # On a loaded machine, dask has cancelled a flight whose worker was killed.
         if self._client.status != "running":
             raise OSError(0, "the scheduler was lost; the flights before are kept, --resume goes on", "--scheduler")
         return None

@@ -1,17 +1,15 @@
-"""The dispersions of a campaign: which quantities vary, by which distribution, and what each flight draws of them.
+"""Dispersions of a campaign: the varying quantities, their distributions, and the draw of each flight.
 
-They are read from a TOML file.
-
-A table a quantity, named as in `QUANTITIES`; `distribution` is the name of one of
-`scipy.stats`' distributions, the other keys are its parameters, and `source` says where the numbers are from:
+Dispersions are read from a TOML file with one table per quantity, named as in `QUANTITIES`.  `distribution` is the name
+of a distribution of `scipy.stats`, the other keys are its parameters, and `source` states the source of the numbers:
 
     [wind_speed]
     distribution = "norm"
     scale = 1.5
     source = "two years of the airfield's records"
 
-``[aircraft] draws = "mine/draws.csv"`` names draws of the whole aircraft, relative to the file: each flight flies one
-of its rows, by the flight's own seed, in place of factors on drag and control power.
+``[aircraft] draws = "mine/draws.csv"`` names a file of draws of the whole aircraft, relative to the dispersions file:
+each flight uses one of its rows, chosen by the flight's own seed, instead of factors on drag and control power.
 """
 
 import hashlib
@@ -30,18 +28,18 @@ from world.errors import PlanflyError
 from world.files import read_small_file, toml_table, utf8_text
 
 # ----------------------------------------------------------------------
-# What may vary between the flights of a campaign: each quantity's unit, how it changes the flight, and its range.
+# Quantities that may vary between the flights of a campaign: unit, effect on the flight, and range of each.
 
 
 class Quantity(NamedTuple):
-    """One number that is drawn once a flight.
+    """Number that is drawn once per flight.
 
-    name: its table in a dispersions file, and its column in the campaign's.
-    combine: "added" to what the scenario has, or "factor" on it.
-    unit: of what is added; "" for a factor.
-    low, high: the least and the largest that may be drawn; a draw beyond them is none of this aircraft or world.
-    integer: whether it counts steps, so that its distribution is a discrete one.
-    title: for a person.
+    name: its table in a dispersions file, and its column in the table of flights.
+    combine: "added" to the value of the scenario, or "factor" on it.
+    unit: unit of an added value; "" for a factor.
+    low, high: smallest and largest value that may be drawn; values beyond them are not realistic.
+    integer: True for a number of steps, with a discrete distribution.
+    title: name for people.
     """
 
     name: str
@@ -54,11 +52,11 @@ class Quantity(NamedTuple):
 
     @property
     def nominal(self) -> float:
-        """The value that changes nothing."""
+        """Value that leaves the flight unchanged."""
         return 1.0 if self.combine == "factor" else 0.0
 
 
-# In this order a flight's numbers are drawn, whether they vary or not: what one quantity does leaves the others alone.
+# The numbers of a flight are drawn in this order, varying or not, so that the quantities do not affect one another.
 QUANTITIES = (
     Quantity("wind_speed", "added", "m/s", -40.0, 40.0, "wind speed"),
     Quantity("wind_from", "added", "deg", -180.0, 180.0, "wind direction"),
@@ -73,30 +71,35 @@ QUANTITIES = (
     Quantity("start_north", "added", "m", -200.0, 200.0, "start, north"),
     Quantity("start_up", "added", "m", -100.0, 100.0, "start, height"),
 )
+# Quantities by name.
 BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
+# Names of the quantities, in the order of the draws.
 NAMES = tuple(BY_NAME)
 
 
-# What draws of the whole aircraft take the place of, and the table that names them.
+# Quantities that draws of the whole aircraft replace.
 DRAWN = ("drag", "control_power")
+# Name of the table with the file of draws.
 _AIRCRAFT = "aircraft"
-# Of a distribution at least this much has to lie within the quantity's range; the rest of it is never drawn.
+# Smallest share of a distribution within the range of its quantity; the rest of it is never drawn.
 INSIDE = 0.99
+# Largest size of a dispersions file, bytes.
 MAX_BYTES = 100_000
+# Name of the default dispersions in messages and reports.
 DEFAULT = "planfly's default dispersions"
 
 
 class SpreadError(PlanflyError):
-    """A dispersions file cannot be used as it stands."""
+    """A dispersions file cannot be used."""
 
 
 @dataclass(frozen=True)
 class Varying:
-    """One quantity and its distribution.
+    """Quantity with its distribution.
 
-    distribution: a name of `scipy.stats`.
-    parameters: by keyword, as `scipy.stats` takes them.
-    source: where the numbers are from.
+    distribution: name in `scipy.stats`.
+    parameters: keyword arguments of the distribution in `scipy.stats`.
+    source: source of the numbers.
     """
 
     quantity: Quantity
@@ -112,18 +115,18 @@ class Varying:
 
     @cached_property
     def _inside(self) -> tuple[float, float]:
-        """The distribution function below the range, and at its end."""
+        """Return the distribution function just below the range, and at its upper end."""
         low = self.quantity.low - (0.5 if self.quantity.integer else 0.0)
         return float(self._frozen.cdf(low)), float(self._frozen.cdf(self.quantity.high))
 
     @property
     def share_inside(self) -> float:
-        """Return the share of the distribution within the quantity's range, 0 to 1; NaN for parameters out of range."""
+        """Return the share of the distribution within the quantity's range, 0 to 1; NaN for invalid parameters."""
         low, high = self._inside
         return high - low
 
     def value(self, uniform: float) -> float:
-        """The quantity at this share (0 to 1) of the distribution within its range: the inverse of the distribution.
+        """Return the quantity at a share (0 to 1) of its distribution within its range (inverse distribution function).
 
         >>> mass = Varying(BY_NAME["mass"], "uniform", (("loc", 0.9), ("scale", 0.2)), "by hand")
         >>> round(mass.value(0.25), 6)
@@ -132,7 +135,7 @@ class Varying:
         return float(self.values(np.array([uniform]))[0])
 
     def values(self, uniform: Floats) -> Floats:
-        """(n,) the same of many shares (n,)."""
+        """Return the quantities (n,) at many shares (n,), as `value`."""
         low, high = self._inside
         drawn = self._frozen.ppf(low + uniform * (high - low))
         return np.clip(drawn, self.quantity.low, self.quantity.high)
@@ -140,9 +143,9 @@ class Varying:
 
 @dataclass(frozen=True)
 class Dispersions:
-    """All that varies, in the order of `QUANTITIES`; name: where it is from.
+    """All varying quantities, in the order of `QUANTITIES`.  name: their source.
 
-    draws: whole aircraft, of which each flight has one; None where drag and control power vary by themselves.
+    draws: draws of the whole aircraft, one for each flight; None if drag and control power vary separately.
     """
 
     varying: tuple[Varying, ...]
@@ -154,7 +157,7 @@ class Dispersions:
         return replace(self, varying=tuple(one for one in self.varying if one.quantity.name not in names))
 
     def with_draws(self, draws: Draws) -> "Dispersions":
-        """Return the dispersions with draws of the aircraft, which take the place of drag and control power.
+        """Return the dispersions with draws of the aircraft instead of drag and control power.
 
         >>> import numpy as np
         >>> made = default_dispersions().with_draws(Draws(("ident/thrust",), np.array([[1.1]]), "mine/draws.csv"))
@@ -164,7 +167,7 @@ class Dispersions:
         return replace(self.without(DRAWN), draws=draws)
 
     def to_json(self) -> dict[str, dict[str, Any]]:
-        """As plain data, a table a quantity, and one of the aircraft's draws."""
+        """Return plain data: a table for each quantity, and one for the aircraft's draws."""
         tables: dict[str, dict[str, Any]] = {
             one.quantity.name: {"distribution": one.distribution, **dict(one.parameters), "source": one.source}
             for one in self.varying
@@ -180,7 +183,7 @@ class Dispersions:
 
 
 def default_dispersions() -> Dispersions:
-    """Return the dispersions that campaigns have where no others are given.
+    """Return the default dispersions of campaigns.
 
     >>> [one.quantity.name for one in default_dispersions().varying][:3]
     ['wind_speed', 'wind_from', 'wind_gradient']
@@ -197,10 +200,10 @@ def read_dispersions(path: Path) -> Dispersions:
 
 
 def parse_dispersions(text: str, name: str) -> Dispersions:
-    r"""Return the dispersions of a file's text; name: of the file in messages.
+    r"""Parse the text of a dispersions file.  name: name of the file in messages.
 
-    Raises SpreadError, in one line, for what is no TOML, an unknown quantity, an unknown distribution, a parameter that
-    the distribution has not or may not have, and a distribution that lies outside the quantity's range.
+    Raises SpreadError, in one line, for a text that is not TOML, an unknown quantity, an unknown distribution, an
+    unknown or invalid parameter of the distribution, and a distribution outside the quantity's range.
 
     >>> parse_dispersions('[mass]\ndistribution = "norm"\nloc = 9.0\nscale = 0.1\nsource = "a guess"', "mine.toml")
     Traceback (most recent call last):
@@ -228,7 +231,7 @@ def parse_dispersions(text: str, name: str) -> Dispersions:
 
 
 def _draws(table: Any, name: str) -> Draws:
-    """Return the draws that a file names, relative to it."""
+    """Return the draws that a dispersions file names, relative to that file."""
     given = table.get("draws") if isinstance(table, dict) else None
     if not isinstance(given, str) or not given or (isinstance(table, dict) and len(table) > 1):
         allowed = 'a file of draws is expected, and nothing else, such as draws = "mine/draws.csv"'
@@ -254,7 +257,7 @@ def _varying(quantity: Quantity, table: Any, name: str) -> Varying:
             f"{100.0 * share:.1f} % of it lies within {quantity.low:g}..{quantity.high:g}"
             f" {quantity.unit or 'of the nominal'}; at least {100.0 * INSIDE:.0f} % has to"
         )
-        raise SpreadError.at(name, quantity.name, _call(varying), allowed)
+        raise SpreadError.at(name, quantity.name, _call_text(varying), allowed)
     return varying
 
 
@@ -294,24 +297,24 @@ def _share_inside(varying: Varying, name: str) -> float:
     share = varying.share_inside
     if math.isnan(share):
         allowed = f"no parameters that {varying.distribution} may have"
-        raise SpreadError.at(name, varying.quantity.name, _call(varying), allowed)
+        raise SpreadError.at(name, varying.quantity.name, _call_text(varying), allowed)
     return share
 
 
-def _call(varying: Varying) -> str:
+def _call_text(varying: Varying) -> str:
     return f"{varying.distribution}({', '.join(f'{key}={value:g}' for key, value in varying.parameters)})"
 
 
-# Shares of a distribution whose values give its mean and standard deviation.
-_MIDDLES = 4096
+# Number of quantiles used to compute the mean and standard deviation of a distribution.
+_QUANTILES = 4096
 
 
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """Return the draw of flight `index` of a campaign.
+    """Draw of flight `index` of a campaign.
 
-    seed: of what changes within the flight: turbulence, and the error of navigation.
-    values: by quantity, all of them; those that do not vary have their nominal value.
+    seed: seed of changes within the flight: turbulence, and the error of navigation.
+    values: values of all quantities by name; quantities that do not vary have their nominal value.
     """
 
     index: int
@@ -322,8 +325,8 @@ class Draw:
 def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
     r"""Draw a flight's numbers.
 
-    seed: the campaign's.  The stream is ``SeedSequence(seed, spawn_key=(index,))``: no flight needs another's draw, so
-    that any order, any number of workers and any part of a campaign give the same flights.
+    seed: seed of the campaign.  The stream is ``SeedSequence(seed, spawn_key=(index,))``: no draw depends on another,
+    so that any order, any number of workers and any part of a campaign give the same flights.
 
     >>> from planfly.campaigns.dispersions import parse_dispersions
     >>> one = parse_dispersions('[mass]\ndistribution = "uniform"\nloc = 0.9\nscale = 0.2\nsource = "by hand"', "x")
@@ -341,9 +344,10 @@ def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
 
 
 def standard_draws(dispersions: Dispersions, seed: int, start: int, stop: int) -> Floats:
-    """(stop - start, d) what varies, as `draw_flight` draws it for these flights, in standard deviations from the mean.
+    """Return the draws of flights, (stop - start, d), in standard deviations from the mean of each quantity.
 
-    d: of the varying quantities those that have more than one value.
+    The flights are drawn as in `draw_flight`.
+    d: number of varying quantities that have more than one value.
 
     >>> from planfly.campaigns.dispersions import default_dispersions
     >>> standard_draws(default_dispersions(), 1, 5, 7).shape
@@ -351,13 +355,14 @@ def standard_draws(dispersions: Dispersions, seed: int, start: int, stop: int) -
     """
     uniform = np.array([_drawn(seed, index)[0] for index in range(start, stop)]).reshape(-1, len(QUANTITIES))
     columns = [QUANTITIES.index(one.quantity) for one in dispersions.varying]
-    return _standardised(dispersions, uniform[:, columns])
+    return _standardise(dispersions, uniform[:, columns])
 
 
 def standard_population(dispersions: Dispersions, count: int) -> Floats:
-    """(count, d) points that cover evenly what may be drawn, as `standard_draws` has it; count: a power of two.
+    """Return points (count, d) that cover the dispersions evenly, in the units of `standard_draws`.
 
-    The points are Sobol's, each in the middle of its cell.
+    count: a power of two.
+    The points are a Sobol sequence, each at the center of its cell.
 
     >>> from planfly.campaigns.dispersions import default_dispersions
     >>> bool(abs(standard_population(default_dispersions(), 1024).mean(axis=0)).max() < 0.01)
@@ -367,21 +372,21 @@ def standard_population(dispersions: Dispersions, count: int) -> Floats:
 
     quantities = len(dispersions.varying)
     shares = qmc.Sobol(quantities, scramble=False).random(count) if quantities else np.zeros((count, 0))
-    return _standardised(dispersions, shares + 0.5 / count)
+    return _standardise(dispersions, shares + 0.5 / count)
 
 
 def _drawn(seed: int, index: int) -> tuple[Floats, int]:
-    """Return the share of its distribution for each of `QUANTITIES`, and the seed of changes within the flight."""
+    """Draw the share of the distribution of each of `QUANTITIES`, and the seed of changes within the flight."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
     return random.random(len(QUANTITIES)), int(random.integers(2**63))
 
 
-def _standardised(dispersions: Dispersions, shares: Floats) -> Floats:
-    """(n, d) of shares (n, v) of each varying quantity's distribution."""
-    middles = (np.arange(_MIDDLES) + 0.5) / _MIDDLES
+def _standardise(dispersions: Dispersions, shares: Floats) -> Floats:
+    """Convert shares (n, v) of the varying quantities' distributions to standard deviations from the mean, (n, d)."""
+    quantiles = (np.arange(_QUANTILES) + 0.5) / _QUANTILES
     columns = []
     for k, one in enumerate(dispersions.varying):
-        values = one.values(middles)
+        values = one.values(quantiles)
         if (deviation := float(values.std())) > 0.0:
             columns.append((one.values(shares[:, k]) - values.mean()) / deviation)
     return np.column_stack(columns) if columns else np.zeros((len(shares), 0))

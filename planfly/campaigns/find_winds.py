@@ -1,4 +1,4 @@
-"""The largest wind from each direction in which a mission flies: flights put where they tell most, in rounds."""
+"""Find the largest wind from each direction in which a mission flies, with rounds of the most informative flights."""
 
 import math
 from collections.abc import Callable, Hashable
@@ -17,20 +17,22 @@ from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, 
 from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, FlownFlight, StoreError, WindsStore, kept_settings
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
 
-# Half of the interval's width that is flown for, m/s, and the fewest flights of a direction: where none of so many
-# fails, one in fifty does at most (95 %); and with fewer a fit is surer of itself than it may be.
+# Target for half the width of the interval of a boundary, m/s.
 ACCURACY = 0.25
+# Smallest number of flights of a direction.  If all of them are flyable, at most one in fifty fails (95 %); with fewer
+# flights the fit states intervals that are too narrow.
 FEWEST = 150
-# Points that stand for all that may be drawn.
+# Number of points that represent the distribution of all drawn quantities.
 _POPULATION = 4096
-# Flights of a round, about, where few directions are open, and the fewest and the most of one direction: workers wait
-# for each round.
-_ROUND = 48
-_FEWEST_EACH = 3
+# Approximate number of flights of a round; workers wait for the end of each round.
+_FLIGHTS_PER_ROUND = 48
+# Smallest number of flights of one direction in a round.
+_MIN_EACH = 3
+# Largest number of flights of one direction in a round.
 _MAX_EACH = 6
-# A direction that is not settled is looked at again with so many times as many flights: a posterior takes a while.
-_LOOK_AGAIN = 1.04
-# Of the dispersions, what the wind that is asked about takes the place of.
+# Growth of the number of flights between two checks of an open direction; the posterior is slow to compute.
+_CHECK_GROWTH_RATIO = 1.04
+# Dispersed quantities that the wind of the search replaces.
 SEARCHED_QUANTITIES = ("wind_speed", "wind_from")
 
 Advance = Callable[[float, float, str], None]
@@ -38,7 +40,7 @@ Advance = Callable[[float, float, str], None]
 
 @dataclass(frozen=True)
 class WindsGoal:
-    """Request: probability, directions, largest wind to try (m/s), and the most flights of all directions."""
+    """Goal of a search: probability, number of directions, largest wind to try (m/s), and most flights in total."""
 
     target: float
     confidence: float
@@ -47,14 +49,14 @@ class WindsGoal:
     flights: int
 
 
-# Flights of a search that says no number.
+# Default number of flights of a search.
 USUAL_WIND_FLIGHTS = 5000
 
 
 def asked_flights(asked: int | None, folder: Path, *, resume: bool) -> int:
-    """Return the most flights of a search: as asked for, or those that the one in a folder was to have.
+    """Return the maximum number of flights: the requested one, or else the one stored in a folder's search.
 
-    Raises StoreError for a file that is none of ours or is held.
+    Raises StoreError for a file that planfly did not write, or that another process holds.
     """
     kept = kept_settings(folder / WINDS_DATABASE) if resume else {}
     return int(kept.get("flights", USUAL_WIND_FLIGHTS)) if asked is None else asked
@@ -62,10 +64,10 @@ def asked_flights(asked: int | None, folder: Path, *, resume: bool) -> int:
 
 @dataclass(frozen=True, repr=False)
 class WindsFound:
-    """The boundary of each direction, and the flights it rests on: direction, speed, and whether flyable.
+    """Boundary of each direction, and the flights it is estimated from: direction, speed, and True if flyable.
 
-    lost: which of them, from 0, could not be flown; they count as not flyable.
-    conditions: whose flights these are, in which world, and who flies; the wind is that of each direction.
+    lost: indices, from 0, of the flights that could not be flown; they are treated as not flyable.
+    conditions: conditions of the flights without the wind, which depends on the direction.
     """
 
     goal: WindsGoal
@@ -75,7 +77,7 @@ class WindsFound:
     conditions: Conditions | None = None
 
     def from_deg(self, direction: int) -> float:
-        """Directions that the winds come from, degrees."""
+        """Directions from which the winds blow, degrees."""
         return 360.0 * direction / self.goal.directions
 
     def __repr__(self) -> str:
@@ -86,11 +88,11 @@ class WindsFound:
 
 
 def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool) -> WindsStore:
-    """Return the search's table in a folder, new or to go on with.
+    """Open the table of a search in a folder, new or to be resumed.
 
-    base: of dispersions without the quantities of `SEARCHED_QUANTITIES`.
-    Raises StoreError, also for one that was asked for something else; more flights may be asked for, or fewer, of which
-    the others then stay in the table.
+    base: has dispersions without the quantities of `SEARCHED_QUANTITIES`.
+    Raises StoreError, also for the table of a search with another goal.  The number of flights may be changed; a
+    smaller number leaves the other flights in the table.
     """
     settings = {"name": base.name, "seed": base.seed, "spread": base.dispersions.to_json(), **asdict(goal)}
     return WindsStore(folder / WINDS_DATABASE, f"{base.world_hash()}-{code_hash()}", settings, resume=resume)
@@ -104,11 +106,12 @@ def find_winds(
     advance: Advance | None = None,
     fly: FlyOne = fly_one,
 ) -> WindsFound:
-    """Fly in rounds, but for what the table has, until each boundary is known well enough or flights are used up.
+    """Fly rounds of flights until each boundary is known well enough or all flights are used.
 
-    A round's winds follow from the rounds before it alone, so that the result is the same for any number of workers
-    and however often it was stopped.  What was flown before an error or Ctrl-C stays in the table.
-    base: of dispersions without the quantities of `SEARCHED_QUANTITIES`.
+    Flights that the table holds are not flown again.  The winds of a round depend on the earlier rounds alone, so that
+    the result is the same for any number of workers and of interruptions.  Flights flown before an error or Ctrl-C stay
+    in the table.
+    base: has dispersions without the quantities of `SEARCHED_QUANTITIES`.
     """
     search, known = _Search(goal, base), _Known(store)
     pace = _Pace(search, len(known.flown), advance)
@@ -117,7 +120,7 @@ def find_winds(
         while asked := search.next_round():
             if missing := known.missing(asked):
                 if pool is None:
-                    # Before the workers are there, which takes seconds.
+                    # Before the workers start, which takes seconds.
                     pace.begin(len(known.flown))
                 pool = pool or stack.enter_context(worker_pool(workers, base, fly))
                 _fly_round(pool, search, missing, known, pace)
@@ -137,15 +140,15 @@ class _Search:
         )
         self.directions = [Direction(goal.most, goal.target, numbers, goal.confidence) for _ in range(goal.directions)]
         self.open = list(range(goal.directions))
-        # Flights of each direction with which it is looked at whether it is settled.
-        self._looked_at = [FEWEST] * goal.directions
+        # Number of flights of each direction at which it is checked next.
+        self._next_check = [FEWEST] * goal.directions
         self.flown: list[tuple[int, float, bool]] = []
         self.lost: list[int] = []
 
     def next_round(self) -> list[AskedFlight]:
-        """Return the flights to fly next; none where all is known or used up."""
+        """Return the flights to fly next; an empty list if all boundaries are known or all flights are used."""
         self.open = [number for number in self.open if self._is_open(number)]
-        each = max(_FEWEST_EACH, min(_MAX_EACH, _ROUND // max(1, len(self.open))))
+        each = max(_MIN_EACH, min(_MAX_EACH, _FLIGHTS_PER_ROUND // max(1, len(self.open))))
         asked: list[AskedFlight] = []
         for number in self.open:
             for speed, draw in next_flights(self.directions[number], each):
@@ -155,19 +158,19 @@ class _Search:
     def _is_open(self, number: int) -> bool:
         direction = self.directions[number]
         count = len(direction.speeds)
-        if count < self._looked_at[number]:
+        if count < self._next_check[number]:
             return True
-        self._looked_at[number] = math.ceil(_LOOK_AGAIN * count)
+        self._next_check[number] = math.ceil(_CHECK_GROWTH_RATIO * count)
         return needs_more(direction.boundary(), count, ACCURACY, FEWEST)
 
     def take(self, asked: AskedFlight, flown: FlownFlight) -> None:
-        """Take a flight in, in the request in which they were asked for."""
+        """Add a flight; flights are added in the order in which they were requested."""
         flyable = flown.outcome == "flyable"
-        ways: set[Hashable] = {_way(rule, place) for rule, place in flown.failed} or {flown.outcome}
-        failed = frozenset() if flyable else frozenset(ways)
+        failures: set[Hashable] = {_way(rule, place) for rule, place in flown.failed} or {flown.outcome}
+        failed = frozenset() if flyable else frozenset(failures)
         margin: dict[Hashable, float] | None = {_way(rule, place): share for rule, place, share in flown.narrow}
         if flown.outcome == "lost" or any(rule == "completion" for rule, _ in flown.failed):
-            # What it would have passed, had it gone on, is not known.
+            # It is not known which rules the flight would have passed if it had continued.
             margin = None
         self.directions[asked.direction].add(asked.speed, asked.draw, failed, margin)
         self.flown.append((asked.direction, asked.speed, flyable))
@@ -175,28 +178,28 @@ class _Search:
             self.lost.append(asked.number)
 
     def request(self, asked: AskedFlight) -> FlightRequest:
-        """As it is flown."""
+        """Return the flight as a request to a worker."""
         return FlightRequest(asked.draw, GivenWind(asked.speed, 360.0 * asked.direction / self.goal.directions))
 
     def at_least(self) -> int:
-        """Return flights that are to come before any direction that is open can be known, of all of them."""
+        """Return the number of flights to come before all open directions have the smallest number of flights."""
         to_come = sum(max(0, FEWEST - len(self.directions[number].speeds)) for number in self.open)
         return min(to_come, self.goal.flights - len(self.flown))
 
     def found(self) -> WindsFound:
-        """Return the answer."""
+        """Return the result of the search."""
         boundaries = tuple(one.boundary() for one in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
         return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions)
 
 
 def _way(rule: str, place: Place) -> Hashable:
-    """Return a way of failing: the rule, and where."""
+    """Return the key of a failure: the rule and its place."""
     return rule, place.kind, place.index
 
 
 class _Known:
-    """The flights that the table has, and what came of each by number."""
+    """Flights in the table, and their outcomes by number."""
 
     def __init__(self, store: WindsStore) -> None:
         known = store.known()
@@ -205,7 +208,7 @@ class _Known:
         self.flown = {number: flown for number, (_, flown) in known.items()}
 
     def missing(self, asked: list[AskedFlight]) -> list[AskedFlight]:
-        """Return those that have still to be flown.  Raises StoreError for one that was asked for otherwise."""
+        """Return the flights still to be flown.  Raises StoreError if the table holds another request for a number."""
         for one in asked:
             if self._asked.get(one.number, one) != one:
                 path = self._store.path
@@ -213,7 +216,7 @@ class _Known:
         return [one for one in asked if one.number not in self.flown]
 
     def add(self, asked: AskedFlight, row: FlightRow) -> None:
-        """Write one down."""
+        """Write a flight to the table."""
         self._store.add(asked, row)
         self.flown[asked.number] = FlownFlight(row.outcome, row.failed, row.narrow)
 
@@ -236,7 +239,7 @@ def _fly_round(pool: WorkerPool, search: _Search, missing: list[AskedFlight], kn
 
 
 class _Pace:
-    """Progress, reported now and then; known: flights that were there before."""
+    """Periodic progress report.  known: number of flights in the table at the start."""
 
     def __init__(self, search: _Search, known: int, advance: Advance | None) -> None:
         self._search, self._advance, self._rate = search, advance, FlightRate(known)
@@ -251,8 +254,8 @@ class _Pace:
     def tell(self, flights: int, last: bool = False) -> None:
         """Describe the progress: directions settled, flights, flights a minute, and the time left if it is known.
 
-        last: whether or not it is due.
-        How many a direction takes beyond the fewest shows only when it has them: no time is given then.
+        last: True reports even if no report is due.
+        The number of flights beyond `FEWEST` is not known in advance: no time left is given then.
         """
         if self._advance is None or not (self._rate.due() or last):
             return

@@ -1,4 +1,4 @@
-"""Flights that a campaign asks its workers for, what a worker holds of the campaign, and which workers may fly it."""
+"""Flights that a campaign requests, the copy of it that each worker holds, and the check of workers."""
 
 import hashlib
 import pickle
@@ -16,47 +16,48 @@ from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.flight_row import FlightRow, fly_one
 from world.errors import PlanflyError
 
-# Flies flight k of a base, in this wind; `fly_one` in all campaigns.
+# Function that flies flight k of a base, in a given wind; `fly_one` in all campaigns.
 FlyOne = Callable[[CampaignBase, int, GivenWind | None], FlightRow]
 
-# How a flight ended that could not be flown.
+# End of a flight that could not be flown.
 LOST = "lost: its workers died"
-# Deaths of workers on one flight before it is lost: the first ones may have had another cause.
+# Number of deaths of workers on one flight before it is lost: the first ones may have had another cause.
 MAX_FAILURES = 3
 
 
 @dataclass(frozen=True, slots=True)
 class FlightRequest:
-    """A flight to fly: its index, and the mean wind that takes the scenario's place, None for none."""
+    """Flight to fly: its index, and the mean wind that replaces the scenario's wind, or None to keep it."""
 
     index: int
     wind: GivenWind | None = None
 
 
 class Flown(NamedTuple):
-    """A request, and its row."""
+    """Request with the row of its flight."""
 
     request: FlightRequest
     row: FlightRow
 
 
 # ----------------------------------------------------------------------
-# Workers that differ in what they fly with may not fly flights of one campaign.
+# Workers with different software may not fly flights of the same campaign.
 
-# Packages whose version may move a bit of a flight.
+# Packages whose version may change a flight in its last bits.
 _PACKAGES = ("jsbsim", "numba", "numpy", "scipy")
-_OURS = ("aircraft", "flight", "logs", "planfly", "planner", "world")
+# Top-level packages of planfly, whose sources are hashed.
+_OWN_PACKAGES = ("aircraft", "flight", "logs", "planfly", "planner", "world")
 
 
 class WorkerError(PlanflyError):
-    """A worker does not fly what the campaign flies."""
+    """A worker does not have the software or model of the campaign."""
 
 
 @cache
 def code_hash() -> str:
     """Return a hash of planfly's own sources, as installed here."""
     digest = hashlib.sha256()
-    for package in _OURS:
+    for package in _OWN_PACKAGES:
         root = Path(str(resources.files(package)))
         for file in sorted(root.rglob("*.py")):
             digest.update(str(file.relative_to(root)).encode())
@@ -65,7 +66,7 @@ def code_hash() -> str:
 
 
 def fingerprint(aircraft: str) -> dict[str, str]:
-    """Return what decides a flight of this aircraft on this machine, by name.
+    """Return the versions and hashes that determine a flight of this aircraft on this machine, by name.
 
     >>> sorted(fingerprint("aerosonde"))
     ['jsbsim', 'model', 'numba', 'numpy', 'planfly', 'python', 'scipy', 'sources']
@@ -84,7 +85,7 @@ def fingerprint(aircraft: str) -> dict[str, str]:
 
 
 def refuse_different(mine: dict[str, str], theirs: dict[str, str], worker: str) -> None:
-    """Raise WorkerError, with the worker and the first difference, unless it flies as this process would.
+    """Raise WorkerError, with the worker and the first difference, unless the fingerprints are equal.
 
     >>> refuse_different({"planfly": "0.1.0"}, {"planfly": "0.0.9"}, "tls://10.0.0.7:4000")
     Traceback (most recent call last):
@@ -99,7 +100,7 @@ def refuse_different(mine: dict[str, str], theirs: dict[str, str], worker: str) 
 
 
 class CampaignCopy:
-    """A campaign as its workers get it: packed, and unpacked once by each.
+    """Campaign packed for its workers; each worker unpacks it once.
 
     mine: `fingerprint` of the process that leads the campaign.
     """
@@ -111,16 +112,16 @@ class CampaignCopy:
         self._unpacked: tuple[CampaignBase, FlyOne] | None = None
 
     def fly(self, request: FlightRequest, worker: str) -> FlightRow:
-        """Fly a flight on this worker.  Raises WorkerError for a worker that would fly it otherwise."""
+        """Fly a flight on this worker.  Raises WorkerError for a worker that would fly it differently."""
         base, fly = self.unpacked(worker)
         return replace(fly(base, request.index, request.wind), worker=worker)
 
     def unpacked(self, worker: str) -> tuple[CampaignBase, FlyOne]:
-        """Return the campaign and the function that flies it.  Raises WorkerError as `fly`."""
+        """Return the campaign and the function that flies it.  Raises WorkerError as `fly` does."""
         if self._unpacked is None:
             refuse_different(self._mine, fingerprint(self._aircraft), worker)
             base, fly = pickle.loads(self._packed)
-            # The same model, wherever this machine has it.
+            # The same model, from its folder on this machine.
             airframe = replace(base.airframe, aircraft=find_aircraft(self._aircraft))
             self._unpacked = replace(base, airframe=airframe), fly
         return self._unpacked

@@ -1,6 +1,6 @@
-"""One flight of a campaign, flown and judged as `planfly fly` does it, and the row that tables keep of it.
+"""Fly and judge one flight of a campaign as `planfly fly` does, and make its row for the tables.
 
-A column of the tables is a field of `FlightRow`; a rule's are its least margin and that margin's place.
+Each column of the tables is a field of `FlightRow`; each rule has columns for its least margin and the margin's place.
 """
 
 import json
@@ -27,12 +27,12 @@ from world.arrays import Singles
 from world.scenario import Scenario
 
 # ----------------------------------------------------------------------
-# Where a flight passed narrowly, and by how much: that tells more of the risk than that it did not fail.
+# Narrow passes of a flight and their margins: they say more about the risk than the fact that no rule failed.
 #
-# A pass is narrow where less than the scale of the rule's margin is left to where the rule
-# fails, its tolerance counted; of a missile, where the flight stayed closer than `SPHERE_SCALE` outside its sphere.
+# A pass is narrow if the distance to the failure of the rule, tolerance included, is less than the scale of the
+# rule's margin.  For a missile, it is narrow if the flight stayed less than `SPHERE_SCALE` outside its sphere.
 
-# Of a missile's sphere, by the distance outside it, m.
+# Scale of the margin of a missile's sphere: distance outside it, m.
 SPHERE_SCALE = 10.0
 
 # Rule, place, and margin as a share of the rule's scale, 0 to 1.
@@ -40,9 +40,9 @@ NarrowPass = tuple[str, Place, float]
 
 
 def narrow_passes(findings: Iterable[Finding], scenario: Scenario, track: Track) -> tuple[NarrowPass, ...]:
-    """Rule, place and margin of each narrow pass of a flight, the verdict's order, then missiles.
+    """Return the rule, place and margin of each narrow pass, in the verdict's order, then missiles.
 
-    Where a rule passes what lies beyond its limit, for reasons of its own, the margin is 0.
+    The margin is 0 where a rule accepts a value beyond its limit for its own reasons.
     """
     shares: dict[tuple[str, Place], float] = {}
     failed = {(item.rule, item.place) for item in findings if item.ok is False}
@@ -54,13 +54,13 @@ def narrow_passes(findings: Iterable[Finding], scenario: Scenario, track: Track)
         share = max(0.0, item.margin + (item.tolerance or 0.0)) / scale
         if share < 1.0:
             shares[at] = min(share, shares.get(at, share))
-    for place, distance in _outside_spheres(scenario, track):
+    for place, distance in _distances_outside_spheres(scenario, track):
         if ("threat", place) not in failed and distance < SPHERE_SCALE:
             shares["threat", place] = max(0.0, distance) / SPHERE_SCALE
     return tuple((rule, place, share) for (rule, place), share in shares.items())
 
 
-def _outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, float]]:
+def _distances_outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, float]]:
     """Return how far outside each missile's sphere the track stays, m."""
     threats = scenario.threats
     if scenario.external or len(track) < 2:
@@ -74,17 +74,17 @@ def _outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, floa
 
 
 # ----------------------------------------------------------------------
-# What the pictures keep of a flight: its clearance along the way, and where it crossed each waypoint.
+# Data of a flight for the pictures: its clearance along the path, and its crossing of each waypoint.
 
 
-# Equal pieces of the route's length, of each of which the least clearance is kept.
+# Number of equal pieces of the route's length; the least clearance of each piece is stored.
 STATIONS = 150
 
 
 def clearance_profile(route: Route, track: Track) -> Singles:
-    """(STATIONS,) the least height above ground on each equal piece of the route's length, m; NaN where none was flown.
+    """Return the least height above ground on each equal piece of the route, (STATIONS,) m; NaN if it was not flown.
 
-    The place on the route is that beside the track, on the leg that was flown then.
+    Each track point is assigned to the nearest place on the leg that was flown at that time.
     """
     starts, ends = route.waypoints[:-1, :2], route.waypoints[1:, :2]
     lengths = np.hypot(*(ends - starts).T)
@@ -100,10 +100,10 @@ def clearance_profile(route: Route, track: Track) -> Singles:
 
 
 def waypoint_crossings(route: Route, track: Track) -> Singles:
-    """(s, 2) distance right of and above each of s stops at the track's nearest row, m; NaN where it did not get there.
+    """Return the distance right of and above each of s stops at closest approach, (s, 2) m; NaN if not reached.
 
-    A stop is a waypoint, or the corner at which a loiter or a return begins: how many corners follow differs between
-    flights.  Right is seen along the mean of the courses in and out.
+    A stop is a waypoint, or the corner at which a loiter or a return begins: the number of later corners differs
+    between flights.  Right is relative to the mean of the incoming and outgoing courses.
     """
     points = route.waypoints
     out = np.full((len(points), 2), np.nan, dtype=np.float32)
@@ -124,15 +124,15 @@ def waypoint_crossings(route: Route, track: Track) -> Singles:
 
 
 # ----------------------------------------------------------------------
-# The row of a flight, and with it the columns of every table of flights.
+# The row of a flight, which also defines the columns of every table of flights.
 
-# A lost flight could not be flown: its workers died on it.
+# Outcomes of a flight; a lost flight could not be flown, because its workers died on it.
 Outcome = Literal["flyable", "not flyable", "lost"]
 
 
 @dataclass(frozen=True, slots=True)
 class LeastMargin:
-    """The least margin of a rule in a flight: how much, in which unit, where; value is None where none has a number."""
+    """Least margin of a rule in a flight: value, unit and place; value is None if no margin has a number."""
 
     value: float | None
     unit: str
@@ -143,10 +143,10 @@ class LeastMargin:
 class Column:
     """Storage of a field of `FlightRow` in a table.
 
-    kind: SQLite's type and constraint.
-    write, read: the field's value to the column's, and back.
-    entry: of an array's bytes (a BLOB, float32), the shape of each of its entries; () for numbers.
-    same: whether the same flight has the same value wherever and however fast it was flown.
+    kind: type and constraint in SQLite.
+    write, read: convert the value of the field to the value of the column, and back.
+    entry: shape of each entry of an array stored as bytes (a BLOB, float32); () for numbers.
+    same: True if the same flight has the same value on every machine, however fast it was flown.
     """
 
     kind: str
@@ -161,7 +161,7 @@ def _failed_text(failed: Iterable[tuple[str, Place]]) -> str:
 
 
 def failed_of(text: str) -> tuple[tuple[str, Place], ...]:
-    """Rule and place of each finding that failed, of the column's text.
+    """Parse the rule and place of each failed finding from the text of the column.
 
     >>> failed_of('[{"rule": "slope", "kind": "leg", "index": 3}]')[0][1].index
     3
@@ -170,29 +170,33 @@ def failed_of(text: str) -> tuple[tuple[str, Place], ...]:
     return tuple((entry.pop("rule"), Place(**entry)) for entry in entries)
 
 
+# Column of a text.
 _TEXT = Column("TEXT NOT NULL")
+# Column of a number.
 _REAL = Column("REAL NOT NULL")
+# Column of an array stored as bytes.
 _BLOB = Column("BLOB NOT NULL")
+# Column of the failed findings, as JSON.
 _FAILED = Column("TEXT NOT NULL", _failed_text, failed_of)
 
 
 @dataclass(frozen=True, slots=True)
 class FlightRow:
-    """A flight in the campaign's table: each field that is ``Annotated`` with a `Column` is one.
+    """Row of a flight in the campaign's table; each field ``Annotated`` with a `Column` is a column.
 
-    The draw takes a column a dispersion, the margins two a rule and one for the closeness; the tables of
-    `planfly.campaigns.tables` follow from all this.
+    The draw has one column per dispersion; the margins have two columns per rule, and one for the closeness.  The
+    tables of `planfly.campaigns.tables` are derived from this class.
 
-    ended: how, "completed" or why not.
-    failed: rule and place of each finding that failed, in the verdict's order.
-    margins: by rule, of those that were judged and whose margin has a scale.
-    energy_left: Wh; None where nothing was flown.
+    ended: "completed", or the reason why the flight ended early.
+    failed: rule and place of each failed finding, in the verdict's order.
+    margins: least margin by rule, for judged rules whose margin has a scale.
+    energy_left: Wh; None if nothing was flown.
     duration: s.
-    made_of: hash of what the flight was flown with; "" outside of a table.
-    clearance, crossings: bytes of the arrays of `clearance_profile` and `waypoint_crossings`; empty where nothing was
+    made_of: hash of all inputs of the flight; "" outside a table.
+    clearance, crossings: bytes of the arrays of `clearance_profile` and `waypoint_crossings`; empty if nothing was
     flown.
-    seconds: that it took.  worker: who flew it.
-    narrow: where it passed narrowly, and with how much margin; the table of a campaign does not keep it.
+    seconds: computing time, s.  worker: name of the worker that flew it.
+    narrow: narrow passes with their margins; the table of a campaign does not store them.
     """
 
     draw: Draw
@@ -211,31 +215,32 @@ class FlightRow:
 
     @property
     def closeness(self) -> float:
-        """Least of all margins in their scales: what orders the closest calls; inf where none is known."""
+        """Least of all scaled margins, by which the closest calls are sorted; inf if no margin is known."""
         shares = (share for rule, margin in self.margins if (share := scaled(rule, margin)) is not None)
         return min((share for share in shares if math.isfinite(share)), default=math.inf)
 
 
 def scaled(rule: str, margin: LeastMargin) -> float | None:
-    """Return a margin in the scale of its rule; None where either has no number."""
+    """Return a margin divided by the scale of its rule, or None if either has no number."""
     scale = RULE_WORDS[rule].scale
     return None if margin.value is None or scale is None else margin.value / scale
 
 
 def _fields() -> dict[str, Column]:
-    """Return the fields of `FlightRow` that are a column each, by name, in order."""
+    """Return the fields of `FlightRow` that are columns, by name, in order."""
     hints = get_type_hints(FlightRow, include_extras=True)
     found = {name: get_args(hint) for name, hint in hints.items()}
     return {name: args[-1] for name, args in found.items() if args and isinstance(args[-1], Column)}
 
 
+# Fields of `FlightRow` that are columns, by name.
 FIELDS = _fields()
 
 
 def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: Path | None = None) -> FlightRow:
     """Fly a flight of a campaign by its index alone.
 
-    wind: mean wind in the scenario's place.  log: where to record it, None for nowhere.
+    wind: mean wind that replaces the scenario's wind.  log: file for the recording, or None for no recording.
     """
     started = time.perf_counter()
     draw = draw_flight(base.dispersions, base.seed, index)
@@ -259,7 +264,7 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
 
 
 def failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
-    """Rule and place of each finding that failed; where none did and the flight is not whole, completion's."""
+    """Return the rule and place of each failed finding, or of completion if none failed in an incomplete flight."""
     failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
     if failed or verdict.flies:
         return failed
@@ -279,7 +284,7 @@ def least_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, LeastMargin
         if item.ok is not None and RULE_WORDS[item.rule].scale is not None:
             by_rule.setdefault(item.rule, []).append(item)
     closest = [closest_to_limit(mine) for mine in by_rule.values()]
-    # A rule that fails by other evidence than its number has none.
+    # A rule that fails for reasons other than its number has no margin.
     return tuple(
         (one.rule, LeastMargin(one.margin, one.unit, one.place)) for one in closest if one and one.margin is not None
     )

@@ -1,4 +1,4 @@
-"""A campaign from its first flight to its answer: flown in parallel, stored by index, summarised from the table."""
+"""Fly a campaign in parallel, store its flights by index, and decide on its answer."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -16,9 +16,9 @@ Advance = Callable[[float, float, str], None]
 
 @dataclass
 class _Book:
-    """Known flights, and the result of the first of them without a gap.
+    """Known flights, and the tally of the flights before the first gap.
 
-    beyond: outcome of the known ones after the first gap.
+    beyond: outcomes of the known flights after the first gap.
     """
 
     estimator: Estimator
@@ -29,14 +29,14 @@ class _Book:
     decided: bool = False
 
     def add(self, index: int, outcome: str) -> None:
-        """Take a flight in, and decide as soon as the flights without a gap do."""
+        """Add a flight, and decide as soon as the flights before the first gap allow it."""
         self.beyond[index] = outcome
         while not self.decided and (known := self.beyond.pop(self.tally.flown, None)) is not None:
             self.tally = _with_outcome(self.tally, known)
             self.decided = self.goal.stops and self.estimator.decides(self.tally)
 
     def following(self) -> FlightRequest | None:
-        """Return the next flight to send."""
+        """Return the next flight to send, or None if no flight is left."""
         self.sent = max(self.sent, self.tally.flown)
         while self.sent in self.beyond:
             self.sent += 1
@@ -52,9 +52,9 @@ def _with_outcome(tally: Tally, outcome: str) -> Tally:
 
 
 def resumed_goal(asked: Goal | None, folder: Path, confidence: float | None = None) -> Goal:
-    """Return the goal with which a folder's campaign is gone on with: that asked for now, or else its own.
+    """Return the goal of a resumed campaign: the goal requested now, or else the goal stored in its folder.
 
-    confidence: of either; None for the campaign's own.
+    confidence: confidence of the goal; None keeps the stored one.
     Raises StoreError for a folder without a campaign.
     """
     path = folder / DATABASE
@@ -68,9 +68,9 @@ def resumed_goal(asked: Goal | None, folder: Path, confidence: float | None = No
 
 
 def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) -> Store:
-    """Return the campaign's table in a folder, new or to go on with.
+    """Open the table of a campaign in a folder, new or to be resumed.
 
-    Raises StoreError, also where more flights than the goal's are there.
+    Raises StoreError, also if the table holds more flights than the goal.
     """
     settings = {"name": base.name, "seed": base.seed, "spread": base.dispersions.to_json(), **asdict(goal)}
     path = folder / DATABASE
@@ -85,10 +85,10 @@ def fly_campaign(
     advance: Advance | None = None,
     fly: FlyOne = fly_one,
 ) -> Estimate:
-    """Fly what the table has not, until the goal's number of flights or its answer.
+    """Fly the flights missing in the table, until the goal's number of flights or its answer is reached.
 
-    Flights are decided upon in the order of their indices, so that answer and table do not depend on who was quicker;
-    those beyond the one that decides are taken out again.  What was flown before an error or Ctrl-C stays in the table.
+    The answer is decided in the order of the flights' indices, so that answer and table do not depend on the speed of
+    the workers; flights after the deciding one are deleted.  Flights flown before an error or Ctrl-C stay in the table.
     """
     estimator = Estimator(goal)
     book = _Book(estimator, goal)
@@ -119,23 +119,23 @@ def _take(row: FlightRow, book: _Book, store: Store) -> None:
 
 
 class _Pace:
-    """Progress, reported now and then; known: the flights that were there before."""
+    """Periodic progress report.  known: number of flights in the table at the start."""
 
     def __init__(self, goal: Goal, estimator: Estimator, known: Tally, advance: Advance | None) -> None:
         self._goal, self._estimator, self._advance = goal, estimator, advance
         self.start(known)
         if advance is not None:
-            # Before the workers are there, which takes seconds.
+            # Before the workers start, which takes seconds.
             total = self._total(known)
             remark = f"{known.flown} of {total} flights" + (" at least" if goal.stops else "")
             advance(float(known.flown), float(total), remark)
 
     def start(self, known: Tally) -> None:
-        """Count the time from here: the workers are there."""
+        """Start timing: the workers are ready."""
         self._rate = FlightRate(known.flown)
 
     def _total(self, tally: Tally) -> int:
-        """Return how many flights there will be, at least."""
+        """Return the smallest possible number of flights in total."""
         return max(self._estimator.fewest, tally.flown) if self._goal.stops else self._goal.flights
 
     def tell(self, tally: Tally, last: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""Processes of this machine that fly a campaign: plain ones, each with one flight at a time, which open no socket."""
+"""Plain processes on this machine that fly a campaign, one flight at a time each, without sockets."""
 
 import errno
 import os
@@ -26,15 +26,15 @@ from world.interruption import children_ignore_sigint, end_children, end_with_pa
 if TYPE_CHECKING:
     from multiprocessing.process import BaseProcess
 
-# Processes that end while they start, one after the other, before the pool gives up.
+# Number of processes in a row that may die while starting before the pool gives up.
 MAX_FAILED_STARTS = 10
 
-# The campaign of a worker process.
+# Campaign of this worker process.
 _copies: list[CampaignCopy] = []
 
 
 def _begin(copy: CampaignCopy) -> None:
-    """Take the campaign into a worker process."""
+    """Load the campaign in a worker process."""
     _copies.append(copy)
 
 
@@ -44,7 +44,7 @@ def _fly(request: FlightRequest) -> FlightRow:
 
 
 class _Worker:
-    """A process that flies one flight at a time.  One that has died is replaced with the next flight."""
+    """Process that flies one flight at a time; a dead process is replaced when the next flight is sent."""
 
     def __init__(self, copy: CampaignCopy) -> None:
         self._copy = copy
@@ -52,8 +52,8 @@ class _Worker:
         self._started: Future[None] = Future()
 
     def send(self, request: FlightRequest) -> Future[FlightRow]:
-        """Have a flight flown."""
-        # Ctrl-C reaches every process of a terminal: workers leave it to this one, which ends them.
+        """Send a flight to the process."""
+        # Ctrl-C reaches every process of a terminal: workers ignore it, and this process ends them.
         with children_ignore_sigint(), uninterrupted():
             try:
                 return self._submit(request)
@@ -64,22 +64,22 @@ class _Worker:
 
     def _submit(self, request: FlightRequest) -> Future[FlightRow]:
         if self._pool is None:
-            # A pool of one: where a process dies, it is known on which flight.
+            # A pool of one process: if it dies, its flight is known.
             self._pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=end_with_parent)
-            # Not as an argument of the process: its start would wait until it has imported all that this takes.
+            # Not an argument of the process: the start would wait until the process has imported everything it needs.
             self._started = self._pool.submit(_begin, self._copy)
         return self._pool.submit(_fly, request)
 
     @property
     def has_started(self) -> bool:
-        """True where the last process has come to its first flight."""
+        """True if the last process has started its first flight."""
         return self._started.done() and self._started.exception() is None
 
     def leave(self) -> "list[BaseProcess]":
-        """Send the process no more flights, and return it where there is one: the caller ends it."""
+        """Send no more flights to the process, and return it, if any: the caller ends it."""
         if self._pool is None:
             return []
-        # Python 3.14 has a method for it.
+        # Python 3.14 has a method for this.
         processes: list[BaseProcess] = list((self._pool._processes or {}).values())
         self._pool.shutdown(wait=False, cancel_futures=True)
         self._pool = None
@@ -87,12 +87,12 @@ class _Worker:
 
 
 def _end(workers: Iterable[_Worker]) -> None:
-    """End the processes of workers, whatever they do."""
+    """Kill the processes of workers."""
     end_children([process for worker in workers for process in worker.leave()])
 
 
 class LocalPool:
-    """Processes of this machine that fly the flights of a campaign.  count: of them."""
+    """Processes on this machine that fly the flights of a campaign.  count: number of processes."""
 
     def __init__(self, count: int, base: CampaignBase, fly: FlyOne = fly_one) -> None:
         self._base = base
@@ -105,10 +105,10 @@ class LocalPool:
         _end(self._workers)
 
     def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
-        """Fly requests as they are asked for, and yield each when it is done, in any order.
+        """Fly requests as `following` returns them, and yield each when it is done, in any order.
 
-        following: gives the next request, None for none at present; asked again after each flight.
-        Raises the `world.errors.PlanflyError` of a flight, and OSError where no process can be started.
+        following: returns the next request, or None for the time being; called again after each flight.
+        Raises the `world.errors.PlanflyError` of a flight, and OSError if no process can be started.
         """
         idle = list(self._workers)
         flying: dict[Future[FlightRow], tuple[_Worker, FlightRequest]] = {}
@@ -137,7 +137,7 @@ class LocalPool:
             _end(worker for worker, _ in flying.values())
 
     def _row(self, future: Future[FlightRow], worker: _Worker, request: FlightRequest) -> FlightRow | None:
-        """Return the row of a flight; None where its process has died.  Raises as `fly`."""
+        """Return the row of a flight, or None if its process has died.  Raises the errors of `fly`."""
         try:
             row = future.result()
         except BrokenProcessPool:

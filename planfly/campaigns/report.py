@@ -1,4 +1,4 @@
-"""The files of a campaign's folder: summary, report page, worst flights' logs, and the go/no-go chart of winds."""
+"""Files of a campaign's folder: summary, report page, logs of the worst flights, and go/no-go chart of winds."""
 
 import json
 import math
@@ -46,12 +46,12 @@ from planner.plan import plan_json
 from world.errors import ArgumentError, PlanflyError
 from world.files import write_whole
 
-# Flights whose way is drawn, at most: of more a picture shows no more.
+# Largest number of flights drawn in the pictures of tracks: more flights do not change them visibly.
 _DRAWN = 3000
 
 
 def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, command: str) -> bytes:
-    """Return the page's bytes; command: the line that flies it again."""
+    """Return the report page as bytes.  command: the command line that repeats the campaign."""
     pictures = [_both_widths(figure, words) for figure, words in _pictures(base, summary, store)]
     lines = campaign_lines(summary)
     text = _render(
@@ -101,20 +101,20 @@ def _render(template: str, **values: object) -> str:
 
 
 def winds_page(name: str, figure: Figure, lines: list[str], rows: Sequence[tuple[str, ...]], command: str) -> bytes:
-    """Return the page of a go/no-go chart, which is narrowed."""
+    """Return the page of a go/no-go chart; the figure is changed to its narrow layout."""
     picture = _both_widths(figure, "Go/no-go chart: wind from each direction")
     return _render("winds.html", name=name, picture=picture, lines=lines, rows=rows, command=command).encode("utf-8")
 
 
 def _both_widths(figure: Figure, words: str) -> Markup:
-    """Return a picture as a page shows it: wide, and on a phone narrow, to which the figure is changed."""
+    """Return a picture for a page in two widths, wide and for phones; the figure is changed to the narrow one."""
     wide = page_svg(figure, words)
     narrow = page_svg(narrowed(figure), f"{words} (narrow)")
     return Markup(f'<div class="wide">{wide}</div><div class="narrow">{narrow}</div>')
 
 
 def _pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:
-    """Figures and their captions."""
+    """Draw the figures of the report, and return them with their captions."""
     flyable = np.array([outcome == "flyable" for outcome in store.outcomes().values()])
     speed = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed"))
     bins = speed_bins(speed, flyable, summary.goal.confidence)
@@ -132,7 +132,7 @@ def _pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> lis
 
 
 def _ways(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
-    """Fan and crossings of the flights that have a track."""
+    """Draw the clearance fan and the crossings of the flights that have a track."""
     setup = make_setup(base.scenario, base.airframe, base.mission, base.seed, plan=base.plan, placed=base.placed)
     points = setup.route.waypoints
     shapes = [np.frombuffer(data, np.float32) for data in store.blobs("clearance", _DRAWN)]
@@ -151,7 +151,7 @@ def _ways(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
         figure = draw_clearance_fan(np.array(shapes, dtype=np.float64), failed, ground, float(before[-1]), least)
         out.append((figure, "Height above ground along the way, over all flights, and the ground itself"))
     crossings = [np.frombuffer(data, np.float32).reshape(-1, 2) for data in store.blobs("crossings", _DRAWN)]
-    # Wind decides whether an autopilot has further stops on its way back: of flights without them NaN.
+    # The number of stops on a return depends on the wind: NaN for flights without the further stops.
     crossed = np.full((len(crossings), max(map(len, crossings)), 2), np.nan)
     for row, known in zip(crossed, crossings, strict=True):
         row[: len(known)] = known
@@ -160,9 +160,9 @@ def _ways(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
 
 
 # ----------------------------------------------------------------------
-# The files of a campaign's folder: what is cleared there, and summary, report, and the logs of its worst flights.
+# Open and clear a campaign's folder, and write its summary, report and logs of the worst flights.
 
-# What a campaign or a search for winds writes into its folder, and clears where it is replaced.
+# Files that a campaign or a search for winds writes into its folder, and removes when it is replaced.
 CAMPAIGN_FILES = (
     *(f"{table}{ending}" for table in (DATABASE, WINDS_DATABASE) for ending in ("", "-wal", "-shm")),
     "summary.json",
@@ -176,10 +176,10 @@ CAMPAIGN_FILES = (
 
 @dataclass(frozen=True)
 class OutputDirectory:
-    """A campaign's folder, and what may be done with what lies in it.
+    """Folder of a campaign, and the permission to resume or replace its contents.
 
     table: name of the file of flights.
-    resume: go on with the campaign that is there.  overwrite: replace it.
+    resume: resume the campaign in the folder.  overwrite: replace it.
     """
 
     folder: Path
@@ -188,7 +188,7 @@ class OutputDirectory:
     overwrite: bool
 
     def refuse(self) -> None:
-        """Refuse a folder that is a file, or has other contents than were asked for.  Raises PlanflyError."""
+        """Raise PlanflyError for a folder that is a file, or has contents that may not be resumed or replaced."""
         folder = self.folder
         if self.resume:
             if not (folder / self.table).is_file():
@@ -207,11 +207,11 @@ class OutputDirectory:
         raise PlanflyError(f"{folder}: exists and is not empty; overwrite=True replaces its results", file=folder)
 
     def open(self, opened: Callable[[Path | None], CampaignBase]) -> CampaignBase:
-        """Return the mission, and the folder ready for it: cleared, or with what is to be gone on with.
+        """Open the mission, and prepare its folder: clear it, or keep the campaign to be resumed.
 
-        opened: gives the mission, with its plan from a file where it is gone on with.
-        A scenario's plan is kept in the folder, for those that go on.
-        Raises PlanflyError; a folder that was not ready is as it was then.
+        opened: returns the mission, from the plan file of a resumed campaign, if any.
+        The plan of a scenario is stored in the folder, to resume the campaign later.
+        Raises PlanflyError, without changes to a folder that is refused.
         """
         self.refuse()
         kept = self.folder / "plan.json"
@@ -225,9 +225,9 @@ class OutputDirectory:
 
 @contextmanager
 def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwrite: bool) -> Iterator[OutputDirectory]:
-    """Yield a campaign's folder; out: None for one that is removed at the end.
+    """Yield the folder of a campaign; out: None for a folder that is removed at the end.
 
-    Raises ArgumentError for a campaign to resume without a folder.
+    Raises ArgumentError if a campaign is to be resumed without a folder.
     """
     if out is not None:
         yield OutputDirectory(Path(out), table, resume, overwrite)
@@ -240,9 +240,9 @@ def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwri
 
 
 def clear_campaign(folder: Path) -> None:
-    """Make a folder, and clear what an earlier campaign or search left there; anything else stays.
+    """Make a folder, and remove the files of an earlier campaign or search from it; other files stay.
 
-    Raises StoreError, and clears nothing, where another process holds it.
+    Raises StoreError, and removes nothing, if another process holds the table.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for table in (DATABASE, WINDS_DATABASE):
@@ -263,7 +263,7 @@ def write_files(
     command: str,
     advance: Advance | None = None,
 ) -> None:
-    """Write ``summary.json``, ``report.html`` and the worst flights' logs; logs of flights that are none stay not."""
+    """Write ``summary.json``, ``report.html`` and the worst flights' logs; remove logs of other flights."""
     (folder / "worst").mkdir(exist_ok=True)
     kept = {folder / log_name(row) for row in summary.worst}
     for path in _logs(folder):
@@ -280,9 +280,9 @@ def write_files(
 
 
 def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
-    """Fly a flight of the table once more, into a log.
+    """Repeat a flight of the table, and record it in a log.
 
-    Raises PlanflyError where it does not come out as the table has it: the machine that flew it computes otherwise.
+    Raises PlanflyError if the result differs from the table: the machine that flew it computes differently.
     """
     again = fly_one(base, row.draw.index, log=log)
     if not same_flight(row, again):
@@ -292,13 +292,14 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
 
 
 # ----------------------------------------------------------------------
-# The files of a go/no-go chart: data, picture and page.
+# Write the files of a go/no-go chart: data, picture and page.
 
+# Schema of ``winds.json``.
 SCHEMA = "planfly.winds/1"
 
 
 def spokes(found: WindsFound) -> list[Spoke]:
-    """Return the chart's data."""
+    """Return the data of the chart."""
     out = []
     for number, boundary in enumerate(found.boundaries):
         counts: dict[float, list[bool]] = {}
@@ -363,26 +364,26 @@ def _speed_text(speed: float, most: float) -> str:
 
 
 def _interval_text(low: float, high: float, most: float) -> str:
-    """Return an interval, m/s, of which what lies beyond all that was looked at is not known."""
+    """Describe an interval, m/s; bounds beyond the largest wind of the search are not known."""
     if low >= most - 1e-9:
         return f"over {most:g}"
     return f"{low:.1f} to {f'over {most:g}' if high >= most - 1e-9 else f'{high:.1f}'}"
 
 
 def _open_lines(found: WindsFound) -> list[str]:
-    """That the flights did not last for all directions, where they did not."""
+    """Return a line about directions with too few flights, if there are any."""
     counts = Counter(direction for direction, _, _ in found.flights)
-    wanting = [k for k, one in enumerate(found.boundaries) if needs_more(one, counts[k], ACCURACY, FEWEST)]
-    if not wanting:
+    short = [k for k, one in enumerate(found.boundaries) if needs_more(one, counts[k], ACCURACY, FEWEST)]
+    if not short:
         return []
     return [
-        f"not settled: {len(wanting)} of {len(found.boundaries)} directions, for want of flights: each takes"
+        f"not settled: {len(short)} of {len(found.boundaries)} directions, for want of flights: each takes"
         f" {FEWEST} at least, and an interval of {2.0 * ACCURACY:g} m/s; with fewer the interval is mostly assumption"
     ]
 
 
 def _lost_lines(found: WindsFound) -> list[str]:
-    """Return which flights could not be flown, where some could not."""
+    """Return a line about flights that could not be flown, if there are any."""
     if not found.lost:
         return []
     named = ", ".join(
@@ -393,7 +394,7 @@ def _lost_lines(found: WindsFound) -> list[str]:
 
 
 def _none_failed_lines(found: WindsFound) -> list[str]:
-    """Return what the flights of directions in which none failed show by themselves."""
+    """Return a line about directions without any failure, and the probability that their flights alone prove."""
     most, confidence = found.goal.most, found.goal.confidence
     at_most = Counter(direction for direction, speed, _ in found.flights if speed == most)
     failed = {direction for direction, _, flyable in found.flights if not flyable}
@@ -408,7 +409,7 @@ def _none_failed_lines(found: WindsFound) -> list[str]:
 
 
 def wind_lines(found: WindsFound) -> list[str]:
-    """Return what was found, in a few lines."""
+    """Summarise the result of a search in a few lines."""
     chart = spokes(found)
     least, largest = (pick(chart, key=lambda one: one.boundary) for pick in (min, max))
     most, percent = found.goal.most, f"{100 * found.goal.confidence:g} %"
@@ -425,15 +426,15 @@ def wind_lines(found: WindsFound) -> list[str]:
 
 
 # ----------------------------------------------------------------------
-# The end of a campaign.
+# Finish a campaign.
 
 
 def finish_campaign(
     base: CampaignBase, goal: Goal, estimate: Estimate, folder: Path, command: str, advance: Advance | None = None
 ) -> CampaignSummary:
-    """Sum up a campaign from the table in its folder, which no process holds, and write its files.
+    """Summarise a campaign from the table in its folder, which no process holds, and write its files.
 
-    command: the line that repeats it, for the report.
+    command: the command line that repeats it, for the report.
     Raises a `world.errors.PlanflyError`, or OSError for a full disk.
     """
     with open_store(base, goal, folder, resume=True) as store:

@@ -18,16 +18,17 @@ from planfly.campaigns.flight_row import FlightRow, scaled
 from planfly.campaigns.statistics.decision import Estimate, Goal, first_order, rank_slope
 from planfly.campaigns.tables import Store
 
+# Schema of ``summary.json``.
 SCHEMA = "planfly.campaign-summary/1"
-# Of a margin's variance, the share from which on a quantity is named as explaining it.
-_NOTABLE = 0.05
-# Flights whose logs are kept.
+# Smallest share of a margin's variance for a quantity to be named as explaining it.
+_MIN_NAMED_FRACTION = 0.05
+# Number of worst flights with a log.
 WORST = 10
 
 
 @dataclass(frozen=True)
 class RuleFailures:
-    """Flights that a rule failed in, and in how many at each place; a flight may fail at several."""
+    """Number of flights that failed a rule, in total and at each place; a flight may fail at several places."""
 
     rule: str
     flights: int
@@ -48,13 +49,13 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class CampaignSummary:
-    """All that summary and report tell.
+    """Contents of the summary and the report.
 
-    deciding: the rule that fails most, or, where none does, that of the least reliability index: the mean of its
-    margins in their standard deviations (Cornell, "A probability-based structural code", ACI Journal 66, 1969); "" for
-    none.
-    conditions: whose flights these are, in which weather and world, about which each is drawn, and who flies.
-    low_margin: of that rule, the margin that one flight in twenty falls below, in `unit`; None where unknown.
+    deciding: the rule that fails most often; if no rule fails, the rule with the smallest reliability index: the mean
+    of its margins divided by their standard deviation (Cornell, "A probability-based structural code", ACI Journal 66,
+    1969); "" if there is no such rule.
+    conditions: nominal conditions of the flights: aircraft, weather, world and autopilot.
+    low_margin: margin of the deciding rule that one flight in twenty falls below, in `unit`; None if unknown.
     """
 
     name: str
@@ -74,7 +75,7 @@ class CampaignSummary:
 
 
 def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) -> CampaignSummary:
-    """Read a campaign's table once through."""
+    """Summarise a campaign in one pass through its table."""
     by_rule = _failures(store)
     worst = tuple(store.closest(WORST))
     deciding, low = _deciding_rule(store, by_rule)
@@ -142,7 +143,7 @@ def _sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensiti
 
 
 def summary_json(summary: CampaignSummary) -> str:
-    """The text of ``summary.json``; no time and no worker stands in it, so that it is the same for any number."""
+    """Return the text of ``summary.json``; without times and workers, so that it is the same for any number of them."""
     found = summary.estimate
     data = {
         "schema": SCHEMA,
@@ -197,7 +198,7 @@ def _flight(row: FlightRow) -> dict[str, Any]:
 
 
 def closest_text(row: FlightRow) -> str:
-    """Return the least margin of a flight in words; "" where none is known."""
+    """Return the least margin of a flight in words; "" if no margin is known."""
     known = [(share, rule, margin) for rule, margin in row.margins if (share := scaled(rule, margin)) is not None]
     if not known:
         return ""
@@ -206,12 +207,12 @@ def closest_text(row: FlightRow) -> str:
 
 
 def log_name(row: FlightRow) -> str:
-    """Return name of the log of a flight, among the worst."""
+    """Return the name of the log of one of the worst flights."""
     return f"worst/flight-{row.draw.index:06d}.mcap"
 
 
 def campaign_lines(summary: CampaignSummary) -> list[str]:
-    """Return the summary on a terminal."""
+    """Return the lines of the summary for a terminal."""
     found, goal = summary.estimate, summary.goal
     tally, sure = found.tally, f"{100.0 * goal.confidence:g} %"
     lines = [
@@ -241,7 +242,7 @@ def _answer_text(summary: CampaignSummary) -> str:
 
 
 def _drivers_text(summary: CampaignSummary) -> str:
-    drivers = [one for one in summary.sensitivities if one.index >= _NOTABLE][:3]
+    drivers = [one for one in summary.sensitivities if one.index >= _MIN_NAMED_FRACTION][:3]
     if not drivers:
         return "no single quantity explains it"
     return "of its variance " + ", ".join(

@@ -1,4 +1,4 @@
-"""Recover the whole rows of a damaged table of flights, each known by its checksum."""
+"""Recover the undamaged rows of a damaged table of flights, verified by their checksums."""
 
 import contextlib
 import hashlib
@@ -9,14 +9,14 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
-# What SQLite says of a file that another process holds.
+# Error codes of SQLite for a file that another process holds.
 HELD = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
-# Numbers that a line lists.
+# Largest number of flights listed in a line.
 _LISTED = 8
 
 
 def stored(value: Any, kind: str) -> Any:
-    """Return a value as SQLite gives it back from a column of a kind: numpy's numbers are plain ones, and NaN is NULL.
+    """Return a value as SQLite reads it from a column of a kind: numpy numbers become plain ones, NaN becomes NULL.
 
     >>> stored(3, "REAL NOT NULL"), stored(math.nan, "REAL"), stored(True, "INTEGER")
     (3.0, None, 1)
@@ -28,7 +28,7 @@ def stored(value: Any, kind: str) -> Any:
 
 
 def checksum(values: Iterable[Any]) -> str:
-    """16 hexadecimal digits of values as SQLite gives them back: another value, or one of another type, gives others.
+    """Return a checksum of 16 hexadecimal digits of values read from SQLite; it depends on values and types.
 
     >>> checksum([1, 0.5, "flyable", None]) == checksum([1, 0.5, "flyable", 0])
     False
@@ -39,11 +39,11 @@ def checksum(values: Iterable[Any]) -> str:
 
 
 class Examined(NamedTuple):
-    """The numbers of flights that are whole, and of those that are not; both rise.
+    """Numbers of undamaged and damaged flights, both in ascending order.
 
-    sound: whether SQLite finds nothing wrong with the file, whatever its rows hold.
-    after: of a file that is not, the last flight that is known of, if fewer are known of than were asked for: others
-        may have been lost behind it, all of them behind -1; None where that is not so.
+    sound: True if SQLite finds no error in the file, even if some rows are damaged.
+    after: last known flight of an unsound file if fewer flights are known than were requested: later flights may have
+        been lost, or all flights for -1; otherwise None.
     """
 
     whole: list[int]
@@ -52,7 +52,7 @@ class Examined(NamedTuple):
     after: int | None = None
 
     def text(self) -> str:
-        """Return what is damaged, and what becomes of it, in words.
+        """Describe the damage and its consequence.
 
         >>> Examined([0, 1, 3], [2]).text()
         'flight 2 is damaged and was taken out: 3 flights are whole and stay; --resume flies what is missing'
@@ -72,32 +72,34 @@ class Examined(NamedTuple):
 
 
 def examine(connection: sqlite3.Connection, columns: Sequence[str], asked: int, most: int) -> Examined:
-    """Return which rows of the table ``flights`` are whole, whatever has happened to its file.
+    """Determine which rows of the table ``flights`` are undamaged, even in a broken file.
 
-    columns: that the checksum is of, in order, the flight's number first.  asked: flights that were asked for.  most:
-    flights that it may hold, where that has to be tried number by number.
+    columns: columns of the checksum, in order, with the flight's number first.  asked: number of requested flights.
+    most: number of flights to try one by one in a broken file.
     Raises sqlite3.Error for a file that another process holds.
     """
-    # Bytes that are no UTF-8 end no reading: they make another checksum.
+    # Invalid UTF-8 does not stop the reading: it changes the checksum.
     connection.text_factory = lambda data: data.decode("utf-8", "surrogateescape")
     query = f"SELECT {', '.join(columns)}, checksum FROM flights"
     try:
         if connection.execute("PRAGMA quick_check(1)").fetchone() == ("ok",):
-            return _by_checksum(connection.execute(f"{query} ORDER BY flight"))
+            return _check_rows(connection.execute(f"{query} ORDER BY flight"))
     except sqlite3.Error as error:
         _refuse_held(error)
     rows = (row for number in range(most) if (row := _row_of(connection, query, number)) is not None)
-    whole, damaged = _by_checksum(rows)[:2]
-    # Of a broken file a row that is not found may have been lost with its page.  A number that no checksum vouches for
-    # is believed where it was asked for: flights are numbered from 0 on.
-    numbers = (number for number in (*damaged, *_seen(connection)) if isinstance(number, int) and number < asked)
+    whole, damaged = _check_rows(rows)[:2]
+    # In a broken file, a missing row may have been lost with its page.  A number without a valid checksum is accepted
+    # if it is in the range of requested flights, which are numbered from 0.
+    numbers = (
+        number for number in (*damaged, *_readable_numbers(connection)) if isinstance(number, int) and number < asked
+    )
     last = max([-1, *whole, *numbers])
     missing = set(range(last + 1)) - set(whole)
     return Examined(whole, sorted(missing), sound=False, after=last if last + 1 < asked else None)
 
 
-def _seen(connection: sqlite3.Connection) -> list[Any]:
-    """Numbers of flights, or what became of them, that can be read one after the other, up to where the file breaks."""
+def _readable_numbers(connection: sqlite3.Connection) -> list[Any]:
+    """Return the flight numbers, some perhaps corrupt, that can be read up to the damaged part of the file."""
     seen: list[Any] = []
     with contextlib.suppress(sqlite3.Error):
         for (number,) in connection.execute("SELECT flight FROM flights"):
@@ -105,7 +107,7 @@ def _seen(connection: sqlite3.Connection) -> list[Any]:
     return seen
 
 
-def _by_checksum(rows: Iterable[tuple[Any, ...]]) -> Examined:
+def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examined:
     found = Examined([], [])
     for *values, kept in rows:
         (found.whole if kept == checksum(values) else found.damaged).append(values[0])
@@ -113,7 +115,7 @@ def _by_checksum(rows: Iterable[tuple[Any, ...]]) -> Examined:
 
 
 def _row_of(connection: sqlite3.Connection, query: str, number: int) -> tuple[Any, ...] | None:
-    """Return a row by its number; one that cannot be read has no checksum."""
+    """Return a row by its number, with None as the checksum if it cannot be read."""
     try:
         found: tuple[Any, ...] | None = connection.execute(f"{query} WHERE flight = ?", (number,)).fetchone()
     except sqlite3.Error as error:
@@ -130,9 +132,9 @@ def _refuse_held(error: sqlite3.Error) -> None:
 def copy_whole(
     connection: sqlite3.Connection, target: Path, create: Sequence[str], numbers: Sequence[int], kept: Mapping[str, str]
 ) -> None:
-    """Write a new file with some rows of a table, and with what its table ``campaign`` is to hold.
+    """Write a new file with some rows of a table, and with these entries in its table ``campaign``.
 
-    create: statements that make both tables.
+    create: SQL statements that create both tables.
     """
     target.unlink(missing_ok=True)
     with closing(sqlite3.connect(target, isolation_level=None)) as copy:

@@ -1,7 +1,8 @@
-"""The tables of flights, SQLite files written as flights come in, and read back as rows or as columns.
+"""Tables of flights: SQLite files that are written flight by flight, and read as rows or as columns.
 
-A campaign's table has a row a flight, by the index of its draw; a search for winds has one a flight, in the order in
-which it asked.  One process at a time holds a table, and opening it leaves only rows whose checksum holds.
+The table of a campaign has one row per flight, keyed by the index of its draw.  The table of a search for winds has one
+row per flight, in the order of requests.  One process at a time holds a table; opening it drops all rows with a wrong
+checksum.
 """
 
 import errno
@@ -30,16 +31,16 @@ from planfly.runtime.stages import say
 from world.errors import PlanflyError
 
 # ----------------------------------------------------------------------
-# A flight's row as values of the table's columns, and back: all follows from `FlightRow`, `RULE_WORDS` and `NAMES`.
+# Convert a flight's row to values of the table's columns, and back; `FlightRow`, `RULE_WORDS` and `NAMES` define them.
 
-# Columns that a second campaign of the same flights may have otherwise.
+# Columns that may differ between two campaigns with the same flights.
 RUN_DEPENDENT_COLUMNS = tuple(name for name, column in FIELDS.items() if not column.same)
-# Arrays as bytes.
+# Columns with arrays, stored as bytes.
 SHAPES = tuple(name for name, column in FIELDS.items() if column.kind.startswith("BLOB"))
 
 
 def _row_columns() -> dict[str, str]:
-    """Return name and kind of each column of a row, in the order of the row's fields."""
+    """Return the name and kind of each column of a row, in the order of the row's fields."""
     columns = {"seed": "INTEGER NOT NULL", **dict.fromkeys(NAMES, "REAL NOT NULL")}
     for name in FlightRow.__dataclass_fields__:
         if name in FIELDS:
@@ -51,12 +52,12 @@ def _row_columns() -> dict[str, str]:
     return columns
 
 
-# Of a row, but for the flight's number.
+# Columns of a row, without the flight's number.
 ROW_COLUMNS = _row_columns()
 
 
 def row_values(row: FlightRow) -> dict[str, Any]:
-    """Return a value for each of `ROW_COLUMNS`."""
+    """Return the value of each of `ROW_COLUMNS`."""
     values: dict[str, Any] = dict.fromkeys(ROW_COLUMNS)
     values |= {"seed": row.draw.seed, **row.draw.values}
     values |= {name: column.write(getattr(row, name)) for name, column in FIELDS.items()}
@@ -69,7 +70,7 @@ def row_values(row: FlightRow) -> dict[str, Any]:
 
 
 def row_of(index: int, known: Mapping[str, Any]) -> FlightRow:
-    """Return the row of a draw's index and its values by column."""
+    """Return the row with a draw's index and these values by column."""
     margins = []
     for rule in RULE_WORDS.values():
         if (place := known[rule.place_column]) is not None:
@@ -83,31 +84,31 @@ def row_of(index: int, known: Mapping[str, Any]) -> FlightRow:
 
 
 def same_flight(one: FlightRow, other: FlightRow) -> bool:
-    """Return True if two rows hold the same flight, apart from where and how fast it was flown."""
+    """Return True if two rows hold the same flight, whatever machine flew it and however fast."""
     mine, theirs = (row_values(replace(row, made_of="")) for row in (one, other))
     same = all(mine[name] == theirs[name] for name in ROW_COLUMNS if name not in RUN_DEPENDENT_COLUMNS)
     return same and one.draw.index == other.draw.index
 
 
 # ----------------------------------------------------------------------
-# The file: made or opened to go on, locked by one process, and refused where it holds something else.
+# Create the file or open it to resume, lock it for one process, and refuse other contents.
 
-# Flights of a table whose settings do not say how many it may have, and of a broken one beyond what they say.
+# Largest number of flights of a table whose settings state none, and largest credible number in a damaged table.
 _MAX_FLIGHTS = 100_000
 
 
 class StoreError(PlanflyError):
-    """The table of a campaign cannot be opened, or is another campaign's."""
+    """The table of a campaign cannot be opened, or belongs to another campaign."""
 
 
 @dataclass(frozen=True)
 class TableKind:
-    """Content of a file of this kind.
+    """Kind of a table file.
 
-    name: of the schema.
-    columns: of the table of flights, name and kind of each; the first is the key, a flight's number.  A checksum of
-    them follows.
-    fixed: what of the settings may not be otherwise where it is gone on with.
+    name: name of the schema.
+    columns: name and kind of each column of the table of flights; the first is the key, the number of the flight.  A
+    checksum of all columns follows them.
+    fixed: settings that must stay the same when the table is resumed.
     """
 
     name: str
@@ -116,7 +117,7 @@ class TableKind:
 
     @property
     def schema(self) -> str:
-        """The schema kept in the file: its name, and as its version a digest of the columns.
+        """Schema stored in the file: its name, and a digest of the columns as its version.
 
         >>> TableKind("t", {"a": "REAL"}).schema == TableKind("t", {"a": "REAL", "b": "REAL"}).schema
         False
@@ -126,17 +127,17 @@ class TableKind:
 
 
 class LockedTable:
-    """The table of a campaign or of a search, held until it is left.
+    """Table of a campaign or of a search, locked until the context ends.
 
-    made_of: hash of code, model, mission, scenario, dispersions and seed; flights with another one are refused.
+    made_of: hash of code, model, mission, scenario, dispersions and seed; flights with another hash are refused.
     """
 
     def __init__(self, path: Path, kind: TableKind, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
-        """Make the table, or open it to go on.
+        """Create the table, or open it to resume.
 
-        settings: what was asked for, kept in the file.
-        Raises StoreError for a file that is none of this kind, another campaign's, or held by another process, and
-        OSError for a full disk.
+        settings: the request, stored in the file.
+        Raises StoreError for a file of another kind or another campaign, or held by another process, and OSError for a
+        full disk.
         """
         self.path, self.made_of, self._kind = path, made_of, kind
         if resume and not path.is_file():
@@ -161,7 +162,7 @@ class LockedTable:
         run = self._connection.execute
         for statement in self._create():
             run(statement)
-        # Before the new settings are written: those of a refused question would stay.
+        # Before the new settings are written: the settings of a refused request would stay in the file.
         self._refuse_more(settings)
         values = {
             "schema": self._kind.schema,
@@ -175,7 +176,7 @@ class LockedTable:
         run("COMMIT")
 
     def _hold(self) -> None:
-        """Take the file for this process alone, and begin to write."""
+        """Lock the file for this process, and begin a transaction."""
         run = self._connection.execute
         run("PRAGMA locking_mode = EXCLUSIVE")
         run("PRAGMA journal_mode = WAL")
@@ -211,16 +212,16 @@ class LockedTable:
                 )
 
     def _mend(self, known: dict[str, str]) -> None:
-        """Keep the flights that are whole, report the others, and write the file again."""
-        # A search may have been asked for fewer flights than are there: those beyond are kept, too.
+        """Keep the undamaged flights, report the others, and rewrite the file."""
+        # A search may have been resumed with fewer flights than the table holds: all of them are kept.
         asked = json.loads(known["settings"]).get("flights", _MAX_FLIGHTS)
         examined = examine(self._connection, tuple(self._kind.columns), asked, max(asked, self._last() + 1))
         if examined.sound and not examined.damaged:
             return
-        mended = self.path.with_name(f".{self.path.name}.mended")
-        copy_whole(self._connection, mended, self._create(), examined.whole, known)
+        repaired = self.path.with_name(f".{self.path.name}.mended")
+        copy_whole(self._connection, repaired, self._create(), examined.whole, known)
         self._connection.close()
-        mended.replace(self.path)
+        repaired.replace(self.path)
         for ending in ("-wal", "-shm"):
             Path(f"{self.path}{ending}").unlink(missing_ok=True)
         self._connection = sqlite3.connect(self.path, timeout=1.0, isolation_level=None)
@@ -228,12 +229,12 @@ class LockedTable:
         say(f"{self.path}: {examined.text()}")
 
     def _last(self) -> int:
-        """Return the largest number of a flight that can be read, one after the other; -1 for none."""
+        """Return the largest flight number that can be read, from either end of the table; -1 for none."""
         last = -1
         for order in ("", " DESC"):
             with suppress(sqlite3.Error, UnicodeDecodeError):
                 for (number,) in self._connection.execute(f"SELECT flight FROM flights ORDER BY flight{order}"):
-                    # That of a damaged page may be any.
+                    # A damaged page may hold any number.
                     if isinstance(number, int) and number < _MAX_FLIGHTS:
                         last = max(last, number)
                         if order:
@@ -241,23 +242,23 @@ class LockedTable:
         return last
 
     def _refuse_more(self, settings: Mapping[str, Any]) -> None:
-        """Refuse more flights than may be there.  Raises StoreError."""
+        """Raise StoreError if the table holds more flights than requested."""
 
     def __enter__(self) -> Self:
-        """Hold it."""
+        """Return the locked table."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Let it go."""
+        """Release the table."""
         self._connection.close()
 
     def insert(self, values: Mapping[str, Any]) -> None:
-        """Write a flight, for good: a value a column.
+        """Write a flight durably, one value per column.
 
-        Raises OSError for a full disk; what was written before stays.  Raises OSError for a table that was removed, and
-        StoreError for a number that is there.
+        Raises OSError for a full disk or a removed table; flights written before stay.  Raises StoreError for a number
+        that the table already holds.
         """
         self._refuse_removed()
         with translated_errors(self.path):
@@ -266,7 +267,7 @@ class LockedTable:
             self._connection.execute(f"INSERT INTO flights VALUES ({marks})", [*row, checksum(row)])
 
     def drop_from(self, flight: int) -> None:
-        """Take out the flights from this number on: those that were flown while an earlier one decided.
+        """Delete the flights from this number on, which were flown while an earlier flight decided.
 
         Raises OSError for a table that was removed.
         """
@@ -275,7 +276,7 @@ class LockedTable:
             self._connection.execute("DELETE FROM flights WHERE flight >= ?", (flight,))
 
     def _refuse_removed(self) -> None:
-        """Refuse to write into a file that has lost its name: on POSIX that works, and all of it is lost at the end."""
+        """Refuse to write into a deleted file: on POSIX that succeeds, and everything is lost at the end."""
         try:
             there = os.path.samestat(self.path.stat(), self._file)
         except OSError:
@@ -285,15 +286,15 @@ class LockedTable:
             raise OSError(errno.EIO, words, str(self.path))
 
     def tally(self) -> Tally:
-        """Return how many flights came out how."""
+        """Return the number of flights with each outcome."""
         counts = dict(self._connection.execute("SELECT outcome, COUNT(*) FROM flights GROUP BY outcome"))
         return Tally(counts.get("flyable", 0), counts.get("not flyable", 0), counts.get("lost", 0))
 
 
 def kept_settings(path: Path) -> dict[str, Any]:
-    """Return what the flights of a table were asked for with; nothing where there is no such file.
+    """Return the settings stored in a table; empty if there is no such file.
 
-    Raises StoreError for a file that is none of ours or is held.
+    Raises StoreError for a file that planfly did not write, or that another process holds.
     """
     if not path.is_file():
         return {}
@@ -305,20 +306,20 @@ def kept_settings(path: Path) -> dict[str, Any]:
 
 
 def _kept(connection: sqlite3.Connection) -> dict[str, str]:
-    """Return what a file says of itself, by key."""
+    """Return the entries of the table ``campaign`` by key."""
     connection.text_factory = lambda data: data.decode("utf-8", "surrogateescape")
     return dict(connection.execute("SELECT key, value FROM campaign").fetchall())
 
 
 def _refuse_damaged(known: Mapping[str, str], path: Path) -> None:
-    """Refuse a file with settings that planfly did not write.  Raises StoreError."""
+    """Raise StoreError for a file with settings that planfly did not write."""
     if known.get("checksum") != checksum(known.get(name) for name in ("schema", "made_of", "settings")):
         words = "its settings are damaged, or another version's: it cannot be resumed, and --overwrite begins anew"
         raise StoreError(f"{path}: {words}", file=path, field="settings")
 
 
 def refuse_held(path: Path) -> None:
-    """Refuse a table that another process holds; no process holds a missing file.  Raises StoreError."""
+    """Raise StoreError if another process holds a table; a missing file is not held."""
     if not path.is_file():
         return
     connection = sqlite3.connect(path, timeout=1.0, isolation_level=None)
@@ -332,20 +333,20 @@ def refuse_held(path: Path) -> None:
 
 
 class translated_errors:
-    """Raises SQLite's errors about a file as planfly's: a full disk as OSError, the rest as StoreError."""
+    """Context that converts SQLite errors about a file: a full disk to OSError, all others to StoreError."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
     def __enter__(self) -> None:
-        """Nothing to do before."""
+        """Enter the context."""
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Raise planfly's error for SQLite's."""
+        """Convert an SQLite error and raise it."""
         if isinstance(error, UnicodeDecodeError):
-            # SQLite quotes what it does not understand of its own tables' definition.
+            # SQLite quotes the parts of a table definition that it does not understand.
             raise StoreError(f"{self._path}: is damaged where it says which tables it has", file=self._path) from error
         if not isinstance(error, sqlite3.Error):
             return
@@ -358,19 +359,23 @@ class translated_errors:
 
 
 # ----------------------------------------------------------------------
-# The table of a campaign: a row a flight, read by its index.
+# The table of a campaign: one row per flight, read by its index.
 
+# Name of the file with the table of a campaign.
 DATABASE = "campaign.sqlite"
+# Kind of the table of a campaign.
 CAMPAIGN_KIND = TableKind("planfly.campaign", {"flight": "INTEGER PRIMARY KEY", **ROW_COLUMNS})
+# Columns of the table of a campaign.
 COLUMNS = tuple(CAMPAIGN_KIND.columns)
+# Query for whole rows.
 _SELECT = f"SELECT {', '.join(COLUMNS)} FROM flights"
 
 
 class Store(LockedTable):
-    """A campaign's table, held by one process at a time; a flight's number is its draw's index."""
+    """Table of a campaign, locked by one process at a time; the number of a flight is the index of its draw."""
 
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
-        """Make the table, or open it to go on; as `LockedTable`, and never for fewer flights than are there."""
+        """Create the table, or open it to resume, as `LockedTable`; never for fewer flights than it holds."""
         super().__init__(path, CAMPAIGN_KIND, made_of, settings, resume=resume)
 
     def _refuse_more(self, settings: Mapping[str, Any]) -> None:
@@ -383,37 +388,37 @@ class Store(LockedTable):
         self.insert({"flight": row.draw.index, **row_values(replace(row, made_of=self.made_of))})
 
     def outcomes(self) -> dict[int, str]:
-        """Outcome by index of all flights."""
+        """Return the outcome of all flights by index."""
         return dict(self._connection.execute("SELECT flight, outcome FROM flights ORDER BY flight"))
 
     def column(self, name: str) -> NDArray[np.float64]:
-        """(n,) a column of numbers, in the order of flights; NaN for none."""
+        """Return a column of numbers (n,), in the order of flights; NaN for a missing value."""
         rows = self._connection.execute(f"SELECT {_known(name)} FROM flights ORDER BY flight")
         return np.fromiter((math.nan if value is None else value for (value,) in rows), dtype=np.float64)
 
     def texts(self, name: str) -> list[str]:
-        """Return a column of words, in the order of flights."""
+        """Return a column of texts, in the order of flights."""
         return [
             str(value) for (value,) in self._connection.execute(f"SELECT {_known(name)} FROM flights ORDER BY flight")
         ]
 
     def blobs(self, name: str, most: int) -> list[bytes]:
-        """Return a column of arrays' bytes, of the first flights that have some."""
+        """Return a column of arrays as bytes, for the first flights that have one."""
         query = f"SELECT {_known(name)} FROM flights WHERE LENGTH({name}) > 0 ORDER BY flight LIMIT ?"
         return [value for (value,) in self._connection.execute(query, (most,))]
 
     def has_track(self) -> list[bool]:
-        """Return True if each flight, in order, has a track's shape."""
+        """Return for each flight, in order, True if the shape of its track is stored."""
         return [bool(n) for (n,) in self._connection.execute("SELECT LENGTH(clearance) FROM flights ORDER BY flight")]
 
     def closest(self, most: int) -> list[FlightRow]:
-        """The worst flights first: the lost, those that failed, then the closest calls, each by its least margin."""
+        """Return the worst flights: lost flights first, then failed ones, then the closest calls by margin."""
         order = "CASE outcome WHEN 'lost' THEN 0 WHEN 'not flyable' THEN 1 ELSE 2 END, closeness IS NULL, closeness"
         rows = self._connection.execute(f"{_SELECT} ORDER BY {order}, flight LIMIT ?", (most,))
         return [_row(values) for values in rows]
 
     def flight(self, index: int) -> FlightRow | None:
-        """Return the flight of an index; None where there is none."""
+        """Return the flight with an index, or None if the table has no such flight."""
         found = self._connection.execute(f"{_SELECT} WHERE flight = ?", (index,)).fetchone()
         return None if found is None else _row(found)
 
@@ -435,11 +440,13 @@ def _row(values: tuple[Any, ...]) -> FlightRow:
 
 
 # ----------------------------------------------------------------------
-# The table of a search for the largest winds: a row a flight, numbered in the order in which they are asked for.
+# The table of a search for the largest winds: one row per flight, numbered in the order of requests.
 
+# Name of the file with the table of a search.
 WINDS_DATABASE = "winds.sqlite"
-# What decides which flights are asked for; of the number of flights, only how many are.
+# Settings that determine the requested flights; the number of flights only determines where the sequence ends.
 FIXED = ("target", "confidence", "directions", "most")
+# Kind of the table of a search.
 WINDS_KIND = TableKind(
     "planfly.winds-flights",
     {
@@ -456,11 +463,11 @@ WINDS_KIND = TableKind(
 
 @dataclass(frozen=True, slots=True)
 class AskedFlight:
-    """A flight that a search asks for.
+    """Flight that a search requests.
 
-    number: in the order of the search.
-    direction: counted from the north.  speed: of the mean wind, m/s.
-    draw: index of what varies about that wind; the same in all directions.
+    number: position in the order of the search.
+    direction: index of the direction, from the north.  speed: mean wind speed, m/s.
+    draw: index of the draw around that wind; the same in all directions.
     """
 
     number: int
@@ -479,10 +486,10 @@ class FlownFlight:
 
 
 class WindsStore(LockedTable):
-    """A search's table, held by one process at a time."""
+    """Table of a search, locked by one process at a time."""
 
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
-        """Make the table, or open it to go on with the same question; settings: with `FIXED` among them."""
+        """Create the table, or open it to resume the same search.  settings: include `FIXED`."""
         super().__init__(path, WINDS_KIND, made_of, settings, resume=resume)
 
     def add(self, asked: AskedFlight, row: FlightRow) -> None:
@@ -497,7 +504,7 @@ class WindsStore(LockedTable):
         self.insert({**asked_for, **row_values(replace(row, made_of=self.made_of))})
 
     def known(self) -> dict[int, tuple[AskedFlight, FlownFlight]]:
-        """Return each flight there is and what came of it, by number."""
+        """Return each flight of the table and its outcome, by number."""
         rows = self._connection.execute(
             "SELECT flight, direction, asked_speed, draw, outcome, failed, narrow FROM flights ORDER BY flight"
         )
@@ -508,7 +515,7 @@ class WindsStore(LockedTable):
 
 
 def narrow_passes_of(text: str) -> tuple[NarrowPass, ...]:
-    """Narrow passes of the column's text.
+    """Parse the narrow passes from the text of the column.
 
     >>> narrow_passes_of('[{"rule": "slope", "margin": 0.25, "kind": "leg", "index": 3}]')[0][2]
     0.25
@@ -521,19 +528,20 @@ def _narrow_pass(rule: str, margin: float, **place: Any) -> NarrowPass:
 
 
 # ----------------------------------------------------------------------
-# The table of a campaign as columns, read without holding it and without what no table of numbers needs.
+# Read the table of a campaign as columns, without locking it and without the columns of arrays.
 
-# Rows that are turned into arrays at a time.
+# Number of rows converted to arrays in one step.
 _CHUNK = 1000
+# Array type of each kind of column.
 _TYPES: dict[str, type] = {"INTEGER": np.int64, "REAL": np.float64, "TEXT": object}
 
 
 def read_table(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the columns of a campaign's table by name, (n,) each, in the order of flights; of arrays' bytes none.
+    """Return the columns of a campaign's table by name, (n,) each, in the order of flights, without arrays.
 
-    Numbers are float64 with NaN for none, or int64; words are Python's, None for none, each kept once.  Some 60 MB for
-    100,000 flights.
-    Raises StoreError for a file that is none of ours or is held.
+    Numbers are float64, NaN if missing, or int64.  Texts are Python strings, None if missing; equal strings share
+    memory. About 60 MB for 100,000 flights.
+    Raises StoreError for a file that planfly did not write, or that another process holds.
     """
     names = tuple(name for name in CAMPAIGN_KIND.columns if name not in SHAPES)
     with _opened(path) as connection:
@@ -556,18 +564,18 @@ def count_flights(path: Path) -> int:
 
 
 def read_shapes(path: Path) -> dict[str, NDArray[np.float32]]:
-    """Return what a campaign keeps of each flight's way, in the order of flights; NaN for flights that have none.
+    """Return the stored path data of each flight, in the order of flights; NaN for flights without them.
 
-    "clearance": (n, 150) least height above ground on each equal piece of the route's length, m.
-    "crossings": (n, s, 2) distance right of and above each stop of the route at its nearest, m.
-    Raises StoreError for a file that is none of ours or is held.
+    "clearance": (n, 150) least height above ground on each of 150 equal pieces of the route, m.
+    "crossings": (n, s, 2) distance to the right of and above each stop of the route at closest approach, m.
+    Raises StoreError for a file that planfly did not write, or that another process holds.
     """
     with _opened(path) as connection:
-        return {name: _singles(connection, name, FIELDS[name].entry) for name in SHAPES}
+        return {name: _read_arrays(connection, name, FIELDS[name].entry) for name in SHAPES}
 
 
-def _singles(connection: sqlite3.Connection, name: str, entry: tuple[int, ...]) -> NDArray[np.float32]:
-    """(n, m, *entry) the arrays of a column, m the longest one's length."""
+def _read_arrays(connection: sqlite3.Connection, name: str, entry: tuple[int, ...]) -> NDArray[np.float32]:
+    """Return the arrays of a column, (n, m, *entry), where m is the length of the longest one."""
     count, size = connection.execute(f"SELECT COUNT(*), MAX(LENGTH({name})) FROM flights").fetchone()
     found = np.full((count, (size or 0) // np.dtype(np.float32).itemsize), np.nan, dtype=np.float32)
     for row, (data,) in zip(found, connection.execute(f"SELECT {name} FROM flights ORDER BY flight"), strict=True):
@@ -579,7 +587,7 @@ def _singles(connection: sqlite3.Connection, name: str, entry: tuple[int, ...]) 
 
 @contextmanager
 def _opened(path: Path) -> Iterator[sqlite3.Connection]:
-    # Nothing is written; but a connection that may write removes its -wal and -shm files when it closes.
+    # Nothing is written, but a writable connection removes its -wal and -shm files when it closes.
     with (
         translated_errors(path),
         closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=rw", uri=True, timeout=1.0)) as connection,

@@ -1,4 +1,4 @@
-"""The workers of a campaign: processes of this machine, or a running dask cluster's, and how fast they fly."""
+"""Workers of a campaign, on this machine or on a running dask cluster, and the rate of their flights."""
 
 import contextlib
 import ipaddress
@@ -16,20 +16,20 @@ from planfly.campaigns.local_pool import LocalPool
 from world.errors import PlanflyError
 from world.extras import need_extra
 
-# Seconds between two lines of progress.
+# Time between two lines of progress, s.
 REPORTED_EVERY = 0.5
 
 
 class SchedulerError(PlanflyError):
-    """A scheduler cannot be used as it stands."""
+    """A scheduler cannot be used."""
 
 
 @dataclass(frozen=True)
 class Workers:
-    """Place where a campaign is flown.
+    """Workers that fly a campaign.
 
-    count: processes on this machine; None for as many as it has cores.
-    scheduler: address of a running dask scheduler; None for processes of this machine.
+    count: number of processes on this machine; None for the number of its cores.
+    scheduler: address of a running dask scheduler; None for local processes.
     """
 
     count: int | None = None
@@ -40,14 +40,14 @@ class WorkerPool(Protocol):
     """Workers that fly the flights of a campaign."""
 
     def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
-        """Fly requests as they are asked for, and yield each when it is done, in any order."""
+        """Fly requests as `following` returns them, and yield each when it is done, in any order."""
 
 
 @contextlib.contextmanager
 def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> Iterator[WorkerPool]:
-    """Make the pool of a campaign; processes of this machine end with it, workers of a cluster forget the campaign.
+    """Make the pool of a campaign; on exit, local processes end and workers of a cluster drop the campaign.
 
-    Raises SchedulerError for an address that may not be used, and a scheduler that does not answer.
+    Raises SchedulerError for an address that is not allowed, and for a scheduler that does not answer.
     """
     if workers.scheduler is None:
         with contextlib.closing(LocalPool(workers.count or os.cpu_count() or 1, base, fly)) as pool:
@@ -55,7 +55,7 @@ def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> 
         return
     address = checked_address(workers.scheduler)
     need_extra("cluster", "--scheduler needs")
-    # Imported here: it is an extra.
+    # Imported here because dask is an optional dependency.
     from planfly.campaigns.dask_pool import DaskPool, connect
 
     try:
@@ -67,9 +67,9 @@ def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> 
 
 
 def checked_address(address: str) -> str:
-    """Return a scheduler's address, if flights may be sent there: TLS anywhere, plain TCP on loopback only.
+    """Return a scheduler's address if it is allowed: TLS for any host, plain TCP on loopback only.
 
-    A scheduler's workers run whatever they are sent.  Raises SchedulerError.
+    The workers of a scheduler run any code sent to them.  Raises SchedulerError.
 
     >>> checked_address("127.0.0.1:8786"), checked_address("tls://10.0.0.7:8786")
     ('tcp://127.0.0.1:8786', 'tls://10.0.0.7:8786')
@@ -101,14 +101,14 @@ def _is_loopback(host: str) -> bool:
 
 
 class FlightRate:
-    """Flights a second since it was made; known: flights that were there before."""
+    """Flights per second since its creation.  known: number of flights in the table at the start."""
 
     def __init__(self, known: int) -> None:
         self._known = known
         self._started = self._reported = time.monotonic()
 
     def due(self) -> bool:
-        """Return True if it is time to report again, and count the time from now on."""
+        """Return True if the next report is due, and start timing the one after it."""
         now = time.monotonic()
         if now - self._reported < REPORTED_EVERY:
             return False
@@ -116,5 +116,5 @@ class FlightRate:
         return True
 
     def a_second(self, flights: int) -> float:
-        """Return the flights a second, with so many flights there by now; 0 before the first."""
+        """Return the rate, flights per second, at this number of flights; 0 before the first."""
         return (flights - self._known) / max(time.monotonic() - self._started, 1e-3)

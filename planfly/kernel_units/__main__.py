@@ -1,7 +1,7 @@
-"""``python -m planfly.kernel_units``: do the units named on standard input, and report which kernels are compiled.
+"""``python -m planfly.kernel_units``: compile the units named on standard input, and report their kernels.
 
 Lines out: ``ready KERNEL`` for each kernel of a unit that is compiled or loaded, then ``done UNIT`` or ``failed UNIT``.
-The process ends at once when its standard input does, since no process waits for it any more.
+The process ends as soon as its standard input closes, since no process waits for it any more.
 """
 
 import functools
@@ -15,8 +15,8 @@ from planfly.runtime.process_setup import prepare_process, with_large_stack
 
 
 def answer_requests() -> int:
-    """Do one unit after another until standard input ends."""
-    # Ctrl-C reaches all processes of a terminal: this one ends with the one that started it.
+    """Process one unit after another until standard input ends."""
+    # Ctrl-C reaches all processes of a terminal: this process ends with the process that started it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     requested: queue.Queue[str] = queue.Queue()
     threading.Thread(target=_listen, args=(requested,), daemon=True).start()
@@ -28,7 +28,7 @@ def answer_requests() -> int:
         try:
             with_large_stack(functools.partial(do_unit, unit, _report))
         except Exception:
-            # What it was to compile is compiled where it is needed, and fails there by its own name.
+            # The kernels of this unit are compiled later, where they are needed, and report their own errors there.
             _report(f"failed {unit}")
         else:
             _report(f"done {unit}")

@@ -1,4 +1,4 @@
-"""Do a unit of work, and report which of its kernels are ready."""
+"""Run a unit of work to compile its kernels, and report the kernels that are ready."""
 
 import functools
 import math
@@ -29,8 +29,9 @@ from world.compile_events import tell_before_compiling
 from world.scenario import Scenario, from_spec
 
 # ----------------------------------------------------------------------
-# Units of small work: each calls kernels that the others do not call, with the types that all commands use.
+# Units of work: each calls kernels that no other unit calls, with the argument types that all commands use.
 
+# Scenario of the units, as TOML.
 FIELD = """
 name = "field"
 [terrain]
@@ -62,6 +63,7 @@ turbulence = "light"
 [limits]
 min_clearance_m = 50
 """
+# Mission of the units, as a .waypoints file.
 MISSION = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t46.0\t8.0\t0.0\t1
 1\t0\t3\t16\t0\t0\t0\t0\t46.0\t8.0\t100.0\t1
@@ -117,6 +119,7 @@ def _glide() -> None:
     return_summary(setup, None).drawn()
 
 
+# Function of each unit by name.
 UNITS: dict[str, Callable[[], None]] = {
     "problem": _make_problem,
     "tracking": _track,
@@ -128,9 +131,9 @@ UNITS: dict[str, Callable[[], None]] = {
 
 
 def do_unit(unit: str, report: Callable[[str], None]) -> None:
-    """Do a unit of work; report ``ready KERNEL`` for each of its kernels, as soon as the next is being compiled.
+    """Run a unit of work; report ``ready KERNEL`` for each of its kernels, as soon as the next one is being compiled.
 
-    Raises KeyError for a name that is no unit's.
+    Raises KeyError for an unknown unit.
     """
     waiting = list(UNIT_KERNELS[unit])
 
@@ -151,5 +154,5 @@ def is_ready(kernel: str) -> bool:
     True
     """
     module, _, name = kernel.rpartition(".")
-    # As numba documents its dispatchers: the argument types that they are compiled for.
+    # A documented attribute of numba's dispatchers: the argument types that they are compiled for.
     return bool(getattr(import_module(module), name).signatures)

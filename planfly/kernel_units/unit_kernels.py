@@ -1,58 +1,67 @@
-"""The kernels that each unit of work calls from Python, which is what a first start counts.
+"""Kernels that each unit of work calls from Python, for the progress of a first start.
 
-Those that they call themselves are compiled with them.  `tests/planfly/kernel_units` holds this to what is called.
+Kernels that other kernels call are compiled with them.  `tests/planfly/kernel_units` compares these lists with the
+actual calls.
 """
 
+# Kernels of terrain and map projection.
 _FIELD = (
     "world.least_squares._least_squares",
     "world.frames._polymap_many",
     "world.terrain._heights_many",
 )
-_TRACKING = ("flight.autopilots.arduplane.tracking_error._fill",)
-_WORLD = (*_FIELD, *_TRACKING)
-_RANKS = ("planner.optimisers.preference._rank_rows",)
-_ARRAYS = (
+# Kernel of the tracking error.
+_TRACKING_KERNELS = ("flight.autopilots.arduplane.tracking_error._fill",)
+# Kernels of a scenario.
+_WORLD_KERNELS = (*_FIELD, *_TRACKING_KERNELS)
+# Kernel of the ranking of candidates.
+_RANK_KERNELS = ("planner.optimisers.preference._rank_rows",)
+# Kernels of the arrays of a planning problem.
+_ARRAY_KERNELS = (
     "world.terrain.steepest_slopes",
     "planner.airspace.zone_limits._reduce_margins",
     "planner.evaluation.threat_index._fill_cells",
     "planner.evaluation.threat_index._lists",
 )
-_PROBLEM = (*_WORLD, *_ARRAYS)
-_CERTIFY = "planner.evaluation.certify_kernels."
+# Kernels of a planning problem.
+_PROBLEM_KERNELS = (*_WORLD_KERNELS, *_ARRAY_KERNELS)
+# Prefixes of kernel names.
+_CERTIFY_MODULE = "planner.evaluation.certify_kernels."
 _SIDES = "planner.seeding.side_routes."
 _LAYOUT = "logs.recording.mcap_writer."
-_GLIDES = "logs.verdict.returns."
+_GLIDES_MODULE = "logs.verdict.returns."
 
+# Kernels that each unit calls from Python, by name of the unit.
 UNIT_KERNELS: dict[str, tuple[str, ...]] = {
-    "problem": (*_FIELD, *_ARRAYS),
-    "tracking": _TRACKING,
-    "ranks": _RANKS,
+    "problem": (*_FIELD, *_ARRAY_KERNELS),
+    "tracking": _TRACKING_KERNELS,
+    "ranks": _RANK_KERNELS,
     "scores": (
-        *_PROBLEM,
+        *_PROBLEM_KERNELS,
         "planner.evaluation.graded_scores._score_paths",
-        *_RANKS,
+        *_RANK_KERNELS,
         "planner.seeding.pattern_search._begin_search",
         "planner.seeding.pattern_search._continue_search",
     ),
     "certificates": (
-        *_PROBLEM,
+        *_PROBLEM_KERNELS,
         "aircraft.path_limits.arc_slope",
         "aircraft.path_limits.turn_tangents",
-        _CERTIFY + "heights_above_ground",
-        _CERTIFY + "leg_slope_limits",
-        _CERTIFY + "missile_distance",
-        _CERTIFY + "turn_and_roll_lengths",
-        _CERTIFY + "with_courses",
+        _CERTIFY_MODULE + "heights_above_ground",
+        _CERTIFY_MODULE + "leg_slope_limits",
+        _CERTIFY_MODULE + "missile_distance",
+        _CERTIFY_MODULE + "turn_and_roll_lengths",
+        _CERTIFY_MODULE + "with_courses",
         "planner.evaluation.corners.fly_by_radii",
         "planner.evaluation.corners.settling_length",
     ),
     "shortening": (
-        *_PROBLEM,
+        *_PROBLEM_KERNELS,
         "planner.seeding.shortening.begin_shortening",
         "planner.seeding.shortening.continue_shortening",
     ),
     "routes": (
-        *_PROBLEM,
+        *_PROBLEM_KERNELS,
         "planner.evaluation.leg_constraints.slope_limits",
         "planner.seeding.grids.begin_route",
         "planner.seeding.grids.continue_route",
@@ -60,7 +69,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "planner.seeding.waypoint_fitting._choose",
     ),
     "sides": (
-        *_PROBLEM,
+        *_PROBLEM_KERNELS,
         "planner.seeding.grids.find_obstacles",
         _SIDES + "begin_grid_costs",
         _SIDES + "cheapest_passings",
@@ -68,14 +77,14 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         _SIDES + "route_through",
     ),
     "fronts": (
-        *_PROBLEM,
+        *_PROBLEM_KERNELS,
         "planner.evaluation.front_scores._fill",
         "planner.optimisers.hypervolume._covered",
         "planner.optimisers.hypervolume._greedy",
     ),
-    "paper": (*_PROBLEM, "planner.evaluation.paper_scores._score_paths"),
+    "paper": (*_PROBLEM_KERNELS, "planner.evaluation.paper_scores._score_paths"),
     "flight": (
-        *_WORLD,
+        *_WORLD_KERNELS,
         "aircraft.envelope.ground_speed",
         "aircraft.path_limits.aircraft_slopes",
         "aircraft.path_limits.arc_slope",
@@ -105,29 +114,33 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "world.wind.mean_wind_speed",
     ),
     "glides": (
-        *_WORLD,
+        *_WORLD_KERNELS,
         "aircraft.envelope.ground_speed",
         "flight.autopilots.arduplane.rtl_point_mass.fly_stages",
-        _GLIDES + "glide_map._fill_slopes",
-        _GLIDES + "glide_map._search",
-        _GLIDES + "glide_reach._look_ahead",
+        _GLIDES_MODULE + "glide_map._fill_slopes",
+        _GLIDES_MODULE + "glide_map._search",
+        _GLIDES_MODULE + "glide_reach._look_ahead",
         "world.highest_ground._fill_cells",
     ),
 }
 
-# What a default plan, a flight and its report's glides call.  First what the others call too, so that two processes do
-# not compile it at once; the first of it takes as long as the other two.  Then the longest first.
+# Units of a default plan, a flight and the glides of its report.  The shared units come first, so that two processes do
+# not compile the same kernels; the first of them takes as long as the other two.  The others follow, the longest first.
 _SHARED = ("problem", "tracking", "ranks")
+# Units of a plan.
 PLANNING = (*_SHARED, "scores", "shortening", "routes", "certificates", "paper", "sides")
-# What a choice of plans calls: all of a default plan's, and its own.
+# Units of a choice of plans: all units of a default plan, and its own.
 CHOOSING = (*_SHARED, "scores", "shortening", "routes", "certificates", "fronts", "paper", "sides")
+# Units of a flight.
 FLYING = ("tracking", "flight")
+# Units of glides without the engine.
 GLIDING = ("glides",)
+# Units of a plan and its flights.
 BOTH = (*_SHARED, "scores", "flight", "shortening", "routes", "certificates", "paper", "sides")
 
 
 def kernels_of(units: tuple[str, ...]) -> frozenset[str]:
-    """Return all kernels of units, each once.
+    """Return all kernels of units, without repetition.
 
     >>> len(kernels_of(("scores", "paper")))
     13

@@ -59,6 +59,7 @@ from world.frames import to_geo
 from world.interruption import end_with_parent
 from world.scenario import Scenario, in_the_air
 
+# Scenario of ``planfly serve`` if none is given.
 DEFAULT_SCENARIO = "jacksboro-air"
 # Duration of a loiter in LOITER and GUIDED in one log, s: each lap of a loiter is laid out, and judged, separately.
 HELD = 900.0

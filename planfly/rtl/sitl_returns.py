@@ -154,7 +154,7 @@ def worst_apart(
     apart = 0.5 * float(np.hypot(*np.diff(place, axis=0).T).sum()) / points if len(starts) > 1 else 0.0
     number = {float(time): k for k, time in enumerate(starts.time)}
     chosen: list[tuple[ReturnFlown, int]] = []
-    for one in sorted(returns.each, key=_worst_first):
+    for one in sorted(returns.each, key=_badness_key):
         k = number[one.time]
         near = any(np.hypot(*(place[k] - place[other])) < apart for _, other in chosen)
         if near or starts.low[k] or not is_steady(world, rows[k]) or not _is_clear(world, rows[k]):
@@ -165,7 +165,7 @@ def worst_apart(
     return chosen
 
 
-def _worst_first(one: ReturnFlown) -> tuple[int, float]:
+def _badness_key(one: ReturnFlown) -> tuple[int, float]:
     """Return the sort key of a return: `badness`, and for safe returns the one nearest to a limit first."""
     return (KINDS.index("safe"), doubt(one)) if one.safe else badness(one)
 
@@ -186,7 +186,7 @@ def fly_by_program(
 ) -> ProgramReturns:
     """Fly at most `points` of the worst returns by ArduPlane, in the mean wind, with exact navigation.
 
-    folder: target of the flight logs, both planfly's and the program's; None writes none.
+    folder: folder for the flight logs of planfly and of the program; None writes no logs.
     Raises FlightError if the program does not start or breaks off.
     """
     flown, version = [], ""
@@ -200,19 +200,21 @@ def fly_by_program(
                 continue
             judged = fly_and_judge(setup, airframe, log, advance, autopilot=program, reference="never")
         version = judged.setup.autopilot.version
-        found = _as_flown(world, one, starts.rows[k], judged.track, judged.ended)
+        found = _judge_flown_return(world, one, starts.rows[k], judged.track, judged.ended)
         reason = "" if found else f"it does not come to where the return begins ({judged.ended})"
         flown.append(ProgramReturn(one, found, reason, log))
     return ProgramReturns(version, tuple(flown))
 
 
-def _as_flown(world: ReturnWorld, law: ReturnFlown, start: Record, track: Track, ended: str) -> ReturnFlown | None:
+def _judge_flown_return(
+    world: ReturnWorld, law: ReturnFlown, start: Record, track: Track, ended: str
+) -> ReturnFlown | None:
     """Judge a return flown by the program; None if the flight did not reach the start of the return."""
     whole = from_start(track, start)
     if whole is None:
         return None
     begin = len(track) - len(whole)
-    position = _until_landing(law.target, whole)
+    position = _cut_at_landing(law.target, whole)
     target = _flown_target(world, law.target, position)
     closest = met_on_way(world, position)
     hits = ended == "ground contact" and len(position) == len(whole)
@@ -249,7 +251,7 @@ def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
     return (target.landing, *target.landing.onward)[-1].place
 
 
-def _until_landing(target: ReturnTarget, position: Floats) -> Floats:
+def _cut_at_landing(target: ReturnTarget, position: Floats) -> Floats:
     """Cut a path (t, 3) to a landing sequence at the last place before the landing."""
     if target.landing is None:
         return position
