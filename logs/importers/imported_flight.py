@@ -149,6 +149,7 @@ _MAX_INTERPOLATED_STEP_S = 1.0
 _MAX_INTERPOLATED_STEPS = 2.5
 # Duration at the start of a flight over which altitudes are compared, s.
 _COMPARED_TIME_S = 5.0
+# Vehicles that are refused, with their words for the message.
 _REFUSED: dict[VehicleKind, str] = {
     "copter": "a copter's",
     "rover": "a rover's",
@@ -157,7 +158,9 @@ _REFUSED: dict[VehicleKind, str] = {
     "tracker": "an antenna tracker's",
     "blimp": "a blimp's",
 }
+# Quantities that a log may lack.
 _OPTIONAL_QUANTITIES: tuple[Quantity, ...] = ("velocity", "attitude", "airspeed", "wind", "battery", "throttle")
+# Largest number of positions that are read.
 _MAX_ROWS = 4_000_000
 
 

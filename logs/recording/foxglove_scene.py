@@ -36,8 +36,11 @@ from world.scenario import Scenario
 from world.terrain import Terrain
 from world.threats import Threats
 
+# Name of the frame of the map.
 MAP = "map"
+# Name of the frame of the aircraft.
 AIRCRAFT = "aircraft"
+# Foxglove log level by name.
 LEVELS = {"debug": Log.DEBUG, "info": Log.INFO, "warning": Log.WARNING, "error": Log.ERROR, "fatal": Log.FATAL}
 # Largest number of vertices along a side of the terrain mesh.
 MAX_VERTICES = 80
@@ -52,7 +55,9 @@ _LINE_POINTS = LinePrimitive.POINTS_FIELD_NUMBER
 _MESH_POINTS = TriangleListPrimitive.POINTS_FIELD_NUMBER
 _MESH_COLOURS = TriangleListPrimitive.COLORS_FIELD_NUMBER
 
+# Colour of the lowest ground.
 _LOW = np.array(theme.rgb(theme.GROUND[0]))
+# Colour of the highest ground.
 _HIGH = np.array(theme.rgb(theme.GROUND[-2]))
 # Scenes have a black background: use the theme's colours for dark ground.
 _KILL = theme.rgba("missile", 0.35, dark=True)
@@ -63,7 +68,7 @@ _KEEP_OUT = theme.rgba("zone", dark=True)
 _STAY_IN = theme.rgba("highlight", dark=True)
 # Height of a name above the ground around it, m.
 _LABEL_HEIGHT_M = 40.0
-# Radius of the ground that a name stays above, m.
+# Half the side of the square of ground that a name stays above, m.
 _NEAR = 300.0
 # Distance of the coloured path below the flight, m.
 _PATH_OFFSET_M = 6.0

@@ -277,8 +277,9 @@ _SLOT_NS = 200_000_000
 _XYZ = "xyz"
 _XYZW = "xyzw"
 _GEO = ("latitude", "longitude", "altitude")
-# Least time between messages with the points of the track, s; the ratio of successive times limits their number.
+# Least time between messages with the points of the track, s.
 _MIN_CLOUD_INTERVAL_S = 10.0
+# Ratio of successive times of these messages, which limits their number.
 _CLOUD_RATIO = 1.05
 # Constant parts of the messages after their timestamps, in protobuf's encoding.
 _TRANSFORM_NAMES = FrameTransform(parent_frame_id=scene.MAP, child_frame_id=scene.AIRCRAFT).SerializeToString(

@@ -25,7 +25,9 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Chunk, DataEnd, Footer
 
+# Magic at start and end of an MCAP file.
 MAGIC = b"\x89MCAP0\r\n"
+# Largest size of a record or an uncompressed chunk that is read, bytes.
 RECORD_LIMIT = 64 * 2**20
 # Least size of the pieces in which records outside chunks are returned, bytes.
 _PIECE_BYTES = 2**18
@@ -33,13 +35,14 @@ _PIECE_BYTES = 2**18
 _OUTSIDE_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 # Greatest ratio of the size of all chunks to the bytes read; valid logs stay under 20.
 _MAX_GROWTH_RATIO = 256
+# Frame of a record: opcode and length.
 FRAME = struct.Struct("<BQ")
 # Errors of mcap's record classes for invalid bytes.
 PARSE_ERRORS = (McapError, struct.error, ValueError, OverflowError, MemoryError)
 
 
 class _Damage(Exception):
-    """The file is damaged; the message says where and how."""
+    """Error for a damaged file; the message states position and kind of the damage."""
 
 
 @dataclass(slots=True)
@@ -57,7 +60,7 @@ class Container:
 def read_chunks(file: BinaryIO, found: Container) -> Iterator[bytes]:
     """Yield the records inside each whole chunk, and the others, as bytes, and fill ``found`` meanwhile.
 
-    file: positioned behind the magic at the start.  Damage raises no error; `Container.problem` describes it.
+    file: positioned after the magic at the start.  Damage raises no error; `Container.problem` describes it.
     """
     try:
         yield from _read(file, found)

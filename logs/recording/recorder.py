@@ -57,6 +57,7 @@ from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict, verdict_json
 from world.arrays import Ints
 
+# Largest size of a chunk, bytes.
 CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"
 PROFILE = "planfly"
@@ -65,7 +66,8 @@ ZONES_TOPIC = "/scene/zones"
 # Topic of logs that were written with judged returns.
 RETURNS_TOPIC = "/scene/returns"
 
-_BUFFER = 2**20
+# Size of the file's write buffer, bytes.
+_BUFFER_BYTES = 2**20
 _NO_ROWS: Rows = np.empty(0, dtype=TRACK_ROW)
 _NO_TIMES = np.empty(0, dtype=np.int64)
 _CHANNELS: dict[str, Any] = {
@@ -119,7 +121,7 @@ class Recorder:
         self._last_ns = EPOCH_NS - 1  # of the rows recorded
         self._newest_ns = EPOCH_NS - 1  # of the rows received
         self._channels: dict[str, int] = {}
-        self._file = path.open("wb", buffering=_BUFFER)
+        self._file = path.open("wb", buffering=_BUFFER_BYTES)
         self._open = True
         try:
             # A thinned log is meant to cost little: compress faster, a quarter more bytes for half the time.

@@ -84,7 +84,8 @@ def media_type(name: str) -> str:
 
 TERRAIN_SCHEMA = "planfly.terrain/1"
 _ENCODING = "float32 bits, difference to the west modulo 2^32, byte planes (low first), zstd"
-_PART_PIXELS = 4 * 2**20
+# Largest number of heights in one attachment.
+_MAX_PART_HEIGHTS = 4 * 2**20
 
 
 class _File(SetupModel):
@@ -92,7 +93,7 @@ class _File(SetupModel):
     file_schema: Annotated[str, Field(alias="schema", pattern=f"^{TERRAIN_SCHEMA}$")] = TERRAIN_SCHEMA
     encoding: Annotated[str, Field(max_length=200)] = _ENCODING
     rows: Annotated[int, Field(ge=2)]
-    cols: Annotated[int, Field(ge=2, le=_PART_PIXELS)]
+    cols: Annotated[int, Field(ge=2, le=_MAX_PART_HEIGHTS)]
     spacing_m: Annotated[Finite, Field(gt=0.0)]
     source: str
     sha256: str
@@ -159,7 +160,7 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
 
 
 def _row_blocks(rows: int, cols: int) -> list[tuple[int, int]]:
-    step = max(1, _PART_PIXELS // cols)
+    step = max(1, _MAX_PART_HEIGHTS // cols)
     return [(first, min(rows, first + step)) for first in range(0, rows, step)]
 
 

@@ -15,10 +15,13 @@ from logs import theme
 from logs.views.drawing import clean_style, new_figure
 from world.arrays import Floats
 
+# Bank angles of the turns, degrees.
 _BANKS_DEG = (15, 20, 30, 40)
+# Winds of the slopes over the ground, m/s.
 _WINDS = (-10.0, -5.0, 0.0, 5.0, 10.0)
 # Line styles from solid to dotted, in the order of `theme.SHADES` from dark to light.
 _DASHES: tuple[Any, ...] = ("-", (0, (7, 2)), (0, (4, 2)), (0, (2, 2)), (0, (1, 1.5)))
+# Marker of each mode.
 _MARKS = {"short period": "o", "phugoid": "s", "Dutch roll": "D", "roll-spiral": "P", "roll": "^", "spiral": "v"}
 _MODE_COLORS = dict(zip(_MARKS, theme.MODES, strict=True))
 _ROWS = {

@@ -16,6 +16,7 @@ from world.arrays import Floats
 
 # Roles of the first and the second flight.
 ROLES = ("flown", "other")
+# Number of points along the distance flown.
 _POINTS = 3000
 
 

@@ -23,18 +23,27 @@ from world.airspace.zones_on_map import zone_walls
 from world.arrays import Floats
 from world.terrain import Terrain
 
+# Margin left of the picture, inches.
 _LEFT = 0.15
+# Margin right of the picture, inches.
 _RIGHT = 0.15
+# Margin above the picture, inches.
 _TOP = 0.5
+# Margin below the picture, inches.
 _BOTTOM = 0.8
+# Elevation of the view, rad.
 _ELEVATION = math.radians(36.0)
+# Largest number of ground samples along a side.
 _MAX_CELLS = 130
+# Largest number of drawn points of the track.
 _MAX_TRACK = 1600
 # Smallest ratio of the shorter to the longer side of the drawn ground.
 _MIN_SIDE_RATIO = 0.3
 # Additional azimuth of the view of a narrower scene, rad.
 _NARROW_SCENE_AZIMUTH_RAD = math.radians(45.0)
+# With more waypoints than this, only every n-th waypoint is numbered.
 _MAX_NUMBERS = 40
+# Largest number of named threats.
 _MAX_NAMES = 30
 
 

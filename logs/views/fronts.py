@@ -9,6 +9,7 @@ from logs.views.charts import Chart, Label, Layer, Panel
 from logs.views.map import MapChart, NamedWind, end_labels, map_extent, world_map
 from planner.search.plan_front import Front
 
+# One watt hour, J.
 _WATT_HOUR = 3600.0
 # Smallest range of an axis, s, m or Wh; plans that differ less are alike.
 LEAST_SPAN = 1.0

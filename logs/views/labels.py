@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from logs import theme
 from world.arrays import Floats
 
+# Resolution of pictures, pixels an inch.
 DPI = 150
 
 Box = tuple[float, float, float, float]
@@ -31,7 +32,7 @@ _DIRECTIONS = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1,
 class LabelPlacer:
     """Greedy placement in pixels on one axes, whose limits and position must be final.
 
-    lines: (n, 2) pixel positions that labels should not cover.  boxes: areas of the labels placed so far.
+    lines: (n, 2) pixel positions that labels should not cover.  boxes: areas of the labels already placed.
     """
 
     axes: Any

@@ -16,6 +16,7 @@ from world.terrain import Terrain
 
 # Largest number of vertices along a side of the ground: indices of the mesh stay below 65,536.
 MAX_GROUND = 250
+# Value of an unknown height.
 MISSING = 65535
 
 

@@ -17,7 +17,9 @@ from aircraft.xml_text import number
 from world.arrays import Floats
 from world.errors import FlightError
 
+# Moment of inertia of 1 slug ft^2, kg m^2.
 _SLUG_FT2 = 1.3558179483314004
+# One pound, kg.
 _POUND = 0.45359237
 # Largest angle of attack seen in flight, rad; the estimated terms stay constant beyond it.
 _LARGEST_ALPHA = 0.25

@@ -41,10 +41,12 @@ _RUDDER = 21
 _THROTTLE = 70
 _ELEVON_LEFT = 77
 _ELEVON_RIGHT = 78
+# Functions of mixed surfaces, which are refused.
 _MIXED = {79: "a V-tail", 80: "a V-tail"}
 # Names of the two outputs of a flying wing, each a mix of elevator and aileron.
 LEFT = "left elevon"
 RIGHT = "right elevon"
+# Functions of surfaces that must not move in flight.
 _FLAPS = {
     2: "flap",
     3: "automatic flap",
@@ -55,6 +57,7 @@ _FLAPS = {
     86: "spoiler",
     87: "spoiler",
 }
+# Functions of lifting motors.
 _LIFT_MOTORS = frozenset(range(33, 41))
 # ArduPlane's default LOG_BITMASK, which logs both at a high rate.
 _BITMASK = 65535

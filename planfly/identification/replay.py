@@ -32,6 +32,7 @@ _JSBSIM_RATE_HZ = 100.0
 _GUST_BANDWIDTH_HZ = 2.0
 # Compared quantities.
 QUANTITIES = ("roll rate", "pitch rate", "yaw rate", "roll", "pitch", "airspeed")
+# Units of the compared quantities.
 UNITS = ("deg/s", "deg/s", "deg/s", "deg", "deg", "m/s")
 
 

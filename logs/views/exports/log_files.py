@@ -89,13 +89,15 @@ def parquet_bytes(log: FlightLog) -> bytes:
 # A flight as a PX4 log (`.ulg`): topics and fields as in PX4's "ULog File Format", which pyulog cannot write from
 # scratch.
 #
-# Local positions are north, east and down from the scenario's origin, as PX4's are from its own; the attitude rotates
+# Local positions are north, east and down from the scenario's origin (in PX4 from its own origin); the attitude rotates
 # from these axes to forward, right and down.  Timestamps are microseconds since the start of the flight.
 
 
+# Magic and version at the start of a ULog file.
 _MAGIC = b"ULog\x01\x12\x35\x01"
 # Size of the message with the flags, bytes.
 _FLAG_BITS_SIZE_BYTES = 40
+# ULog type by numpy type.
 _TYPES = {"<u8": "uint64_t", "<f8": "double", "<f4": "float", "u1": "uint8_t", "<u2": "uint16_t", "?": "bool"}
 # Letters of log levels, as in syslog.
 _LEVELS = {"debug": b"7", "info": b"6", "warning": b"4", "error": b"3", "fatal": b"2"}
@@ -340,7 +342,7 @@ def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
     }
     values = {
         "timestamp": np.array([round(time * 1e6) for time, _ in flown], dtype=np.uint64),
-        # PX4 counts from 0.
+        # PX4 numbers mission items from 0.
         "sequence_current": np.array([item.seq - 1 for _, item in flown]),
         "nav_cmd": np.array([item.command for _, item in flown]),
         "acceptance_radius": np.nan_to_num(np.array(radii)),

@@ -32,11 +32,15 @@ from flight.simulation.track import track_rows
 from logs.recording.reader import FlightLog
 from logs.recording.state_channel import EPOCH_NS
 
+# Time before each frame.
 _STAMP = struct.Struct(">Q")
 # Interval of heartbeats, s.
 _HEARTBEAT_INTERVAL_S = 1.0
+# MAVLink severity by log level.
 _SEVERITY = {"debug": INFO, "info": INFO, "warning": WARNING, "error": CRITICAL, "fatal": CRITICAL}
+# System and component of the vehicle.
 _VEHICLE = (1, mavlink.MAV_COMP_ID_AUTOPILOT1)
+# System and component of the ground station.
 _STATION = (255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
 
 

@@ -30,6 +30,7 @@ Pixels = NDArray[np.uint8]
 
 # Frames a second.
 RATE = 12
+# Resolution of the frames, pixels an inch.
 _DPI = 100.0
 # Largest number of points of the trail; an hour of flight has more points than a screen.
 _MAX_TRAIL_POINTS = 4000

@@ -19,6 +19,7 @@ from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
 from world.frames import to_geo
 from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
 
+# Width of a line, columns.
 WIDTH = 100
 # The throttle is at a limit if it is within this tolerance of 0 or 1.
 _THROTTLE_LIMIT_TOLERANCE = 1e-3
@@ -113,8 +114,8 @@ def _group_by_loiter(parts: list[_LegRows], route: Route) -> list[list[_LegRows]
     first: list[int] = []
     for leg in range(route.legs):
         around = min(route.arcs[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]
-        goes_on = around and leg and route.arcs[leg - 1] > 0.0 and route.items[leg - 1] == route.items[leg]
-        first.append(first[-1] if goes_on else leg)
+        continues = around and leg and route.arcs[leg - 1] > 0.0 and route.items[leg - 1] == route.items[leg]
+        first.append(first[-1] if continues else leg)
     return [list(group) for _, group in itertools.groupby(parts, key=lambda part: first[part.leg])]
 
 

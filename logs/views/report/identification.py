@@ -24,7 +24,8 @@ from logs.views.report.page import (
 from logs.views.scene import script_json
 from world.arrays import Floats
 
-_TWO_SIDED = 1.96
+# Standard deviations from the estimate to either end of a 95 % interval.
+_INTERVAL_SIGMAS = 1.96
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +88,8 @@ def parameter_rows(estimate: Estimate) -> list[ParameterRow]:
                 name=parameter.property_name,
                 prior=f"{parameter.prior:g} ± {parameter.sd:g}",
                 estimate=f"{value:.3f}",
-                low=f"{value - _TWO_SIDED * sd:.2f}",
-                high=f"{value + _TWO_SIDED * sd:.2f}",
+                low=f"{value - _INTERVAL_SIGMAS * sd:.2f}",
+                high=f"{value + _INTERVAL_SIGMAS * sd:.2f}",
                 share=share,
             )
         )
