@@ -360,7 +360,9 @@ class MeanWind:
 
 
 def mean_wind(flight: LoggedFlight) -> MeanWind | None:
-    """Return the mean wind over the stretches along the mission, or over the flight; None if the log holds no wind.
+    """Return the mean wind over the stretches along the mission, or over the flight.
+
+    Return None if the log holds no wind.
 
     The first part of the estimate is left out: it starts from zero, and converges in the first turns.
 

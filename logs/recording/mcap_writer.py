@@ -147,7 +147,9 @@ class ContainerWriter:
         return front
 
     def copy(self, data: bytes) -> None:
-        """Write a chunk of another file, from its records.  Raises ValueError and the errors of mcap's classes.
+        """Write a chunk of another file, from its records.
+
+        Raises ValueError and the errors of mcap's classes.
 
         Its schemas and channels become schemas and channels of this file.
         """
@@ -520,7 +522,10 @@ def lay_out(
 
 
 def _entries(others: list[MessageRecords]) -> Entries:
-    """Return messages in order of time, with their starts in the joined blobs; their offsets are not set yet."""
+    """Return messages in order of time, with their starts in the joined blobs.
+
+    Their offsets are not set yet.
+    """
     found: Entries = np.zeros(sum(len(item.log_times) for item in others), dtype=ENTRY)
     first, start = 0, 0
     for item in others:

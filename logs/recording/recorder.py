@@ -283,7 +283,10 @@ class Recorder:
         self._writer.attach(name, media_type(name), data, log_time)
 
     def _emit(self, until: int | None) -> None:
-        """Write the pending rows and events before ``until`` (ns; None for all), in chunks of at most a second."""
+        """Write the pending rows and events before ``until``, in chunks of at most a second.
+
+        until: ns; None for all.
+        """
         rows = join_rows(self._pending)
         log_times = times_ns(rows["time"])
         stop = len(rows) if until is None else int(np.searchsorted(log_times, until))

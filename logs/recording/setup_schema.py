@@ -143,7 +143,10 @@ class RouteTable(SetupModel):
     open_items: Annotated[tuple[OpenItem, ...], Field(alias="open_items_item_text")] = ()
 
     def route(self, file: str) -> Route:
-        """Return the route of the table.  Raises LogError for inconsistent columns, and for a leg without length."""
+        """Return the route of the table.
+
+        Raises LogError for inconsistent columns, and for a leg without length.
+        """
         waypoints = np.array(self.waypoints)
         if not (leg_runs(waypoints) > 0.0).all():
             raise self.fault(file, "waypoints", "a leg without horizontal length")
@@ -197,7 +200,10 @@ class EnvelopeTable(SetupModel):
     battery_guessed: bool = False
 
     def envelope(self, file: str) -> Envelope:
-        """Return the envelope of the table.  Raises LogError for inconsistent tables, and for axes out of order."""
+        """Return the envelope of the table.
+
+        Raises LogError for inconsistent tables, and for axes out of order.
+        """
         for field in ("airspeed", "amsl"):
             if (np.diff(getattr(self, field)) <= 0.0).any():
                 raise self.fault(file, field, "not increasing")

@@ -1,1 +1,1 @@
-"""Views of a flight: charts, pictures and pages, each drawn from one description; replays; and exports."""
+"""Views of a flight: charts, pictures and pages from one description each, replays, and exports."""

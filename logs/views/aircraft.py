@@ -120,7 +120,9 @@ def _turns(axes: Any, aircraft: Aircraft) -> None:
 
 
 def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[float, Sequence[Mode]]) -> Figure:
-    """Draw four panels: angle of attack and controls, and throttle and power, over airspeed; roots of the modes.
+    """Draw four panels: angle of attack and controls, throttle and power, roots of the modes.
+
+    All panels but the roots are drawn over airspeed.
 
     trims: trims in order of airspeed.  modes: modes by airspeed, m/s.
 
@@ -212,7 +214,9 @@ def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool)
 
 
 def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
-    """Draw a column for each control; a panel shows the change of one quantity from level flight over time (s).
+    """Draw a column for each control.
+
+    A panel shows the change of one quantity from level flight over time (s).
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.characteristics import step_responses

@@ -55,7 +55,9 @@ class Layer:
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A text at a position of a panel, moved away from other labels; a "name" without free space is left out.
+    """A text at a position of a panel, moved away from other labels.
+
+    A "name" without free space is left out.
 
     rank: "fail" is framed, "end" and "number" are bold; the page writes these two and shows the others on hover.
     prefer: direction tried first; (0, 0) centers the text on the position.

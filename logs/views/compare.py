@@ -114,7 +114,9 @@ _REFLOWN = (
 
 
 def refly_charts(again: Reflight) -> dict[str, Chart]:
-    """Return charts over the distance, as flown and as simulated, by name of the PNG; only of logged quantities.
+    """Return charts over the distance, as flown and as simulated, by name of the PNG.
+
+    Quantities that the log lacks have no chart.
 
     >>> from flight.simulation.setup import MissionStretch
     >>> from logs.recording.example_log import example_log

@@ -63,7 +63,10 @@ def _legend_height(handles: list[Any]) -> float:
 
 
 def map_frame(east: tuple[float, float], north: tuple[float, float], legend: float) -> tuple[Figure, Any]:
-    """Make figure and axes of a map with these ranges (m).  legend: height of the legend below the map, inches."""
+    """Make figure and axes of a map with these ranges (m).
+
+    legend: height of the legend below the map, inches.
+    """
     height = _MAP_WIDTH * (north[1] - north[0]) / (east[1] - east[0])
     tall = max(height, _MIN_HEIGHT)
     total = _TOP + tall + _BOTTOM + legend

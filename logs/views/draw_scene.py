@@ -76,7 +76,9 @@ class Projection:
 
 
 def draw_scene(view: SceneView) -> Figure:
-    """Draw the scene from the side of the line from start to destination; the title states the stretch of heights.
+    """Draw the scene from the side of the line from start to destination.
+
+    The title states the stretch of heights.
 
     Lines are dashed and thin behind a ridge.  A long and narrow scene is seen more from its end, with ground around it,
     so that it does not appear as a strip.
@@ -201,7 +203,10 @@ def _ground_surface(axes: Any, projection: Projection, grid: GroundGrid | None, 
 
 
 def _threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Failures) -> list[Any]:
-    """Draw outlines of the upper halves of spheres, at the altitude of their centers; entered spheres are broad."""
+    """Draw outlines of the upper halves of spheres, at the altitude of their centers.
+
+    Entered spheres are broad.
+    """
     threats = setup.scenario.threats
     handles: list[Any] = []
     # Stretched dome of radius 1: far half of its outline, and near half of its base.

@@ -544,7 +544,10 @@ def _legend_beside(axes: Any) -> None:
 
 
 def _legend_above(figure: Figure, top: float) -> None:
-    """Draw each entry of the panels once, in a row.  top: upper edge as a fraction of the height of the figure."""
+    """Draw each entry of the panels once, in a row.
+
+    top: upper edge as a fraction of the height of the figure.
+    """
     entries = {
         str(label): handle
         for axes in figure.axes

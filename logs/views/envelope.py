@@ -17,7 +17,10 @@ _MAX_DOTS = 2000
 
 @dataclass(frozen=True, slots=True)
 class EnvelopeLine:
-    """Steepest steady path angles (°) at one altitude (m AMSL) over true airspeed (m/s), (120,); descents negative."""
+    """Steepest steady path angles (°) at one altitude (m AMSL) over true airspeed (m/s), (120,).
+
+    Descents have negative angles.
+    """
 
     amsl: int
     airspeed: Floats

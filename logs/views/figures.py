@@ -324,7 +324,9 @@ def subject_of(
 
 
 def figure_views(subject: Subject) -> dict[str, View]:
-    """Build the descriptions of all figures of a flight or of a plan, by name; figures without data are left out.
+    """Build the descriptions of all figures of a flight or of a plan, by name.
+
+    Figures without data are left out.
 
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.judge_geometry import judge_geometry

@@ -27,7 +27,10 @@ class _Named:
 
 
 def _named(front: Front) -> list[_Named]:
-    """Return the best plan in each objective; a plan that is best in several is named for the first of them."""
+    """Return the best plan in each objective.
+
+    A plan that is best in several is named for the first of them.
+    """
     rows = front.objectives()
     names = ("shortest", "least exposed", "highest above ground", f"least {front.fourth}")
     roles = ("front-shortest", "front-unseen", "front-high", "front-sparing")
@@ -40,7 +43,10 @@ def _named(front: Front) -> list[_Named]:
 
 
 def front_map(front: Front) -> MapChart:
-    """Return all plans of a non-empty front from above; the best in each objective are numbered and stand out."""
+    """Return all plans of a non-empty front from above.
+
+    The best in each objective are numbered and stand out.
+    """
     scenario, named = front.plans[0].plan.scenario, _named(front)
     marked = {one.row for one in named}
     layers, labels = [], []

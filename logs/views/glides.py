@@ -16,7 +16,10 @@ _LOOKS: dict[Reach, tuple[str, str]] = {reach: (f"reach-{reach}", reached_text(r
 
 
 def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
-    """Return the glide footprint from above, and the path coloured by destination in reach; None if not judged."""
+    """Return the glide footprint from above, and the path coloured by destination in reach.
+
+    Return None if glides were not judged.
+    """
     glides, scenario, route = drawn.glides, setup.scenario, setup.route.waypoints
     if not glides.each:
         return None
@@ -51,7 +54,10 @@ def _said(one: Glide, drawn: DrawnReturns) -> str:
 
 
 def footprint_layers(drawn: DrawnReturns, extent: Extent) -> list[Layer]:
-    """Return bands of the least height above ground to reach a chosen place, and flat ground; empty without a map."""
+    """Return bands of the least height above ground to reach a chosen place, and flat ground.
+
+    The list is empty without a map.
+    """
     footprint = drawn.glides.footprint
     if footprint is None:
         return []

@@ -214,7 +214,10 @@ def map_extent(scenario: Scenario, route: Floats | None, ways: Sequence[Floats])
 
 
 def _area(scenario: Scenario) -> list[Layer]:
-    """Draw the edge of the scenario's area; bounds made around an external mission limit nothing and are not drawn."""
+    """Draw the edge of the scenario's area.
+
+    Bounds made around an external mission limit nothing and are not drawn.
+    """
     if scenario.external:
         return []
     (west, east), (south, north) = scenario.bounds.tolist()

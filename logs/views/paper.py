@@ -110,7 +110,10 @@ def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: in
 
 
 def _map(scenario: Scenario, title: str, legend: float) -> tuple[Figure, Any, list[Any]]:
-    """Draw ground and threats; return figure, axes and their legend handles.  legend: height of the legend, inches."""
+    """Draw ground and threats; return figure, axes and their legend handles.
+
+    legend: height of the legend, inches.
+    """
     low, high = scenario.bounds[:, 0], scenario.bounds[:, 1]
     padding = 0.02 * float((high - low).max())
     (west, south), (east, north) = (low - padding).tolist(), (high + padding).tolist()

@@ -146,7 +146,10 @@ def ground_under(scenario: Scenario, points: Floats) -> Floats | None:
 
 
 def _span(scenario: Scenario, route: Floats, track: Track | None, ground: Floats | None) -> tuple[float, float]:
-    """Return a range that holds ground, plan and flight; and height limit and ceiling, if these do not flatten it."""
+    """Return an altitude range that holds ground, plan and flight.
+
+    Height limit and ceiling are included if they do not flatten the others.
+    """
     heights = [route[:, 2]] + ([] if track is None else [track.position[:, 2]])
     if ground is not None:
         heights.append(ground)

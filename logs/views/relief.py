@@ -6,7 +6,9 @@ from world.arrays import Floats
 
 
 def relief(heights: Floats, pitch: float, span: float) -> Floats:
-    """Return the brightness, about 0.75 to 1.1 clipped at 1; unknown heights have the brightness of level ground.
+    """Return the brightness, about 0.75 to 1.1 clipped at 1.
+
+    Unknown heights have the brightness of level ground.
 
     heights: (rows, columns) m, rows from south to north.  pitch: distance between rows, m.  span: difference between
     lowest and highest height, m.

@@ -99,7 +99,10 @@ def _targets(targets: dict[str, tuple[float, float, float]]) -> list[Layer]:
 
 
 def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None:
-    """Return altitude profiles of the worst returns with the ground below, one panel each; None without returns."""
+    """Return altitude profiles of the worst returns with the ground below, one panel each.
+
+    Return None without returns.
+    """
     if not drawn.worst:
         return None
     scenario = setup.scenario

@@ -120,7 +120,10 @@ def scene_data(view: SceneView) -> dict[str, object]:
 
 
 def _zone_walls(setup: FlightSetup) -> dict[str, object]:
-    """Return names, kinds and rings of zones, with lower and upper end of each corner; empty without zones."""
+    """Return names, kinds and rings of zones, with lower and upper end of each corner.
+
+    The result is empty without zones.
+    """
     zones, up = setup.scenario.zones, setup.route.waypoints[:, 2]
     if not zones:
         return {}

@@ -18,7 +18,10 @@ _POINTS = 8000
 
 
 def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
-    """Return a panel for each survey, rotated so that its lines are horizontal; None without a flown survey."""
+    """Return a panel for each survey, rotated so that its lines are horizontal.
+
+    Return None without a flown survey.
+    """
     if not surveys_of(setup):
         return None
     requirements = route_requirements(setup)

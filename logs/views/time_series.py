@@ -1,4 +1,4 @@
-"""Chart a flight over time: speed, bank, tracking errors and clearance; controls and limits; energy; exposure."""
+"""Chart a flight over time: tracking, controls and their limits, energy, and exposure."""
 
 from dataclasses import replace
 

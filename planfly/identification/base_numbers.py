@@ -156,7 +156,10 @@ def is_flying_wing(aircraft: Aircraft) -> bool:
 
 
 def _reacts(aircraft: Aircraft) -> bool:
-    """Return True if a model includes the reaction to propeller torque; models of flying wings leave it out."""
+    """Return True if a model includes the reaction to propeller torque.
+
+    Models of flying wings leave it out.
+    """
     root = _model(aircraft)
     reactions = None if root is None else root.find("external_reactions")
     return reactions is None or reactions.find("moment") is not None
@@ -171,7 +174,10 @@ def _model(aircraft: Aircraft) -> ElementTree.Element | None:
 
 
 def read_motor(aircraft: Aircraft) -> Motor:
-    """Return the constants of a model's motor, or of its propeller disc.  Raises FlightError for any other form."""
+    """Return the constants of a model's motor, or of its propeller disc.
+
+    Raises FlightError for any other form.
+    """
     try:
         root = ElementTree.parse(aircraft.model_file).getroot()
         functions = {one.get("name", ""): one for one in root.iter("function")}

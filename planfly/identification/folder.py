@@ -129,7 +129,9 @@ def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> 
 
 
 def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
-    """Return cruise, lowest and highest true airspeed at `AMSL`, m/s; values of the base if the log states none.
+    """Return cruise, lowest and highest true airspeed at `AMSL`, m/s.
+
+    Values that the log does not state come from the base.
 
     ArduPlane's parameters are equivalent airspeeds.
     """

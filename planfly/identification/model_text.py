@@ -70,7 +70,10 @@ _PARTS = (
 
 
 def check_base(base: Aircraft) -> None:
-    """Refuse a base whose model lacks a part that `identified_xml` needs.  Raises FlightError, in one line."""
+    """Refuse a base whose model lacks a part that `identified_xml` needs.
+
+    Raises FlightError, in one line.
+    """
     try:
         root = ElementTree.parse(base.model_file).getroot()
     except (OSError, ElementTree.ParseError) as error:

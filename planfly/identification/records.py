@@ -136,7 +136,10 @@ def _controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:
 
 
 def _shares_as_angles(shares: Floats, aircraft: Aircraft) -> Floats:
-    """Convert fractions of full travel to controls (n, 4); full travel is the base aircraft's largest deflection."""
+    """Convert fractions of full travel to controls (n, 4).
+
+    Full travel is the base aircraft's largest deflection.
+    """
     # Positive fractions are nose up and yaw to the right; the model's elevator and rudder have the opposite sign.
     largest = np.array([-aircraft.max_elevator, aircraft.max_aileron, -aircraft.max_rudder, 1.0])
     return np.asarray(shares * largest)

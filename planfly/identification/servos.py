@@ -35,7 +35,9 @@ class ServoOutput:
 
 
 def read_servos(file: Path) -> Mapping[str, ServoOutput]:
-    """Read the outputs of a file by control: elevator, aileron, rudder, throttle.  Raises FlightError for a bad file.
+    """Read the outputs of a file by control: elevator, aileron, rudder, throttle.
+
+    Raises FlightError for a bad file.
 
     >>> from aircraft.catalog import load_aircraft
     >>> outputs = read_servos(load_aircraft("aerosonde").folder / "ardupilot.toml")

@@ -44,7 +44,9 @@ def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
 
 
 def csv_text(log: FlightLog) -> str:
-    """Return the table as CSV: a line of names, then one line a row; numbers have the fewest digits that read back.
+    """Return the table as CSV: a line of names, then one line a row.
+
+    Numbers have the fewest digits that read back.
 
     >>> from logs.recording.example_log import example_log
     >>> csv_text(example_log()).splitlines()[1].split(",")[:6]
@@ -296,7 +298,10 @@ def _topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
 
 
 def _battery(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
-    """Return the values of battery_status by field; the voltage is the mean from logged energy and current."""
+    """Return the values of battery_status by field.
+
+    The voltage is the mean from logged energy and current.
+    """
     time, current = log.track.time[rows], log.track.current[rows].astype(np.float64)
     energy = log.track.energy[rows].astype(np.float64)
     charge = np.concatenate([[0.0], np.cumsum(np.diff(time) * current[1:])])[: len(rows)]  # As

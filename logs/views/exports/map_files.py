@@ -269,7 +269,9 @@ def _coordinates(line: MapLine, k: int) -> str:
 
 
 def gpx_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) -> str:
-    """Return a GPX document: lines with named points as routes; other lines, and outlines of zones, as tracks.
+    """Return a GPX document: lines with named points as routes.
+
+    Other lines and outlines of zones are written as tracks.
 
     >>> line = MapLine("leg", np.array([46.0, 46.01]), np.array([8.0, 8.0]), np.array([500.0, 520.0]))
     >>> '<trkpt lat="46.01" lon="8.0">' in gpx_text("one leg", [line])

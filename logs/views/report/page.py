@@ -183,7 +183,10 @@ def script_digest(text: str) -> str:
 
 @cache
 def page_library() -> PageLibrary:
-    """Return plotly.js as packed by the build, a third of its size.  Raises OSError if the build is missing."""
+    """Return plotly.js as packed by the build, a third of its size.
+
+    Raises OSError if the build is missing.
+    """
     packed = resources.files("logs.views.report").joinpath("plotly.min.js.gz").read_bytes()
     text = gzip.decompress(packed).decode("utf-8")
     # The script begins with a comment that states its version: "plotly.js v3.1.0".
@@ -309,12 +312,18 @@ def _page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View
 
 
 def page_charts(views: Mapping[str, View]) -> dict[str, Any]:
-    """Return the charts that the scripts draw, by name of the figure; a chart without panels stays a picture."""
+    """Return the charts that the scripts draw, by name of the figure.
+
+    A chart without panels stays a picture.
+    """
     return {name: view_json(view) for name, view in views.items() if not isinstance(view, Chart) or view.panels}
 
 
 def report_flight(setup: FlightSetup, track: Track | None) -> dict[str, Any]:
-    """Return the flight for slider and map, and the aircraft model; a plan that was not flown has no flight."""
+    """Return the flight for slider and map, and the aircraft model.
+
+    A plan that was not flown has no flight.
+    """
     flights = [] if track is None else [flight_moments(setup, track)]
     # A flight without a known position cannot be shown.
     known = [flight for flight in flights if flight["time"]]

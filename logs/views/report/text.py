@@ -228,7 +228,9 @@ def level_rows(verdict: Verdict, autopilot: Autopilot) -> list[LevelRow]:
 
 
 def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None = None) -> list[FindingRow]:
-    """Return all findings as text: failing first, then passed, then not judged; otherwise in the verdict's order.
+    """Return all findings as text: failing first, then passed, then not judged.
+
+    Within each state, the order of the verdict is kept.
 
     deciding: deciding parameter of the verdict, for the remedies.
     """
