@@ -1,4 +1,4 @@
-"""Choose one flight of a log, and resample everything else that the log holds at the times of its positions.
+"""Choose one flight of a log, and resample all its data at the times of its positions.
 
 A log may hold several flights, each flown along several missions: `make_flight` chooses one.  The chosen flight gives
 the altitudes for a plan that states none, the mean wind, and the track that is judged.
@@ -128,7 +128,7 @@ def _stretches(start: float, end: float, modes: Sequence[ModeChange], last: floa
 
 
 def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:
-    """Return the mission active at the start of a stretch: the last one logged by then, or the first one within it."""
+    """Return the mission active at the start of a stretch, or the first mission within the stretch."""
     before = [k for k, logged in enumerate(missions) if logged.time <= stretch.start + 1.0]
     if before:
         return before[-1]
@@ -137,7 +137,7 @@ def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> i
 
 
 def choose_part(parts: Sequence[FlightPart]) -> int:
-    """Return the index of the flight to judge: the one flown along its mission for longest, or the longest."""
+    """Return the index of the flight that followed its mission for longest, or of the longest flight."""
     return max(range(len(parts)), key=lambda k: (parts[k].along_mission, parts[k].end - parts[k].start))
 
 
@@ -304,7 +304,7 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, places: P
 
 
 def _heights(raw: RawLog, places: Places, start: float) -> Heights:
-    """Return the chosen altitude source, and the offsets of the others in the first seconds of the judged flight."""
+    """Return the chosen altitude source, and offsets of the others in the first seconds of the flight."""
     offsets = []
     for other in raw.heights:
         time = places.on_clock(other.series.time)

@@ -79,7 +79,7 @@ def example_log() -> FlightLog:
 
 
 def write_example_log(path: Path) -> Path:
-    """Record the flight of `example_log` in a file, replacing an existing one, and return its path.
+    """Record the flight of `example_log` in a file, replacing an existing one; return its path.
 
     Raises OSError.
 

@@ -116,7 +116,7 @@ def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
 
 
 def _ground(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Return corners (n, m, 3) of the mesh, their colours (n, m, 3), and flags (n, m) of known ones, possibly none."""
+    """Return corners (n, m, 3) of the mesh, colours (n, m, 3), and flags (n, m) of known corners."""
 
     def axis(low: float, high: float) -> Floats:
         return np.linspace(low, high, int(np.clip((high - low) / terrain.spacing, 2, MAX_VERTICES)))
@@ -191,7 +191,7 @@ def _name(place: Floats, name: str) -> TextPrimitive:
 
 
 def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
-    """Draw the legs between waypoints (w, 3) as a line, the waypoints as dots with their numbers and mission items."""
+    """Draw legs between waypoints (w, 3) as a line, and waypoints as dots with numbers and mission items."""
     entity = _entity(time_ns, "plan")
     legs = _line(_PLAN)
     legs.points.extend(_points(waypoints))
@@ -248,7 +248,7 @@ def _points(points: Floats) -> Iterable[Point3]:
 
 
 def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
-    """Draw edges of zones as lines, from ground or floor to the ceiling or to above the path, and their names."""
+    """Draw names and edges of zones, from ground or floor to the ceiling or to above the path."""
     entity = _entity(time_ns, "zones")
     low, top = float(waypoints[:, 2].min()), float(waypoints[:, 2].max()) + 50.0
     for zone in scenario.zones:
@@ -264,7 +264,7 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
 
 
 def returns_scene(time_ns: int, drawn: DrawnReturns, terrain: Terrain | None) -> bytes:
-    """Draw the path coloured by outcome of returns, the worst returns with their numbers, and the glide's footprint.
+    """Draw the path coloured by outcome of returns, the worst returns, and the glide's footprint.
 
     The coloured line lies below the path, so that plan and track stay visible.
     """
@@ -347,7 +347,7 @@ def model_colours() -> Singles:
 
 
 def aircraft_glb() -> bytes:
-    """Return the model as a `.glb` file: one unit wide, in glTF's axes (right-handed, y up), with coloured parts."""
+    """Return the model as a coloured `.glb` file, one unit wide, in glTF's axes (right-handed, y up)."""
     pieces = b""
     views: list[dict[str, Any]] = []
     accessors, primitives, materials = [], [], []

@@ -254,7 +254,7 @@ def threats_cloud(time_ns: int, threats: Threats) -> bytes:
 
 
 def along(waypoints: Floats) -> Floats:
-    """Return points at even distances on the straight legs between waypoints (w, 3), including the waypoints."""
+    """Return points at even distances on the legs between waypoints (w, 3), including the waypoints."""
     lengths = np.sqrt((np.diff(waypoints, axis=0) ** 2).sum(axis=1))
     step = max(_POINT_SPACING_M, float(lengths.sum()) / _MAX_SAMPLES)
     legs = [

@@ -101,7 +101,7 @@ class _ChunkIndex(NamedTuple):
 
 
 class ContainerWriter:
-    """Writer of a container: magic and header at once, then attachments and chunks, and the summary at `finish`."""
+    """Writer of a container: magic and header, then attachments and chunks, and the summary at `finish`."""
 
     def __init__(self, file: BinaryIO, profile: str, level: int = 3) -> None:
         """Begin a container in an empty file open for writing.
@@ -411,7 +411,7 @@ def single_record(channel: int, log_time: int, data: bytes) -> MessageRecords:
 def _order(
     row_times: Ints, row_length: int, row_channel: int, others: Entries, front: int, limit: int
 ) -> tuple[Entries, Ints]:
-    """Merge rows and other messages by time, and return all messages (n,) and the first message of each chunk.
+    """Merge rows and other messages by time; return all messages (n,) and the first of each chunk.
 
     At equal times a row comes last.  The first messages end with n.
     """
@@ -505,7 +505,7 @@ def _index(entries: Entries, firsts: Ints, front: int, most: int) -> tuple[Bytes
 def lay_out(
     rows: Bytes, row_times: Ints, row_channel: int, others: list[MessageRecords], front: bytes, limit: int
 ) -> Layout:
-    """Order message records by time, cut them into chunks of at most one second and ``limit`` bytes, and index them.
+    """Order message records by time, and index them in chunks of at most one second and ``limit`` bytes.
 
     rows: (n, size) records of the channel ``row_channel``, at ``row_times`` (ns); at equal times a row comes last.
     front: bytes before the first message.  A message of more than ``limit`` bytes gets its own chunk.

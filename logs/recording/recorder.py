@@ -329,7 +329,7 @@ def _chunks(layout: Layout) -> Iterator[ChunkContent]:
 
 
 def thin_track(track: Track, every: int) -> Track:
-    """Return the rows that a `Recorder` with this ``every`` records of a whole flight: every n-th row, and the last.
+    """Return the rows of a flight that a `Recorder` with ``every`` records: every n-th row, and the last.
 
     >>> from logs.recording.example_log import example_log
     >>> thin_track(example_log().track, 100).time

@@ -256,7 +256,7 @@ def _versions() -> tuple[tuple[str, str], ...]:
 
 
 def package_versions() -> dict[str, str]:
-    """Return the versions of Python and of the installed packages whose arithmetic or formats a log depends on.
+    """Return versions of Python and the packages whose arithmetic or formats a log depends on, if installed.
 
     >>> versions = package_versions()
     >>> versions["numpy"] == metadata.version("numpy")

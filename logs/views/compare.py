@@ -1,4 +1,4 @@
-"""Chart two flights together: on the map of the first, over the distance flown, and as flown and simulated."""
+"""Chart two flights together: on one map, over the distance flown, and as flown and simulated."""
 
 from dataclasses import dataclass, replace
 

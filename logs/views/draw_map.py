@@ -1,4 +1,4 @@
-"""Draw the map as PNG and SVG: relief with contours, layers of the chart, compass, colour bar and legend."""
+"""Draw the map: relief with contours, layers of the chart, compass, colour bar and legend."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -57,7 +57,7 @@ def draw_map(chart: MapChart) -> Figure:
 
 
 def _legend_height(handles: list[Any]) -> float:
-    """Return the height (inches) of a legend of four columns with the entry for contours, at least `_LEGEND`."""
+    """Return the height (inches) of a legend of four columns with contours, at least `_LEGEND`."""
     lines = [1 + str(handle.get_label()).count("\n") for handle in handles] + [1]
     return max(_LEGEND, 0.08 + _LEGEND_LINE * max(int(column.sum()) for column in np.array_split(lines, 4)))
 

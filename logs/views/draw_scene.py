@@ -1,4 +1,4 @@
-"""Draw the 3-D picture: ground, threats, plan and flight from the side, for paper and pages without scripts."""
+"""Draw the 3-D picture for paper and pages without scripts: ground, threats, plan and flight."""
 
 import math
 from dataclasses import dataclass

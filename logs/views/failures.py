@@ -1,4 +1,4 @@
-"""Find the places of failures on a route, their names in charts, and the progress of a flight along the route."""
+"""Find the places of failures on a route, their names in charts, and the progress of a flight."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -96,7 +96,7 @@ def route_distance(waypoints: Floats) -> Floats:
 
 
 def route_samples(waypoints: Floats, step: float) -> tuple[Floats, Floats]:
-    """Return distance (s,) m and position (s, 3) m of points along the route, at most `step` apart, with waypoints."""
+    """Return distance (s,) m and position (s, 3) m of waypoints and points between, at most `step` apart."""
     at = route_distance(waypoints)
     count = max(2, int(np.ceil(at[-1] / step)) + 1) if at[-1] > 0.0 else 2
     distance = np.union1d(np.linspace(0.0, at[-1], count), at)
@@ -104,7 +104,7 @@ def route_samples(waypoints: Floats, step: float) -> tuple[Floats, Floats]:
 
 
 def paths_differ(a: Floats, b: Floats, tolerance: float) -> bool:
-    """Return True if a corner of one path is further than `tolerance` (m) from the other path, either way round.
+    """Return True if any corner of either path is further than `tolerance` (m) from the other path.
 
     a, b: (n, 3) and (m, 3) m.
     """

@@ -1,4 +1,4 @@
-"""Chart an identification: measured and predicted values of each equation, and a log replayed by the models."""
+"""Chart an identification: measured and predicted values of equations, and a replayed log."""
 
 from collections.abc import Sequence
 

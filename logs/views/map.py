@@ -189,7 +189,7 @@ def map_json(chart: MapChart) -> Json:
 
 
 def map_extent(scenario: Scenario, route: Floats | None, ways: Sequence[Floats]) -> Extent:
-    """Return the east and north range of the scenario's area and of everything outside it, with a margin, m.
+    """Return the east and north range of the scenario's area and everything outside, with a margin, m.
 
     ways: paths (t, 3) m; unknown rows are left out.
     Bounds made around an external mission limit nothing: the range covers its path, and the parts of zones within them.

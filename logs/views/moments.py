@@ -1,4 +1,4 @@
-"""Build the data of a flight by moment, for slider, read-out and map of the page, and the aircraft model."""
+"""Build the data of a flight by moment for the page, and the aircraft model."""
 
 from typing import Any
 
@@ -82,7 +82,7 @@ def _known(item: int) -> int | None:
 
 
 def aircraft_model() -> dict[str, Any]:
-    """Return the aircraft model of the log: corners of triangles (forward, left, up), one unit wide, with colours."""
+    """Return the aircraft model: coloured triangles with corners forward, left, up, one unit wide."""
 
     def rounded(values: NDArray[np.float32]) -> Any:
         return np.round(values.astype(np.float64), 4).tolist()

@@ -1,4 +1,4 @@
-"""Draw the figures of the paper's experiment: paths of many searches, a path of each encoding, and convergence."""
+"""Draw figures of the paper's experiment: paths of searches, a path of each encoding, convergence."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Chart returns to launch: the path coloured by outcome, the worst returns in profile, and the least start heights."""
+"""Chart returns to launch: path by outcome, profiles of the worst returns, and least start heights."""
 
 from collections.abc import Callable, Sequence
 from typing import TypeVar
@@ -151,7 +151,7 @@ def _profile(scenario: Scenario, one: WorstReturn, number: int, span: tuple[floa
 
 
 def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track | None) -> Chart | None:
-    """Return altitudes over time: of the flight by outcome of a return, the least ones, and the margin of a glide.
+    """Return flown altitudes over time by outcome of a return, least altitudes, and margins of glides.
 
     None if no returns were judged.
     """

@@ -75,7 +75,7 @@ def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) ->
 
 
 def drawn_rows(track: Track, most: int) -> NDArray[np.intp]:
-    """Return at most ``most`` rows of the track with a known position, including the first and last of these."""
+    """Return at most ``most`` rows of the track with a known position, including the first and last."""
     good = np.flatnonzero(np.isfinite(track.position).all(axis=1))
     return good[np.unique(np.linspace(0, max(len(good) - 1, 0), min(len(good), most)).astype(np.intp))]
 

@@ -93,7 +93,7 @@ def threat_names(threats: Threats, named: frozenset[int] = frozenset()) -> tuple
 
 
 def kill_radius_at_path(threats: Threats, chosen: NDArray[np.intp], route: Floats | None) -> Floats:
-    """Return the section radius (m) of each chosen missile sphere at the altitude of the nearest point of the path."""
+    """Return the section radius (m) of each chosen missile sphere at the nearest altitude of the path."""
     radius = threats.kill_radius[chosen]
     if route is None:
         return radius
@@ -244,7 +244,7 @@ def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
 
 
 def zone_names(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
-    """Return names and altitudes of zones: in the center of exclusion zones, at the north corner of inclusion zones."""
+    """Label zones: exclusion zones at the center, inclusion zones at their northernmost corner."""
     if len(zones) > _MAX_ZONE_NAMES:
         return ()
     found = []

@@ -126,7 +126,7 @@ _MAX_SEGMENTS = 12_000
 
 
 def exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
-    """Return the mean of (scale/d)^4 inside each of m spheres on each segment (paper eq. 9, 10), summed over spheres.
+    """Return the mean of (scale/d)^4 on each segment (paper eq. 9, 10), summed over spheres around it.
 
     position: (t, 3) m.  centres: (m, 3).  radii, scales: (m,).  Returns (t - 1,), 1 at a distance of one scale; NaN
     where the track is unknown.

@@ -1,1 +1,1 @@
-"""Identify an aircraft from flight logs: read and cut logs, estimate a model, then write, replay and show it."""
+"""Identify an aircraft from flight logs: estimate a model, then write, replay and show it."""

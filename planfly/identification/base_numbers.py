@@ -1,4 +1,4 @@
-"""Extract the numbers of a base aircraft from its JSBSim model, linearized about level flight at cruise."""
+"""Extract the numbers of a base aircraft from its JSBSim model in level flight at cruise."""
 
 import math
 from collections.abc import Callable
@@ -133,7 +133,7 @@ class _Probe:
     def _at(
         self, alpha: float, beta: float = 0.0, rates: Floats | None = None, surfaces: Floats | None = None
     ) -> Floats:
-        """Return the aerodynamic coefficients (6,) of drag, lift, side force and moments, with closed throttle."""
+        """Return aerodynamic coefficients (6,) of drag, lift, side force and moments, with closed throttle."""
         turning = np.zeros(3) if rates is None else rates
         deflections = np.zeros(3) if surfaces is None else surfaces
         speed = self._airspeed

@@ -1,4 +1,4 @@
-"""Write the JSBSim model of an identified aircraft: the base model with estimated properties ``ident/NAME``.
+"""Write the JSBSim model of an identified aircraft: its base with properties ``ident/NAME``.
 
 The coefficients of the base stay.  Next to each function of forces and moments stands another with the terms that the
 estimate adds.  Motor and propeller are written again, in the form that they have in the base.  The default values of
@@ -128,7 +128,7 @@ def _term(coefficient: float, *factors: str) -> str:
 
 
 def _lift_functions(numbers: BaseModel) -> str:
-    """Return the lift coefficients from angle of attack alone, of base and estimate, up to the largest angle seen."""
+    """Return lift coefficients of base and estimate from angle of attack, up to the largest angle seen."""
     c = numbers.coefficients
     return f"""
     <function name="ident/alpha-rad"> <min> <v> {_LARGEST_ALPHA} </v>

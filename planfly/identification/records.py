@@ -1,4 +1,4 @@
-"""Resample a logged motion on one time grid, and select the stretches of flight that an identification can use."""
+"""Resample a logged motion on one time grid, and select stretches that an identification can use."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""Check a model against a log not used to estimate it: fly the log again in JSBSim, five seconds at a time.
+"""Check a model by flying an unused log again in JSBSim, five seconds at a time.
 
 Each window begins in the logged state and uses the logged controls; the motion of the air follows from logged airspeed,
 accelerometers and velocity.  The simulated motion is compared with the logged one.

@@ -1,4 +1,4 @@
-"""Quantities of an identified aircraft that its logs leave uncertain, and flights that would narrow them down."""
+"""Uncertain quantities of an identified aircraft, and flights that would narrow them down."""
 
 from dataclasses import dataclass
 

@@ -24,7 +24,7 @@ Columns = NDArray[Any]
 
 
 def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
-    """Return columns (t,) by name: the fields of `/state` messages, with latitude and longitude after the time.
+    """Return columns (t,) by name: fields of `/state` messages, with latitude and longitude after time.
 
     Each name ends with its unit; courses and the axes east and north belong to the map about the scenario's origin.
 
@@ -122,7 +122,7 @@ _DENSITY_EXPONENT = 4.2559
 
 
 class _Topic(NamedTuple):
-    """A topic: fields after the timestamp with numpy type and shape, and a value for each valid row of the log."""
+    """A topic: fields after the timestamp (numpy type, shape), and values for the valid rows of the log."""
 
     name: str
     period: float
@@ -316,7 +316,7 @@ def _battery(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
 
 
 def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
-    """Return the topic navigator_mission_item: each item when it becomes active, beginning with the item at the start.
+    """Return the topic navigator_mission_item: each item when it becomes active, from the start on.
 
     Items without a position get the time of the next item with one, and the position 0, 0: a gap in the numbers would
     read as lost items.
@@ -360,7 +360,7 @@ def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
 
 
 def attitude_quaternion(attitude: Any) -> Floats:
-    """Return the quaternion (n, 4) w, x, y, z of the rotation from forward, right, down to north, east, down.
+    """Return the rotation from forward, right, down to north, east, down as quaternion (n, 4) w, x, y, z.
 
     attitude: (n, 3) roll, pitch, yaw in rad.
 

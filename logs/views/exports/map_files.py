@@ -68,7 +68,7 @@ def plan_line(setup: FlightSetup) -> MapLine:
 
 
 def track_line(setup: FlightSetup, track: Track) -> MapLine:
-    """Return the flown track, thinned to a point each `EVERY` seconds and the last, without rows lacking a position.
+    """Return the flown track, thinned to a known position each `EVERY` seconds and the last.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -125,7 +125,7 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
 
 
 def return_lines(setup: FlightSetup, drawn: DrawnReturns) -> list[MapLine]:
-    """Return the path by outcome of returns, the worst returns, and the path by destinations within glide reach."""
+    """Return the path by outcome of returns, the worst returns, and the path by glide destination."""
     limit, lines = drawn.returns.limit, []
     for kind, ones in drawn.by_kind:
         name = f"{ones[0].time:.0f} to {ones[-1].time:.0f} s: {way_text(kind)}"
@@ -147,7 +147,7 @@ def _line(setup: FlightSetup, name: str, places: ArrayLike, folder: str, role: s
 
 
 def glide_shapes(setup: FlightSetup, drawn: DrawnReturns) -> list[MapZone]:
-    """Return the glide footprint: least heights above ground with a chosen place in reach, and flat ground."""
+    """Return the glide footprint: least heights above ground to reach a chosen place, and flat ground."""
     footprint = drawn.glides.footprint
     if footprint is None:
         return []
@@ -170,7 +170,7 @@ def _geographic(setup: FlightSetup, ring: Floats) -> Floats:
 
 
 def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) -> str:
-    """Return a KML document with a folder for each line, absolute altitudes, and a placemark a named point and zone.
+    """Return a KML document with a folder for each line, and a placemark for each named point and zone.
 
     A zone is an outline on the ground, or a body up to its ceiling.
 

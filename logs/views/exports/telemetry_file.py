@@ -45,7 +45,7 @@ _STATION = (255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
 
 
 def telemetry_bytes(log: FlightLog) -> bytes:
-    """Return the bytes of the `.tlog`: the mission upload, then telemetry, waypoints reached, and events as texts.
+    """Return the bytes of the `.tlog`: mission upload, telemetry, waypoints reached, and events as texts.
 
     >>> from logs.recording.example_log import example_log
     >>> data = telemetry_bytes(example_log())

@@ -1,4 +1,4 @@
-"""Timeline of a recorded flight, from its log alone: legs, turns, clearances, threats and events in order of time.
+"""Timeline of a recorded flight: legs, turns, clearances, threats and events in order of time.
 
 Everything is recomputed from the track, the route, the terrain and the threats in the log; a recorded leg, clearance or
 verdict is not read.  Nothing is printed here.

@@ -1,4 +1,4 @@
-"""Write the page of an identification: fits of the equations, values of the parameters, and uncertain quantities."""
+"""Write the page of an identification: fits of equations, parameters, and uncertain quantities."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -97,7 +97,7 @@ def parameter_rows(estimate: Estimate) -> list[ParameterRow]:
 
 
 def shift_rows(estimate: Estimate, count: int = 3) -> list[tuple[str, str]]:
-    """Return the fixed quantities, and the parameters that change most with one standard deviation of each."""
+    """Return the fixed quantities, and parameters that change most with one standard deviation of each."""
     rows = []
     sds = np.array([parameter.sd for parameter in PARAMETERS])
     for name, shift in estimate.shifts.items():

@@ -1,4 +1,4 @@
-"""Format numbers and findings for readers: sensible digits, units, real minus signs, failing rows first."""
+"""Format numbers and findings: sensible digits, units, real minus signs, failing rows first."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -111,7 +111,7 @@ class FindingRow:
 
 @dataclass(frozen=True, slots=True)
 class RuleRow:
-    """One rule over the whole flight: numbers of findings by state, and the judged finding closest to its limit."""
+    """One rule over the whole flight: numbers of findings by state, and the one closest to its limit."""
 
     state: str
     sign: str
