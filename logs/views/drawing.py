@@ -122,7 +122,9 @@ def png_bytes(figure: Figure) -> bytes:
 
 
 def few_colours(png: bytes) -> bytes:
-    """Return a PNG with at most 256 colours: a fifth of the size, and no visible change on paper.
+    """Return a PNG with at most 256 colours.
+
+    Shaded ground then takes a fifth of its size, without a visible change on paper.
 
     >>> few_colours(png_bytes(new_figure(1.0)))[1:4]
     b'PNG'

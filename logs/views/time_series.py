@@ -121,7 +121,7 @@ def energy_chart(setup: FlightSetup, track: Track) -> Chart:
 
 # Exposure along the flown track.
 
-# Largest number of straight segments that approximate the track for the curve and its sums.
+# Largest number of straight segments that replace the track for the curve; the sums are those over these segments.
 _MAX_SEGMENTS = 12_000
 
 
