@@ -1,7 +1,7 @@
-"""One flight of a log: rows at the times of its places, and everything else the log holds brought to those times.
+"""Choose one flight of a log, and resample all its data at the times of its positions.
 
-A log may hold several flights, each flown along several missions: `make_flight` chooses one.  From it come the heights
-of a plan that states none, the mean wind, and the track that is judged.
+A log may hold several flights, each flown along several missions: `make_flight` chooses one.  The chosen flight gives
+the altitudes for a plan that states none, the mean wind, and the track that is judged.
 """
 
 import math
@@ -24,11 +24,11 @@ from world.frames import GeoOrigin, to_map
 
 # Median ground speed above which the aircraft flies, m/s.
 FLYING = 6.0
-# Longest time for which an aircraft in flight may be slower, against the wind, s.
+# Longest time for which an aircraft in flight may be slower, in a headwind, s.
 MAX_SLOW_TIME_S = 60.0
 # Window of the median ground speed, s.
 _MEDIAN_WINDOW_S = 5.0
-# A flight within this time of the first or last row of the log is cut off by the log, s.
+# The log cuts off a flight that begins or ends within this time of its first or last row, s.
 IN_THE_AIR = _MEDIAN_WINDOW_S
 # Least duration of a flight, s.
 SHORTEST = 20.0
@@ -36,9 +36,9 @@ SHORTEST = 20.0
 
 @dataclass(frozen=True, slots=True)
 class FlightPart:
-    """One flight with one mission.
+    """A flight along one mission.
 
-    start, end: of the flight, s.
+    start, end: times of the flight, s.
     mission: number of the mission in the log, -1 for none.
     stretches: parts flown along the mission.
     """
@@ -55,7 +55,7 @@ class FlightPart:
 
 
 def flown_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[float, float]]:
-    """Return starts and ends of flights, s: faster over the ground than a person on the field.
+    """Return starts and ends of flights, s: stretches with a ground speed above `FLYING`.
 
     >>> time = np.arange(0.0, 200.0)
     >>> north = np.cumsum(np.where((time > 50.0) & (time < 150.0), 20.0, 0.1))
@@ -91,9 +91,9 @@ def flight_parts(
     missions: Sequence[LoggedMission],
     last: float,
 ) -> list[FlightPart]:
-    """Return each flight, once for every mission that it was flown with.
+    """Return each flight, once for every mission that it was flown along.
 
-    spans: from `flown_spans`.  last: time of the last row of the log, s.  Without modes, all of a flight is regarded as
+    spans: from `flown_spans`.  last: time of the last row of the log, s.  Without modes, the whole flight is taken as
     flown along the mission.
     """
     parts = []
@@ -109,7 +109,7 @@ def flight_parts(
 
 
 def _stretches(start: float, end: float, modes: Sequence[ModeChange], last: float) -> list[MissionStretch]:
-    # A flight that goes on to the log's last rows is cut off by it.
+    # The log cuts off a flight that continues to its last rows.
     open_end = last - end < IN_THE_AIR
     if not modes:
         return [MissionStretch(start, end, "", "log" if open_end else "landed")]
@@ -128,7 +128,7 @@ def _stretches(start: float, end: float, modes: Sequence[ModeChange], last: floa
 
 
 def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:
-    """Return the mission in force when a stretch began: the last that was logged by then, or the first in it."""
+    """Return the mission active at the start of a stretch, or the first mission within the stretch."""
     before = [k for k, logged in enumerate(missions) if logged.time <= stretch.start + 1.0]
     if before:
         return before[-1]
@@ -137,18 +137,19 @@ def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> i
 
 
 def choose_part(parts: Sequence[FlightPart]) -> int:
-    """Return the index of the flight to judge: the one flown along its mission for longest, or the longest."""
+    """Return the index of the flight that followed its mission for longest, or of the longest flight."""
     return max(range(len(parts)), key=lambda k: (parts[k].along_mission, parts[k].end - parts[k].start))
 
 
-# Time that is shown before and after a flight, s.
+# Time shown before and after a flight, s.
 BESIDE = 10.0
-# Greatest time between rows that a value is interpolated from, s.
+# Longest interval between rows over which values are interpolated, s.
 _MAX_INTERPOLATED_STEP_S = 1.0
-# The same as a multiple of the usual step of the series.
+# The same limit as a multiple of the usual interval of the series.
 _MAX_INTERPOLATED_STEPS = 2.5
-# Time at the start over which altitudes are compared, s.
+# Duration at the start of a flight over which altitudes are compared, s.
 _COMPARED_TIME_S = 5.0
+# Vehicles that are refused, with their words for the message.
 _REFUSED: dict[VehicleKind, str] = {
     "copter": "a copter's",
     "rover": "a rover's",
@@ -157,7 +158,9 @@ _REFUSED: dict[VehicleKind, str] = {
     "tracker": "an antenna tracker's",
     "blimp": "a blimp's",
 }
+# Quantities that a log may lack.
 _OPTIONAL_QUANTITIES: tuple[Quantity, ...] = ("velocity", "attitude", "airspeed", "wind", "battery", "throttle")
+# Largest number of positions that are read.
 _MAX_ROWS = 4_000_000
 
 
@@ -167,14 +170,14 @@ class LoggedFlight:
 
     raw: the log.
     time: (n,) s of the log's clock.  lat, lon: (n,) degrees.  up: (n,) m.
-    columns: by the names of `logs.importers.raw_log.COLUMNS`, (n, k), NaN where the log has nothing near.
-    holds: which of them it holds.
-    stretches: flown along the mission.
-    mission: that it was flown with; None where the log holds none.
+    columns: (n, k) by the names of `logs.importers.raw_log.COLUMNS`, NaN where the log has no row nearby.
+    holds: names of the columns that the log holds.
+    stretches: parts flown along the mission.
+    mission: the mission of the flight; None if the log holds none.
     heights, gaps, faults: see `flight.simulation.setup.ImportedLog`.
-    number, count: which of the log's flights, from 1, and how many there are.
-    others: of the others, when they began and for how long they followed a mission, s.
-    begins, ends: whether the log's first row, and its last, is in the air: what came before and after it does not hold.
+    number, count: number of this flight in the log, from 1, and number of flights.
+    others: start of each other flight, and how long it followed a mission, s.
+    begins, ends: True if the first row of the log, or the last, is in the air: the log lacks the rest of the flight.
     """
 
     raw: RawLog
@@ -198,9 +201,9 @@ class LoggedFlight:
 
 
 def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
-    """Return the flight of a log that was flown along its mission for the longest, or the one of a number, from 1.
+    """Return the flight of a log that followed its mission for longest, or the flight of a given number, from 1.
 
-    Raises LogError for a vehicle that is no aeroplane, a log without a flight, and a number that it does not have.
+    Raises LogError for a vehicle other than an aeroplane, a log without a flight, and a number that is not in the log.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> flight = make_flight(example_raw_log())
@@ -272,7 +275,7 @@ def _cut_out(
 
 
 def _interpolate_at(series: LogSeries | None, name: str, time: Floats, places: Places) -> Floats:
-    """Interpolate a series at the times of the places (n,), NaN without rows nearby."""
+    """Interpolate a series at the times of the positions (n,); NaN without rows nearby."""
     width = len(COLUMNS[name])
     out = np.full((time.size, width), math.nan)
     if series is None:
@@ -294,14 +297,14 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, places: P
     for k in range(width):
         out[:, k] = np.where(within | exact, np.interp(time, own, values[:, k]), math.nan)
     if name == "attitude":
-        # Back into -pi..pi, the yaw into 0..2 pi.
+        # Wrap roll and pitch into -pi..pi, and yaw into 0..2 pi.
         out[:, :2] = np.remainder(out[:, :2] + math.pi, 2.0 * math.pi) - math.pi
         out[:, 2] = np.remainder(out[:, 2], 2.0 * math.pi)
     return out
 
 
 def _heights(raw: RawLog, places: Places, start: float) -> Heights:
-    """Return the chosen altitude, and the offsets of the others in the first seconds of the judged flight."""
+    """Return the chosen altitude source, and offsets of the others in the first seconds of the flight."""
     offsets = []
     for other in raw.heights:
         time = places.on_clock(other.series.time)
@@ -314,11 +317,11 @@ def _heights(raw: RawLog, places: Places, start: float) -> Heights:
 
 
 # ----------------------------------------------------------------------
-# Heights for a plan that states none: those at which the flight passed.
+# Altitudes for a plan that states none: the altitudes at which the flight passed its items.
 
 
 def with_flown_heights(mission: Mission, lat: Floats, lon: Floats, up: Floats) -> Mission:
-    """Return a mission whose items have the height (m) of the row (n,) nearest to each.
+    """Return a mission whose items have the altitude (m) of the nearest row of a flight (n,).
 
     >>> from flight.mission.items import MissionItem
     >>> task = Mission(None, tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 0.0) for k in (0, 1)))
@@ -341,15 +344,15 @@ def with_flown_heights(mission: Mission, lat: Floats, lon: Floats, up: Floats) -
 
 
 # ----------------------------------------------------------------------
-# The wind of a flight, as its autopilot estimated it.
+# The wind of a flight, as estimated by its autopilot.
 
-# m/s.  The most that a scenario's wind may have.
-_MAX_WIND = 30.0
+# Largest wind speed that a scenario allows, m/s.
+_MAX_WIND_MPS = 30.0
 
 
 @dataclass(frozen=True, slots=True)
 class MeanWind:
-    """Mean wind: m/s, rad clockwise from north where it comes from, and its message."""
+    """Mean wind: speed (m/s), direction it blows from (rad clockwise from north), and its log message."""
 
     speed: float
     from_course: float
@@ -357,9 +360,11 @@ class MeanWind:
 
 
 def mean_wind(flight: LoggedFlight) -> MeanWind | None:
-    """Return the mean over the stretches that followed the mission, or over the flight; None where the log holds none.
+    """Return the mean wind over the stretches along the mission, or over the flight.
 
-    The estimate's first part is left out: it begins at nothing, and finds the wind in the first turns.
+    Return None if the log holds no wind.
+
+    The first part of the estimate is left out: it starts from zero, and converges in the first turns.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight
@@ -374,11 +379,10 @@ def mean_wind(flight: LoggedFlight) -> MeanWind | None:
     if not chosen.size:
         return None
     east, north = wind[chosen[len(chosen) // 5 :]].mean(axis=0).tolist()
-    speed = min(_MAX_WIND, math.hypot(east, north))
+    speed = min(_MAX_WIND_MPS, math.hypot(east, north))
     return MeanWind(speed, math.atan2(-east, -north) % (2.0 * math.pi), flight.raw.series["wind"].source)
 
 
-# ----------------------------------------------------------------------
 # ----------------------------------------------------------------------
 # Rows of an imported flight as a track; quantities that are not logged are NaN.
 
@@ -386,8 +390,8 @@ def mean_wind(flight: LoggedFlight) -> MeanWind | None:
 def track_of_flight(flight: LoggedFlight, origin: GeoOrigin) -> Track:
     """Return a track on the map about ``origin``.
 
-    Velocities that the log does not hold are the differences of its places.  A log without heights has 0 there, which
-    no rule reads.
+    Velocities missing in the log are computed from positions.  A log without altitudes gets altitude 0, which no rule
+    reads.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight

@@ -1,1 +1,1 @@
-"""Flights as MCAP files: written, read, recovered."""
+"""Write, read and recover flights as MCAP files."""

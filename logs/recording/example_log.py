@@ -1,4 +1,4 @@
-"""A flight made by formula, to try readers, figures and reports on without a simulator or a file."""
+"""Generate a flight by formula, to test readers, figures and reports without a simulator or a file."""
 
 from pathlib import Path
 
@@ -16,10 +16,11 @@ from world.arrays import Floats
 from world.frames import to_geo
 from world.scenario import Scenario, from_spec
 
-# Two legs and a turn of 14 degrees between them, east, north, up in m.
+# Waypoints of two legs with a turn of 14 degrees between them; east, north, up in m.
 _WAYPOINTS = np.array([[-500.0, 0.0, 200.0], [0.0, 0.0, 200.0], [400.0, 100.0, 220.0]])
-# m/s
+# Airspeed, m/s.
 _AIRSPEED = 25.0
+# Rate of the rows, Hz.
 _RATE_HZ = 10.0
 _SCENARIO = {
     "name": "example",
@@ -34,7 +35,8 @@ _SCENARIO = {
 def example_log() -> FlightLog:
     """Make a log of two legs over level ground in calm air, flown exactly along them at 25 m/s.
 
-    Rows come 10 times a second; one missile reaches the path.  The envelope is a simple one, not a model's.
+    The log has 10 rows a second; the range of one missile covers part of the path.  The envelope is simplified, not
+    computed from a model.
 
     >>> log = example_log()
     >>> log.setup.route.legs, len(log.track), log.end_time
@@ -77,7 +79,9 @@ def example_log() -> FlightLog:
 
 
 def write_example_log(path: Path) -> Path:
-    """Record the flight of `example_log` as a file, replaced if it is there, and return its path.  Raises OSError.
+    """Record the flight of `example_log` in a file, replacing an existing one; return its path.
+
+    Raises OSError.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -118,7 +122,7 @@ def _envelope() -> Envelope:
 
 
 def _track() -> Track:
-    """Along the waypoints at constant speed, pointing along the leg, wings level."""
+    """Return a track along the waypoints at constant speed, heading along the leg, with wings level."""
     steps = np.diff(_WAYPOINTS, axis=0)
     lengths = np.sqrt((steps**2).sum(axis=1))
     reached = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -143,4 +147,4 @@ def _track() -> Track:
         "speed_command": np.full(len(time), _AIRSPEED),
         "leg": leg,
     }
-    return Track(**values)  # type: ignore[arg-type]  # the track gives each column its type
+    return Track(**values)  # type: ignore[arg-type]  # Track converts each column to its type

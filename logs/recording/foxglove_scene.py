@@ -1,6 +1,6 @@
-"""Foxglove messages for a 3-D viewer: the terrain, the threats, zones, the plan, the track and the aircraft.
+"""Build Foxglove messages for a 3-D viewer: terrain, threats, zones, plan, track and aircraft.
 
-Frame `map` is the scenario's east, north and up (AMSL) in metres; `aircraft` is forward, left, up.
+The frame `map` has the scenario's axes east, north and up (AMSL) in metres; `aircraft` has forward, left, up.
 """
 
 import json
@@ -36,10 +36,14 @@ from world.scenario import Scenario
 from world.terrain import Terrain
 from world.threats import Threats
 
+# Name of the frame of the map.
 MAP = "map"
+# Name of the frame of the aircraft.
 AIRCRAFT = "aircraft"
+# Foxglove log level by name.
 LEVELS = {"debug": Log.DEBUG, "info": Log.INFO, "warning": Log.WARNING, "error": Log.ERROR, "fatal": Log.FATAL}
-MAX_VERTICES = 80  # a side of the terrain mesh
+# Largest number of vertices along a side of the terrain mesh.
+MAX_VERTICES = 80
 
 
 _XYZ = "xyz"
@@ -51,35 +55,39 @@ _LINE_POINTS = LinePrimitive.POINTS_FIELD_NUMBER
 _MESH_POINTS = TriangleListPrimitive.POINTS_FIELD_NUMBER
 _MESH_COLOURS = TriangleListPrimitive.COLORS_FIELD_NUMBER
 
+# Colour of the lowest ground.
 _LOW = np.array(theme.rgb(theme.GROUND[0]))
+# Colour of the highest ground.
 _HIGH = np.array(theme.rgb(theme.GROUND[-2]))
-# Scenes stand on black: the theme's colours for dark ground.
+# Scenes have a black background: use the theme's colours for dark ground.
 _KILL = theme.rgba("missile", 0.35, dark=True)
 _DETECTION = theme.rgba("radar", 0.15, dark=True)
 _PLAN = theme.rgba("planned", dark=True)
 _TRACK = theme.rgba("flown", dark=True)
 _KEEP_OUT = theme.rgba("zone", dark=True)
 _STAY_IN = theme.rgba("highlight", dark=True)
-# A name stands so far above the ground within this of its place, m.
-_LIFT = 40.0
+# Height of a name above the ground around it, m.
+_LABEL_HEIGHT_M = 40.0
+# Half the side of the square of ground that a name stays above, m.
 _NEAR = 300.0
-# The way's colour lies so far below the flight, an outline on the ground so far above it, m.
-_BELOW = 6.0
-_OVER_GROUND = 4.0
-# Upright lines of one outline of a zone, about.
+# Distance of the coloured path below the flight, m.
+_PATH_OFFSET_M = 6.0
+# Height of an outline above the ground, m.
+_OUTLINE_HEIGHT_M = 4.0
+# Approximate number of vertical lines of one outline of a zone.
 MAX_POSTS = 24
 
 
 def timestamp(time_ns: int) -> Timestamp:
-    """Return a log_time as protobuf's timestamp."""
+    """Convert a log_time to a protobuf timestamp."""
     return Timestamp(seconds=time_ns // 1_000_000_000, nanos=time_ns % 1_000_000_000)
 
 
 def body_rotation(attitude: ArrayLike) -> Floats:
-    """(..., 4) x, y, z, w of the rotation from forward-left-up to east-north-up.
+    """Return the quaternion (..., 4) x, y, z, w of the rotation from forward-left-up to east-north-up.
 
-    attitude: (..., 3) roll, pitch, yaw in rad, yaw clockwise from north.  Turning the axes from north-east-down makes
-    the angles roll, -pitch and pi/2 - yaw about forward, left and up.
+    attitude: (..., 3) roll, pitch, yaw in rad, yaw clockwise from north.  After the change of axes from north-east-down
+    the angles are roll, -pitch and pi/2 - yaw about forward, left and up.
     """
     roll, pitch, yaw = np.moveaxis(np.asarray(attitude, dtype=np.float64), -1, 0)
     half = (0.5 * roll, -0.5 * pitch, 0.5 * (0.5 * math.pi - yaw))
@@ -96,7 +104,7 @@ def body_rotation(attitude: ArrayLike) -> Floats:
 
 
 def log_message(time_ns: int, text: str, level: str, name: str = "planfly") -> Log:
-    """Return one event; level: a key of `LEVELS`.  name: who says it."""
+    """Return one event as a message; level: a key of `LEVELS`.  name: source of the message."""
     return Log(timestamp=timestamp(time_ns), level=LEVELS[level], message=text, name=name)
 
 
@@ -108,7 +116,7 @@ def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
 
 
 def _ground(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """(n, m, 3) corners of the mesh, (n, m, 3) their colours, and (n, m) which are known; none of them may be."""
+    """Return corners (n, m, 3) of the mesh, colours (n, m, 3), and flags (n, m) of known corners."""
 
     def axis(low: float, high: float) -> Floats:
         return np.linspace(low, high, int(np.clip((high - low) / terrain.spacing, 2, MAX_VERTICES)))
@@ -124,7 +132,7 @@ def _ground(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDArray[n
 
 
 def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
-    """(n, 3) known corners of the ground's mesh, m, and (n, 3) their colours, 0..1."""
+    """Return the known corners of the terrain mesh (n, 3), m, and their colours (n, 3), 0..1."""
     if scenario.terrain is None:
         return np.zeros((0, 3)), np.zeros((0, 3))
     points, colours, known = _ground(scenario.terrain, scenario.bounds)
@@ -132,7 +140,7 @@ def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
 
 
 def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
-    """Return the entity's field of triangles; empty where no ground is known."""
+    """Return the triangles field of the entity; empty if no ground is known."""
     ground, colours, known = _ground(terrain, bounds)
     if not known.any():
         return b""
@@ -144,7 +152,7 @@ def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
     mesh = TriangleListPrimitive(pose=_pose((0.0, 0.0, 0.0)), color=_colour(theme.rgba("terrain")))
     mesh.indices.extend(corners[whole].ravel().tolist())
     points = ground.reshape(-1, 3)
-    # Rounded to 2^-4 m and 2^-7 of a colour: it is drawn, not measured, and takes a quarter of the bytes.
+    # Round to 2^-4 m and 2^-7 of a colour: the mesh is for display only, and takes a quarter of the bytes.
     rgba = np.hstack([np.round(colours.reshape(-1, 3) * 128.0) / 128.0, np.ones((len(points), 1))])
     body = mesh.SerializeToString(deterministic=True)
     body += repeated_submessages(_MESH_POINTS, _XYZ, np.round(points * 16.0) / 16.0)
@@ -153,7 +161,7 @@ def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
 
 
 def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> bytes:
-    """Return spheres of missiles and radars, and their names above the ground about them."""
+    """Draw the spheres of missiles and radars, and their names above the ground around them."""
     entity = _entity(time_ns, "threats")
     for k, name in enumerate(threats.names):
         centre = threats.position[k]
@@ -166,14 +174,14 @@ def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> by
 
 
 def _above_ground(place: Floats, terrain: Terrain | None) -> Floats:
-    """A place for a name: at least `_LIFT` above the highest ground within `_NEAR`, where the ground is known."""
+    """Return a position for a name, at least `_LABEL_HEIGHT_M` above the highest known ground within `_NEAR`."""
     east, north, up = (float(value) for value in place)
     top = up
     if terrain is not None:
         steps = np.linspace(-_NEAR, _NEAR, 9)
         near = terrain.height(*np.meshgrid(east + steps, north + steps))
         top = float(np.max(near, where=np.isfinite(near), initial=up))
-    return np.array([east, north, top + _LIFT])
+    return np.array([east, north, top + _LABEL_HEIGHT_M])
 
 
 def _name(place: Floats, name: str) -> TextPrimitive:
@@ -183,7 +191,7 @@ def _name(place: Floats, name: str) -> TextPrimitive:
 
 
 def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
-    """Draw the legs between waypoints (w, 3) as a line, the waypoints as dots with their numbers and mission items."""
+    """Draw legs between waypoints (w, 3) as a line, and waypoints as dots with numbers and mission items."""
     entity = _entity(time_ns, "plan")
     legs = _line(_PLAN)
     legs.points.extend(_points(waypoints))
@@ -192,7 +200,7 @@ def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
         entity.spheres.add(pose=_pose(point), size=Vector3(x=40.0, y=40.0, z=40.0), color=_colour(_PLAN))
     for number, (point, item) in enumerate(zip(waypoints, items, strict=True)):
         text = f"{number} (item {item})" if item >= 0 else str(number)
-        entity.texts.append(_name(point + np.array([0.0, 0.0, _LIFT]), text))
+        entity.texts.append(_name(point + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), text))
     return _update(entity)
 
 
@@ -222,7 +230,7 @@ def _pose(position: ArrayLike) -> Pose:
 
 
 def _line(colour: tuple[float, float, float, float]) -> LinePrimitive:
-    """Return a line without points yet."""
+    """Return a line without points."""
     return LinePrimitive(
         type=LinePrimitive.LINE_STRIP,
         pose=_pose((0.0, 0.0, 0.0)),
@@ -240,7 +248,7 @@ def _points(points: Floats) -> Iterable[Point3]:
 
 
 def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
-    """Edges of zones as lines, from ground or floor to the ceiling, or to above the path; and their names."""
+    """Draw names and edges of zones, from ground or floor to the ceiling or to above the path."""
     entity = _entity(time_ns, "zones")
     low, top = float(waypoints[:, 2].min()), float(waypoints[:, 2].max()) + 50.0
     for zone in scenario.zones:
@@ -256,17 +264,17 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
 
 
 def returns_scene(time_ns: int, drawn: DrawnReturns, terrain: Terrain | None) -> bytes:
-    """The way coloured by what comes of returns, the ways of the worst with their numbers, and the glide's footprint.
+    """Draw the path coloured by outcome of returns, the worst returns, and the glide's footprint.
 
-    The colour of the way lies below it, so that the plan and the track stay visible.
+    The coloured line lies below the path, so that plan and track stay visible.
     """
     entity = _entity(time_ns, "returns")
     for kind, ones in drawn.by_kind:
-        points = np.array([one.start for one in ones]) - np.array([0.0, 0.0, _BELOW])
+        points = np.array([one.start for one in ones]) - np.array([0.0, 0.0, _PATH_OFFSET_M])
         _add_line(entity, f"return-{kind}", points, 6.0)
     for number, worst in enumerate(drawn.worst, 1):
         _add_line(entity, "return-way", worst.way)
-        entity.texts.append(_name(worst.at + np.array([0.0, 0.0, _LIFT]), f"return {number}"))
+        entity.texts.append(_name(worst.at + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), f"return {number}"))
     footprint = drawn.glides.footprint
     if footprint is not None and terrain is not None:
         for band in footprint.bands():
@@ -276,12 +284,12 @@ def returns_scene(time_ns: int, drawn: DrawnReturns, terrain: Terrain | None) ->
 
 
 def _add_parts(entity: SceneEntity, role: str, parts: Sequence[Part], terrain: Terrain) -> None:
-    """Outlines on the ground."""
+    """Add outlines on the ground."""
     for part in parts:
         for ring in part:
             up = terrain.height(ring[:, 0], ring[:, 1])
             known = np.isfinite(up)
-            _add_line(entity, role, np.column_stack([ring, up + _OVER_GROUND])[known])
+            _add_line(entity, role, np.column_stack([ring, up + _OUTLINE_HEIGHT_M])[known])
 
 
 def _add_line(entity: SceneEntity, role: str, points: Floats, thickness: float = 3.0) -> None:
@@ -292,15 +300,15 @@ def _add_line(entity: SceneEntity, role: str, points: Floats, thickness: float =
 
 
 # ----------------------------------------------------------------------
-# A small aircraft of our own for 3-D viewers: triangles as binary glTF 2.0, its left wing red, its right one green.
+# A small aircraft model for 3-D viewers: triangles as binary glTF 2.0, with a red left wing and a green right wing.
 #
-# trimesh would save 15 lines of glTF, rounds colours to 8 bits, makes three nodes of it, and takes 0.5 s to import.
+# trimesh would save 15 lines of glTF, but it rounds colours to 8 bits, makes three nodes, and takes 0.5 s to import.
 
-# m, whatever the aircraft: at its true size it could not be seen among hills.
+# Wing span of the model, m, for every aircraft: at its true size it would be invisible among hills.
 SPAN = 100.0
 MEDIA_TYPE = "model/gltf-binary"
 
-# Forward, left, up in spans.
+# Points of the model: forward, left, up in spans.
 _NOSE = (0.45, 0.0, 0.0)
 _TAIL = (-0.46, 0.0, 0.03)
 _RING = ((0.12, 0.05, 0.0), (0.12, 0.0, 0.06), (0.12, -0.05, 0.0), (0.12, 0.0, -0.05))
@@ -318,25 +326,28 @@ _PARTS = tuple(
     (triangles, (*theme.rgb(text), 1.0))
     for triangles, text in zip((_BODY, _LEFT, _RIGHT), theme.AIRCRAFT_PARTS, strict=True)
 )
-# Chunk types of a .glb, and glTF's numbers for float32 and for what a buffer's view is used for.
+# Type of the JSON chunk of a .glb.
 _JSON = b"JSON"
+# Type of the binary chunk of a .glb.
 _BIN = b"BIN\0"
+# glTF's number for float32.
 _FLOAT = 5126
+# glTF's number for a buffer view of vertices.
 _VERTICES = 34962
 
 
 def model_corners() -> Singles:
-    """(t, 3, 3) corners of the triangles, m forward, left and up of the aircraft, `SPAN` wide."""
+    """Return the corners of the triangles (t, 3, 3), m forward, left and up; the model is `SPAN` wide."""
     return np.array([triangle for triangles, _ in _PARTS for triangle in triangles], dtype=np.float32) * SPAN
 
 
 def model_colours() -> Singles:
-    """(t, 4) colours of the triangles: red, green, blue, opacity, 0 to 1."""
+    """Return the colours of the triangles (t, 4): red, green, blue, opacity, 0 to 1."""
     return np.array([colour for triangles, colour in _PARTS for _ in triangles], dtype=np.float32)
 
 
 def aircraft_glb() -> bytes:
-    """The model as a `.glb` file: one unit wide, in glTF's axes (right-handed, y up), each part with its colour."""
+    """Return the model as a coloured `.glb` file, one unit wide, in glTF's axes (right-handed, y up)."""
     pieces = b""
     views: list[dict[str, Any]] = []
     accessors, primitives, materials = [], [], []
@@ -378,7 +389,7 @@ def aircraft_glb() -> bytes:
 
 
 def aircraft_scene(time_ns: int) -> bytes:
-    """Return the model in the aircraft's own frame, so that its transforms move it: a SceneUpdate."""
+    """Return the model as a SceneUpdate in the frame of the aircraft, so that the transforms move it."""
     model = ModelPrimitive(
         pose=Pose(position=Vector3(), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)),
         scale=Vector3(x=SPAN, y=SPAN, z=SPAN),
@@ -393,7 +404,7 @@ def aircraft_scene(time_ns: int) -> bytes:
 
 
 # ----------------------------------------------------------------------
-# The layout for Foxglove that shows a flight log whole: 3-D, map, plots, events and the state.
+# The Foxglove layout for all parts of a flight log: 3-D, map, plots, events and the state.
 
 
 def layout_text() -> str:

@@ -254,7 +254,7 @@ def threats_cloud(time_ns: int, threats: Threats) -> bytes:
 
 
 def along(waypoints: Floats) -> Floats:
-    """Return points at even distances on the straight legs between waypoints (w, 3), including the waypoints."""
+    """Return points at even distances on the legs between waypoints (w, 3), including the waypoints."""
     lengths = np.sqrt((np.diff(waypoints, axis=0) ** 2).sum(axis=1))
     step = max(_POINT_SPACING_M, float(lengths.sum()) / _MAX_SAMPLES)
     legs = [
@@ -265,21 +265,23 @@ def along(waypoints: Floats) -> Floats:
 
 
 # ----------------------------------------------------------------------
-# The moving part of views: the pose five times a second, a fix each second, and the track.
+# The moving parts of views: the pose five times a second, a fix each second, and the track.
 
 TF_TOPIC = "/tf"
 FIX_TOPIC = "/fix"
 TRACK_TOPIC = "/scene/track"
 TRACK_POINTS = "/points/track"
 
-_SLOT_NS = 200_000_000  # one transform in each, 5 Hz; one fix a second
+# Interval of transforms, ns (5 Hz); the interval of fixes is one second.
+_SLOT_NS = 200_000_000
 _XYZ = "xyz"
 _XYZW = "xyzw"
 _GEO = ("latitude", "longitude", "altitude")
-# The points of the track: least time between messages, s, and ratio of their times, which limits their number.
+# Least time between messages with the points of the track, s.
 _MIN_CLOUD_INTERVAL_S = 10.0
+# Ratio of successive times of these messages, which limits their number.
 _CLOUD_RATIO = 1.05
-# The messages behind their timestamps, in protobuf's encoding.
+# Constant parts of the messages after their timestamps, in protobuf's encoding.
 _TRANSFORM_NAMES = FrameTransform(parent_frame_id=scene.MAP, child_frame_id=scene.AIRCRAFT).SerializeToString(
     deterministic=True
 )
@@ -297,8 +299,8 @@ _FIX = np.dtype([("names", np.uint8, (len(_FIX_NAMES),)), *tagged_doubles(_GEO)]
 def transform_messages(channel: int, log_times: Ints, position: Floats, attitude: Floats) -> MessageRecords:
     """Encode position and attitude of the aircraft: a FrameTransform for each of n rows.
 
-    position, attitude: (n, 3).  Rounded to 2^-10 m and 2^-20 of the quaternion, which is invisible and halves their
-    size in the log; the message of the state is exact.
+    position, attitude: (n, 3).  Values are rounded to 2^-10 m and 2^-20 of the quaternion, which is invisible and
+    halves their size in the log; the state message is exact.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         translation = np.round(position * 1024.0) / 1024.0

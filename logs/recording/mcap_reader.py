@@ -1,12 +1,12 @@
-"""MCAP container, read front to back without trusting it.
+"""Read an MCAP container front to back without trusting it.
 
 mcap 1.6's `StreamReader` would save 150 lines, but it reports a damaged attachment only at the end of the file, its
-seeking reader not at all, and lz4 chunks decompress to any size.  Therefore the framing is read here; records are then
-parsed by mcap's classes, from bytes that are already bounded and CRC-checked.  Reading stops at the first damage: the
+seeking reader not at all, and lz4 chunks decompress to any size.  Therefore this module reads the framing; the classes
+of mcap then parse records, from bytes that are already bounded and CRC-checked.  Reading stops at the first damage: the
 returned data are complete, in order and without a hole.
 
 Any container that the format allows is read: with chunks or without, compressed by zstd, lz4 or not, with or without
-an index, statistics, a summary and CRCs, with records of other kinds, and with more bytes in a record than it needs.  A
+an index, statistics, a summary and CRCs, with unknown kinds of records, and with surplus bytes in a record.  A
 CRC of 0 means that its writer left it out (mcap.dev, "MCAP Format Specification").  Messages outside chunks, which have
 no CRC of their own, are accepted only if the end of the data section confirms that it is complete.
 """
@@ -25,7 +25,9 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Chunk, DataEnd, Footer
 
+# Magic at start and end of an MCAP file.
 MAGIC = b"\x89MCAP0\r\n"
+# Largest size of a record or an uncompressed chunk that is read, bytes.
 RECORD_LIMIT = 64 * 2**20
 # Least size of the pieces in which records outside chunks are returned, bytes.
 _PIECE_BYTES = 2**18
@@ -33,20 +35,21 @@ _PIECE_BYTES = 2**18
 _OUTSIDE_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 # Greatest ratio of the size of all chunks to the bytes read; valid logs stay under 20.
 _MAX_GROWTH_RATIO = 256
+# Frame of a record: opcode and length.
 FRAME = struct.Struct("<BQ")
 # Errors of mcap's record classes for invalid bytes.
 PARSE_ERRORS = (McapError, struct.error, ValueError, OverflowError, MemoryError)
 
 
 class _Damage(Exception):
-    """The file is damaged; the message says where and how."""
+    """Error for a damaged file; the message states position and kind of the damage."""
 
 
 @dataclass(slots=True)
 class Container:
     """Content of a file up to its end, or up to its first damage.
 
-    attachments: by name.  media: the type and log_time (ns) of each.  problem: empty if the file is whole.
+    attachments: bytes by name.  media: type and log_time (ns) of each.  problem: empty if the file is whole.
     """
 
     attachments: dict[str, bytes] = field(default_factory=dict)
@@ -57,7 +60,7 @@ class Container:
 def read_chunks(file: BinaryIO, found: Container) -> Iterator[bytes]:
     """Yield the records inside each whole chunk, and the others, as bytes, and fill ``found`` meanwhile.
 
-    file: positioned behind the magic at the start.  Damage raises no error; `Container.problem` describes it.
+    file: positioned after the magic at the start.  Damage raises no error; `Container.problem` describes it.
     """
     try:
         yield from _read(file, found)
@@ -195,7 +198,7 @@ def _attachment(content: bytes, at: int, found: Container) -> None:
         attachment = Attachment.read(record_stream(content))
     except PARSE_ERRORS as error:
         raise _Damage(f"the attachment at byte {at:,} cannot be read") from error
-    # Two times, three lengths, and their contents; the CRC follows, and perhaps unused bytes.
+    # Two times, three lengths with their contents; then the CRC, and perhaps unused bytes.
     lengths = (len(attachment.name.encode()), len(attachment.media_type.encode()), len(attachment.data))
     end = 32 + sum(lengths)
     if int.from_bytes(content[end : end + 4], "little") not in (0, zlib.crc32(content[:end])):
@@ -211,7 +214,7 @@ def _data_end(content: bytes, at: int, crc: int) -> None:
         stated = DataEnd.read(record_stream(content)).data_section_crc
     except PARSE_ERRORS as error:
         raise _Damage(f"the end record at byte {at:,} cannot be read") from error
-    # A writer may leave the CRC out, as 0; chunks and attachments have their own.
+    # A writer may leave the CRC out and write 0; chunks and attachments have their own CRC.
     if stated not in (0, crc):
         raise _Damage("the data section is damaged (its CRC differs)")
 

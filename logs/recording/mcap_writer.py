@@ -1,9 +1,9 @@
-"""The MCAP container, written front to back in chunks that come ready made.
+"""Write an MCAP container front to back, from prepared chunks.
 
-mcap's own `Writer` takes one message at a time, at 5 us each or two to three times the time of this one, and its
-`Chunk` and `ChunkIndex` copy their fields through a record builder for as long as the compression takes; here a chunk's
-records and the index of its messages come as bytes.  Records that are written once are mcap's own classes.  Every CRC
-that the format has is written.
+The `Writer` of mcap takes one message at a time, at 5 us each, two to three times the time of this writer; its `Chunk`
+and `ChunkIndex` copy their fields through a record builder for as long as the compression takes.  Here the records of a
+chunk and the index of its messages are passed as bytes.  Records that are written once use the classes of mcap.  Every
+CRC of the format is written.
 """
 
 import struct
@@ -40,18 +40,22 @@ Chunks = NDArray[np.void]  # of CHUNK
 ChannelIndexes = NDArray[np.void]  # of CHANNEL_INDEX
 
 _MESSAGE = struct.Struct("<HIQ")
-# Before a chunk's compression: its times, size and CRC.
+# Head of a chunk: times, size and CRC before compression.
 _CHUNK = struct.Struct("<QQQI")
-# Times, offset and length of a chunk, and the length of its table of message indexes; a line of that; its sizes.
+# Head of a chunk index: times, offset and length of the chunk, and length of its table of message indexes.
 _CHUNK_INDEX = struct.Struct("<QQQQI")
+# Entry of that table: channel and offset.
 _OFFSET = struct.Struct("<HQ")
+# End of a chunk index: sizes of the chunk.
 _SIZES = struct.Struct("<QQ")
+# Name of the compression, with its length.
 _COMPRESSION = b"\x04\x00\x00\x00zstd"
-_PAIRS_HEAD = 6  # channel and length, before a message index's pairs
+# Size of channel and length before the pairs of a message index, bytes.
+_PAIRS_HEAD = 6
 
 
 class ChannelIndex(NamedTuple):
-    """A channel's message index behind a chunk: where its record starts, and how many messages it lists."""
+    """Message index of a channel after a chunk: start of its record, and number of its messages."""
 
     channel: int
     offset: int
@@ -60,11 +64,11 @@ class ChannelIndex(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ChunkContent:
-    """Message records one after the other, and the message index records to stand behind them.
+    """Message records one after the other, and the message index records that follow them.
 
-    records: of the messages, and of schemas and channels before them.
+    records: records of schemas, channels and messages, in this order.
     index: message index records.
-    channels: those with messages here, each with where its record starts in ``index``.
+    channels: channels with messages in the chunk, each with the start of its record in ``index``.
     start, end: log time of the oldest and the newest message, ns.
     """
 
@@ -76,7 +80,7 @@ class ChunkContent:
 
 
 class _ChunkIndex(NamedTuple):
-    """Entry of a chunk in the chunk index; a frozen dataclass takes six times as long to make."""
+    """Entry of a chunk in the chunk index; a frozen dataclass would take six times as long to create."""
 
     content_start: int
     content_end: int
@@ -97,10 +101,13 @@ class _ChunkIndex(NamedTuple):
 
 
 class ContainerWriter:
-    """Writes the magic and the header at once, then attachments and chunks, and the summary at `finish`."""
+    """Writer of a container: magic and header, then attachments and chunks, and the summary at `finish`."""
 
     def __init__(self, file: BinaryIO, profile: str, level: int = 3) -> None:
-        """file: empty, open for writing.  profile: goes into the header, as the library's name too.  level: of zstd."""
+        """Begin a container in an empty file open for writing.
+
+        profile: name of profile and library for the header.  level: compression level of zstd.
+        """
         self._file = file
         self._compressor = zstandard.ZstdCompressor(level=level)
         self._crc = 0
@@ -123,7 +130,7 @@ class ContainerWriter:
     def channel(self, topic: str, schema: str, data: bytes) -> int:
         """Add a protobuf channel and return its number; it is written into the next chunk.
 
-        schema: the message's full name.  data: its FileDescriptorSet.
+        schema: full name of the message.  data: its FileDescriptorSet.
         """
         if schema not in self._schemas:
             self._schemas[schema] = Schema(id=len(self._schemas) + 1, data=data, encoding="protobuf", name=schema)
@@ -134,15 +141,17 @@ class ContainerWriter:
         return channel.id
 
     def front(self) -> bytes:
-        """Give the schemas and channels that no chunk holds yet, as the beginning of the next."""
+        """Return the schemas and channels not yet in any chunk, for the beginning of the next chunk."""
         front = b"".join(_bytes(record) for record in self._unwritten)
         self._unwritten.clear()
         return front
 
     def copy(self, data: bytes) -> None:
-        """Write a chunk as it stood in another file, from its records.  Raises ValueError and what mcap's classes do.
+        """Write a chunk of another file, from its records.
 
-        Its schemas and channels count as this file's.
+        Raises ValueError and the errors of mcap's classes.
+
+        Its schemas and channels become schemas and channels of this file.
         """
         index: dict[int, list[tuple[int, int]]] = {}
         for opcode, at, content in records(data):
@@ -184,11 +193,11 @@ class ContainerWriter:
 
     @property
     def last_time(self) -> int:
-        """log_time of the newest message, ns; 0 before the first chunk."""
+        """Return the log_time of the newest message, ns; 0 before the first chunk."""
         return max((chunk.content_end for chunk in self._chunks), default=0)
 
     def finish(self) -> None:
-        """Write the end of the data and the summary; the file stays open."""
+        """Write the end of the data section and the summary; the file stays open."""
         self._put(_bytes(DataEnd(self._crc)))
         start = self._at
         groups = [
@@ -224,7 +233,7 @@ class ContainerWriter:
         )
 
     def flush(self) -> None:
-        """Hand what was written to the operating system.  Raises OSError."""
+        """Pass the written bytes to the operating system.  Raises OSError."""
         try:
             self._file.flush()
         except OSError as error:
@@ -240,7 +249,7 @@ class ContainerWriter:
 
 
 def _named(error: OSError, file: BinaryIO) -> OSError:
-    """Give an error while writing (a full disk) the name of the file, which a write does not know."""
+    """Add the name of the file to an error while writing (such as a full disk), which lacks it."""
     return OSError(error.errno, error.strerror, getattr(file, "name", None))
 
 
@@ -259,32 +268,40 @@ def _message_index(channel: int, pairs: Index) -> bytes:
 # ----------------------------------------------------------------------
 # The bytes inside chunks, for many seconds of flight at once, in compiled code.
 #
-# A message at a time through Python costs more than flying it.  Here messages are laid out in order of time, cut into
-# chunks, and indexed; what is left for Python is one compression a chunk.
+# Handling one message at a time in Python costs more than simulating it.  Here messages are ordered by time, cut into
+# chunks, and indexed in compiled code; Python only compresses each chunk.
 
-# A message record's frame (opcode, length) and its header (channel, sequence, log time, publish time).
+# Size of the frame of a record (opcode, length), bytes.
 FRAME_SIZE: Final = 9
+# Size of the header of a message (channel, sequence, log time, publish time), bytes.
 MESSAGE_HEADER: Final = 22
+# Opcode of a message record.
 MESSAGE_OPCODE: Final = 5
+# Opcode of a message index record.
 _INDEX_OPCODE: Final = 7
-# A message index's frame, channel and length, and one of its entries.
+# Size of frame, channel and length of a message index, bytes.
 _INDEX_HEAD: Final = 15
+# Size of an entry of a message index, bytes.
 _INDEX_ENTRY: Final = 16
+# One second, ns.
 SECOND_NS: Final = 1_000_000_000
 
-# A message on its way into a chunk: where it comes from (its first byte in the blob of messages, or `FROM_ROWS` for the
-# next state row), bytes, channel, log time (ns), and where it starts in its chunk.
+# A message to be put into a chunk: source (its first byte in the blob of messages, or `FROM_ROWS` for the next state
+# row), length in bytes, channel, log time (ns), and its start in the chunk.
 ENTRY: Final = np.dtype([(name, np.int64) for name in ("source", "length", "channel", "log_time", "offset")])
+# Source of a message that is the next state row.
 FROM_ROWS: Final = -1
-# Results of `last_log_time` for times that cannot be recorded.
+# Result of `last_log_time` for a time outside the recordable range.
 OUT_OF_RANGE: Final = -1
+# Result of `last_log_time` for a time not later than the time before it.
 NOT_INCREASING: Final = -2
-# A chunk: its bytes in `Layout.records`, the log times of its first and last message (ns), and the bytes of its message
-# indexes in `Layout.index`.
+# A chunk: range of its bytes in `Layout.records`, log times of its first and last message (ns), and range of its
+# message indexes in `Layout.index`.
 CHUNK: Final = np.dtype(
     [(name, np.int64) for name in ("start", "stop", "first_ns", "last_ns", "index_start", "index_stop")]
 )
-# A channel in a chunk: where its index starts behind the chunk's first one, and its messages; 0 of these: no index.
+# A channel in a chunk: offset of its index from the first index of the chunk, and number of messages; without messages
+# there is no index.
 CHANNEL_INDEX: Final = np.dtype([("offset", np.int64), ("messages", np.int64)])
 
 
@@ -292,7 +309,7 @@ CHANNEL_INDEX: Final = np.dtype([("offset", np.int64), ("messages", np.int64)])
 class MessageRecords:
     """Message records of one channel, in order of time, one after the other in ``blob``.
 
-    log_times: (n,) ns.  offsets: (n + 1,) where each starts in ``blob``, and where the last ends.
+    log_times: (n,) ns.  offsets: (n + 1,) start of each record in ``blob``, and end of the last.
     """
 
     channel: int
@@ -305,8 +322,8 @@ class MessageRecords:
 class Layout:
     """Chunks of message records, and the message indexes of each.
 
-    records: all chunks' records, one chunk after the other.
-    index: all their message index records.
+    records: records of all chunks, one chunk after the other.
+    index: message index records of all chunks.
     chunks: (c,) of `CHUNK`.
     channels: (c, channels + 1) of `CHANNEL_INDEX`, by chunk and channel number.
     """
@@ -319,7 +336,7 @@ class Layout:
 
 @inner
 def _put(out: Bytes, at: int, value: int, size: int) -> int:
-    """Write a number of ``size`` bytes, low first; returns where it ends."""
+    """Write a little-endian number of ``size`` bytes, and return the position of its end."""
     for k in range(size):
         out[at + k] = (value >> (8 * k)) & 0xFF
     return at + size
@@ -349,7 +366,7 @@ def _put_head(out: Bytes, at: int, size: int, channel: int, log_time: int) -> in
 @compiled
 def _stamped(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> tuple[Bytes, Ints]:
     count, body_size = bodies.shape
-    # The timestamp takes at most 2 + 12 bytes: its tag and length, two tags, two varints of five bytes.
+    # The timestamp takes at most 2 + 12 bytes: tag and length, then two tags and two varints of five bytes.
     out = np.empty(count * (FRAME_SIZE + MESSAGE_HEADER + 14 + body_size), dtype=np.uint8)
     offsets = np.zeros(count + 1, dtype=np.int64)
     timestamp = np.empty(16, dtype=np.uint8)
@@ -372,10 +389,10 @@ def _stamped(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> tuple[By
 
 
 def stamped_records(log_times: Ints, channel: int, timestamp_field: int, bodies: Bytes) -> MessageRecords:
-    """Return messages that are a timestamp followed by bytes of one size, as records.
+    """Return records of messages that consist of a timestamp and bytes of one size.
 
-    log_times: (n,) ns since 1970.  timestamp_field: the timestamp's field number.  bodies: (n, size) what follows it,
-    in protobuf's encoding.
+    log_times: (n,) ns since 1970.  timestamp_field: field number of the timestamp.  bodies: (n, size) bytes after the
+    timestamp, in protobuf's encoding.
     """
     tag = timestamp_field << 3 | 2  # length-delimited
     blob, offsets = _stamped(np.ascontiguousarray(log_times), channel, tag, bodies)
@@ -383,7 +400,7 @@ def stamped_records(log_times: Ints, channel: int, timestamp_field: int, bodies:
 
 
 def single_record(channel: int, log_time: int, data: bytes) -> MessageRecords:
-    """Return one message (its bytes in ``data``) as a record."""
+    """Return the record of one message with the bytes ``data``."""
     out = np.empty(FRAME_SIZE + MESSAGE_HEADER + len(data), dtype=np.uint8)
     at = _put_head(out, 0, len(data), channel, log_time)
     out[at:] = np.frombuffer(data, np.uint8)
@@ -394,9 +411,9 @@ def single_record(channel: int, log_time: int, data: bytes) -> MessageRecords:
 def _order(
     row_times: Ints, row_length: int, row_channel: int, others: Entries, front: int, limit: int
 ) -> tuple[Entries, Ints]:
-    """Merge rows and other messages by time, a row last, and cut: all messages (n,), and the chunks' first ones.
+    """Merge rows and other messages by time; return all messages (n,) and the first of each chunk.
 
-    The last of the firsts is n.
+    At equal times a row comes last.  The first messages end with n.
     """
     count = len(row_times) + len(others)
     merged = np.empty(count, dtype=ENTRY)
@@ -428,7 +445,7 @@ def _order(
 
 @compiled
 def _fill(entries: Entries, rows: Bytes, blob: Bytes, front: Bytes) -> Bytes:
-    """Copy the messages one after the other, behind ``front``."""
+    """Copy the messages one after the other, after ``front``."""
     total = len(front)
     for k in range(len(entries)):
         total += entries[k].length
@@ -448,7 +465,10 @@ def _fill(entries: Entries, rows: Bytes, blob: Bytes, front: Bytes) -> Bytes:
 
 @compiled
 def _index(entries: Entries, firsts: Ints, front: int, most: int) -> tuple[Bytes, Chunks, ChannelIndexes]:
-    """Message index records of each chunk, channel by channel; and `Layout`'s tables.  most: the highest channel."""
+    """Return the message index records of each chunk by channel, and the tables of `Layout`.
+
+    most: highest channel number.
+    """
     count = len(firsts) - 1
     out = np.empty(len(entries) * _INDEX_ENTRY + count * (most + 1) * _INDEX_HEAD, dtype=np.uint8)
     chunks = np.zeros(count, dtype=CHUNK)
@@ -485,10 +505,10 @@ def _index(entries: Entries, firsts: Ints, front: int, most: int) -> tuple[Bytes
 def lay_out(
     rows: Bytes, row_times: Ints, row_channel: int, others: list[MessageRecords], front: bytes, limit: int
 ) -> Layout:
-    """Lay message records out in order of time, cut into chunks of one second and ``limit`` bytes at most, and index.
+    """Order message records by time, and index them in chunks of at most one second and ``limit`` bytes.
 
-    rows: (n, size) records of the channel ``row_channel``, at ``row_times`` (ns); at one time a row comes last.
-    front: bytes before the first message.  A message of more than ``limit`` has a chunk of its own.
+    rows: (n, size) records of the channel ``row_channel``, at ``row_times`` (ns); at equal times a row comes last.
+    front: bytes before the first message.  A message of more than ``limit`` bytes gets its own chunk.
     """
     most = max([row_channel, *(item.channel for item in others)])
     blob = np.concatenate([np.zeros(0, np.uint8), *(item.blob for item in others)])
@@ -502,7 +522,10 @@ def lay_out(
 
 
 def _entries(others: list[MessageRecords]) -> Entries:
-    """Return messages in order of time, where they start in all their blobs together; offsets are still open."""
+    """Return messages in order of time, with their starts in the joined blobs.
+
+    Their offsets are not set yet.
+    """
     found: Entries = np.zeros(sum(len(item.log_times) for item in others), dtype=ENTRY)
     first, start = 0, 0
     for item in others:
@@ -518,10 +541,10 @@ def _entries(others: list[MessageRecords]) -> Entries:
 
 @compiled
 def last_log_time(times: Floats, newest: int, epoch: int, longest: float) -> int:
-    """Log time (ns) of the last of ``times`` (s).
+    """Return the log time (ns) of the last of ``times`` (s).
 
-    newest: the log time before the first.  `OUT_OF_RANGE` where a time is not in 0..longest, `NOT_INCREASING` where
-    one is not later than the one before it.
+    newest: log time before the first.  Returns `OUT_OF_RANGE` if a time is not in 0..longest, and `NOT_INCREASING` if
+    a time is not later than the time before it.
     """
     for k in range(len(times)):
         if not 0.0 <= times[k] < longest:

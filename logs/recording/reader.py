@@ -1,6 +1,6 @@
-"""Read a flight log, checked and rebuilt from the log alone.
+"""Read, check and rebuild a flight log from the log alone.
 
-A recorded verdict is returned as it is in the log, for comparison; no code relies on it.
+A recorded verdict is returned unchanged, for comparison; no code relies on it.
 """
 
 import json
@@ -57,7 +57,7 @@ from world.html_table import html_table
 
 @dataclass(frozen=True, slots=True)
 class LogChannel:
-    """A topic of a log: encoding of its messages, and their schema's name, encoding and data."""
+    """Topic of a log: encoding of its messages, and name, encoding and data of their schema."""
 
     topic: str
     encoding: str
@@ -76,7 +76,7 @@ class LogMessage:
 
 
 def log_messages(path: Path) -> Iterator[LogMessage]:
-    """Give the messages of a log in the order of the file, up to its first damage.  Raises OSError.
+    """Yield the messages of a log in the order of the file, up to its first damage.  Raises OSError.
 
     >>> import tempfile
     >>> from collections import Counter
@@ -99,7 +99,7 @@ def log_messages(path: Path) -> Iterator[LogMessage]:
 
 
 def log_channels(path: Path) -> list[LogChannel]:
-    """List the channels that the first chunk of a log declares: all that a `logs.recording.recorder.Recorder` uses.
+    """List the channels declared by the first chunk of a log: all channels of a `logs.recording.recorder.Recorder`.
 
     Raises OSError.
 
@@ -146,9 +146,9 @@ _LEVEL_NAMES = {number: name for name, number in LEVELS.items()}
 
 @dataclass(frozen=True, slots=True)
 class LogEvent:
-    """One line of the log: time in s (to the nanosecond), what happened, and its level.
+    """One event of the log: time in s (to the nanosecond), text and level.
 
-    level: of `logs.recording.foxglove_scene.LEVELS`.
+    level: a key of `logs.recording.foxglove_scene.LEVELS`.
     """
 
     time: float
@@ -158,16 +158,16 @@ class LogEvent:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class FlightLog:
-    """Flight, as recorded.
+    """A recorded flight.
 
     source: name of the file, for messages.
     setup, track, events: the flown setup, the rows, and the events in order of time.
     ended: how the flight ended; None if the recording stopped before.
-    recorded_verdict: the verdict as it was written, None if there is none; never to be trusted.
-    versions: of the packages that flew it.
-    complete: nothing is missing or damaged.
+    recorded_verdict: the verdict as written, or None; never to be trusted.
+    versions: versions of the packages of the flight.
+    complete: True if nothing is missing or damaged.
     problem: the fault in a line; empty for a complete log.
-    end_time: of the last row, s.
+    end_time: time of the last row, s.
     lost: the lost part of the flight, in a line; ``problem`` adds to it for a recovered log.
     reference: results of reference flights; None if none were flown.
     """
@@ -204,7 +204,7 @@ class FlightLog:
 
 
 class _MessageCollector:
-    """Collects state rows and events from the bytes of chunks."""
+    """Collector of state rows and events from the bytes of chunks."""
 
     def __init__(self) -> None:
         self.parts: list[StateRecords] = []

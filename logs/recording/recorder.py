@@ -1,7 +1,7 @@
-"""The recorder: one flight to one MCAP file, written as it is flown.
+"""Record one flight to one MCAP file while it is flown.
 
-The same setup and rows give the same bytes, in whatever blocks the rows arrive: log_time is simulation time (see
-`logs.recording.state_channel.EPOCH_NS`), a chunk ends at 64 KiB or at a whole second of it, and nothing reads a clock.
+The same setup and rows give the same bytes, however the rows are split into blocks: log_time is simulation time (see
+`logs.recording.state_channel.EPOCH_NS`), a chunk ends at 64 KiB or at a whole second, and nothing reads a clock.
 """
 
 import contextlib
@@ -57,15 +57,17 @@ from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict, verdict_json
 from world.arrays import Ints
 
+# Largest size of a chunk, bytes.
 CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"
 PROFILE = "planfly"
-# A log has it where its scenario has zones.
+# Topic of logs whose scenario has zones.
 ZONES_TOPIC = "/scene/zones"
-# A log has it where returns were judged when it was written.
+# Topic of logs that were written with judged returns.
 RETURNS_TOPIC = "/scene/returns"
 
-_BUFFER = 2**20
+# Size of the file's write buffer, bytes.
+_BUFFER_BYTES = 2**20
 _NO_ROWS: Rows = np.empty(0, dtype=TRACK_ROW)
 _NO_TIMES = np.empty(0, dtype=np.int64)
 _CHANNELS: dict[str, Any] = {
@@ -80,10 +82,10 @@ _CHANNELS: dict[str, Any] = {
 
 
 class Recorder:
-    """Writes a flight log; a context manager, so that a flight that raises leaves a readable, unfinished file.
+    """Writer of a flight log; a context manager, so that a flight that raises leaves a readable, unfinished file.
 
-    The setup goes first; after it each whole second of flight is handed to the operating system, so that a killed
-    process loses at most the last one.
+    The setup is written first; then each whole second of flight is passed to the operating system, so that a killed
+    process loses at most the last second.
 
     >>> import tempfile
     >>> from logs.recording.example_log import example_log
@@ -103,13 +105,13 @@ class Recorder:
     def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
         """Open ``path`` for writing (replacing it) and write the setup.  Raises OSError.
 
-        every: one row in so many is recorded, and the flight's last.  batch: whole seconds of flight that are written
-        at a time, each in chunks of its own: more costs less, and a killed process loses as much; the bytes are the
-        same.
+        every: record every n-th row, and the last row of the flight.  batch: number of whole seconds of flight written
+        at once, each in its own chunks; a larger batch costs less time, but a killed process loses up to one batch.
+        The bytes are the same.
         """
         self._batch_ns = batch * SECOND_NS
         self._every = every
-        self._skipped: Rows | None = None  # the newest row, if it was not recorded
+        self._skipped: Rows | None = None  # newest row, if it was not recorded
         self._received = 0  # rows, recorded or not
         attachments = pack_setup(setup)
         self._terrain = setup.scenario.terrain
@@ -119,10 +121,10 @@ class Recorder:
         self._last_ns = EPOCH_NS - 1  # of the rows recorded
         self._newest_ns = EPOCH_NS - 1  # of the rows received
         self._channels: dict[str, int] = {}
-        self._file = path.open("wb", buffering=_BUFFER)
+        self._file = path.open("wb", buffering=_BUFFER_BYTES)
         self._open = True
         try:
-            # A thinned log is taken because it costs little: a quarter more bytes for half the time.
+            # A thinned log is meant to cost little: compress faster, a quarter more bytes for half the time.
             self._writer = ContainerWriter(self._file, PROFILE, 3 if every == 1 else -1)
             self._begin(attachments, setup)
         except OSError:
@@ -145,7 +147,7 @@ class Recorder:
             self._close()
 
     def abandon(self) -> None:
-        """Close the file after an error, without a result: that error is the one to report, not one of closing."""
+        """Close the file after an error, without a result, and ignore errors of closing: report the first error."""
         if self._open:
             with contextlib.suppress(OSError):
                 self._close()
@@ -155,7 +157,7 @@ class Recorder:
         self.write_rows(track_rows(block))
 
     def write_rows(self, rows: Rows) -> None:
-        """Record rows as a flight hands them on, (t,) of `flight.simulation.track.TRACK_ROW`.
+        """Record rows as a flight returns them, (t,) of `flight.simulation.track.TRACK_ROW`.
 
         Raises ValueError unless their times increase, from 0 on, across all calls.
         """
@@ -168,7 +170,7 @@ class Recorder:
         if newest == NOT_INCREASING:
             raise ValueError(f"rows from {times[0]} s on: times must increase by at least 1 ns a row")
         self._newest_ns = newest
-        # One row in `every`, counted from the flight's first.
+        # Keep every n-th row, from the first row of the flight.
         kept = rows[-self._received % self._every :: self._every]
         self._received += len(rows)
         self._skipped = rows[-1:] if (self._received - 1) % self._every else None
@@ -183,19 +185,19 @@ class Recorder:
 
     @property
     def size(self) -> int:
-        """Present size of the file, bytes."""
+        """Return the present size of the file, bytes."""
         return self._file.tell()
 
     def flush(self) -> None:
-        """Hand every row received to the operating system now, by the caller's clock.
+        """Pass all received rows to the operating system now.
 
-        For a live flight, so that a killed process loses no whole second: chunks then end where the caller flushes,
-        and the file's bytes (not its rows) depend on when that was.
+        In a live flight, a killed process then loses less than a second.  Chunks end at each flush, so the bytes of the
+        file (not its rows) depend on the times of the calls.
         """
         self._emit(self._last_ns + 1)
 
     def event(self, time: float, text: str, level: str = "info") -> None:
-        """Record what happened at ``time`` (s); level: debug, info, warning, error or fatal.  Raises ValueError."""
+        """Record an event at ``time`` (s); level: debug, info, warning, error or fatal.  Raises ValueError."""
         if level not in scene.LEVELS:
             raise ValueError(f"level {level!r}: {', '.join(scene.LEVELS)} are expected")
         if not 0.0 <= time < LATEST:
@@ -211,7 +213,7 @@ class Recorder:
         reference: ReferenceFlights | None = None,
         returns: DrawnReturns | None = None,
     ) -> None:
-        """Write how the flight ended, its verdict, what other flights had to say of it and returns; close the file."""
+        """Write end, verdict, results of reference flights and returns, then close the file."""
         if self._skipped is not None:
             self._append(self._skipped)
             self._skipped = None
@@ -258,7 +260,7 @@ class Recorder:
         self._writer.flush()
 
     def _scene_channel(self, topic: str) -> int:
-        """Return the number of a topic that not every log has."""
+        """Return the channel number of a topic that not every log has."""
         descriptor = SceneUpdate.DESCRIPTOR
         self._channels[topic] = self._writer.channel(topic, descriptor.full_name, schema_of(descriptor))
         return self._channels[topic]
@@ -269,7 +271,7 @@ class Recorder:
         self._writer.flush()
 
     def _close(self) -> None:
-        """Write what is pending, the summary and the end of the file."""
+        """Write pending rows and events, the summary and the end of the file."""
         self._open = False
         try:
             self._emit(None)
@@ -281,7 +283,10 @@ class Recorder:
         self._writer.attach(name, media_type(name), data, log_time)
 
     def _emit(self, until: int | None) -> None:
-        """Write the pending rows and events before ``until`` (ns; None for all), in chunks of at most a second."""
+        """Write the pending rows and events before ``until``, in chunks of at most a second.
+
+        until: ns; None for all.
+        """
         rows = join_rows(self._pending)
         log_times = times_ns(rows["time"])
         stop = len(rows) if until is None else int(np.searchsorted(log_times, until))
@@ -295,7 +300,7 @@ class Recorder:
         self._writer.flush()
 
     def _write(self, others: list[MessageRecords], rows: Rows = _NO_ROWS, log_times: Ints = _NO_TIMES) -> None:
-        """Write rows and other messages in order of time; at one time the row comes last."""
+        """Write rows and other messages in order of time; at equal times the row comes last."""
         channel = self._channels[STATE_TOPIC]
         encoded = encode_rows(rows, self._written, channel)
         self._written += len(rows)
@@ -306,7 +311,7 @@ class Recorder:
 
 def _chunks(layout: Layout) -> Iterator[ChunkContent]:
     records, index = memoryview(layout.records), layout.index.tobytes()  # type: ignore[arg-type]  # an array is a buffer
-    # Lists first: a field of one chunk at a time costs a microsecond.
+    # Convert to lists first: reading the fields chunk by chunk costs a microsecond each.
     bounds = {name: layout.chunks[name].tolist() for name in CHUNK.names or ()}
     offsets, messages = layout.channels["offset"].tolist(), layout.channels["messages"].tolist()
     for k in range(len(layout.chunks)):
@@ -324,7 +329,7 @@ def _chunks(layout: Layout) -> Iterator[ChunkContent]:
 
 
 def thin_track(track: Track, every: int) -> Track:
-    """Return rows of a whole flight that a `Recorder` with this ``every`` records: one in so many, and the last.
+    """Return the rows of a flight that a `Recorder` with ``every`` records: every n-th row, and the last.
 
     >>> from logs.recording.example_log import example_log
     >>> thin_track(example_log().track, 100).time

@@ -1,6 +1,6 @@
-"""Recovery of an unfinished or damaged log: what can be read of it, as a file that any MCAP reader opens.
+"""Recover the readable part of an unfinished or damaged log, as a file that any MCAP reader opens.
 
-The new log carries a note of what was lost, so that it reads as incomplete for ever.
+The new log carries a note on the loss, so that it always reads as incomplete.
 """
 
 import io
@@ -19,17 +19,17 @@ RECOVERY_SCHEMA = "planfly.recovery/1"
 
 @dataclass(frozen=True, slots=True)
 class Recovered:
-    """A recovered log: its bytes, and the flight that it holds."""
+    """A recovered log: its bytes, and its flight."""
 
     data: bytes
     log: FlightLog
 
 
 def recover_log(path: Path) -> Recovered | None:
-    """Rebuild a log up to its first damage; None for one that is complete.
+    """Rebuild a log up to its first damage; return None for a complete log.
 
-    Every chunk and attachment before the damage is kept as it was.  How the flight ended and a verdict are kept out:
-    they would speak of rows that may be gone.  Raises LogError for a file that holds no flight, as `read_log` does.
+    Chunks and attachments before the damage are kept unchanged.  The result of the flight and the verdict are left out,
+    as they may refer to lost rows.  Raises LogError for a file without a flight, as `read_log` does.
 
     >>> import tempfile
     >>> from logs.recording.example_log import write_example_log
@@ -55,7 +55,7 @@ def recover_log(path: Path) -> Recovered | None:
         try:
             writer.copy(chunk)
         except PARSE_ERRORS:
-            # Where the reader stopped, too.
+            # The reader stopped here, too.
             break
     note = {"schema": RECOVERY_SCHEMA, "lost": log.lost, "rows": len(log.track), "end_time_s": log.end_time}
     text = (json.dumps(note, indent=1) + "\n").encode()

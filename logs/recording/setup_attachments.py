@@ -1,6 +1,6 @@
-"""A `FlightSetup` as attachments of a log (bytes by name), and back.
+"""Convert a `FlightSetup` to attachments of a log (bytes by name), and back.
 
-`setup.json` lists every other attachment with its SHA-256, so that none can be missing or altered unnoticed.  Numbers
+`setup.json` lists every other attachment with its SHA-256, so that a missing or altered attachment is noticed.  Numbers
 are written as Python's repr, which reads back to the same float; NaN and infinity as the strings "nan", "inf", "-inf".
 """
 
@@ -46,8 +46,8 @@ from world.terrain import Terrain
 # ----------------------------------------------------------------------
 # The attachments of a flight log: their names and media types.
 #
-# `setup.json` lists those that make up the setup; what flights beside it gave, a verdict, a result and a recovery note
-# come after the flight.
+# `setup.json` lists the attachments of the setup; results of reference flights, a verdict, a result and a recovery note
+# are written after the flight.
 
 SETUP_FILE: Final = "setup.json"
 SCENARIO_FILE: Final = "scenario.json"
@@ -67,24 +67,25 @@ _MEDIA_TYPES: Final = {
 
 
 def heights_name(part: int) -> str:
-    """Return name of a part of the terrain's heights; parts count from 0."""
+    """Return the name of a part of the terrain's heights; parts are numbered from 0."""
     return f"terrain-{part:03d}.heights"
 
 
 def media_type(name: str) -> str:
-    """Media type of an attachment, by its name's suffix."""
+    """Return the media type of an attachment, by the suffix of its name."""
     return _MEDIA_TYPES[PurePath(name).suffix]
 
 
 # ----------------------------------------------------------------------
-# The terrain inside a log: exact heights, packed without loss, and how they lie on the map.
+# The terrain inside a log: exact heights with lossless compression, and their placement on the map.
 #
-# A height is stored as the difference of its float32 bits from those of its western neighbour, the four bytes of all
-# differences in planes, compressed with zstd.
+# A height is stored as the difference between its float32 bits and the bits of its western neighbour.  The four bytes
+# of the differences are stored in separate planes, compressed with zstd.
 
 TERRAIN_SCHEMA = "planfly.terrain/1"
 _ENCODING = "float32 bits, difference to the west modulo 2^32, byte planes (low first), zstd"
-_PART_PIXELS = 4 * 2**20
+# Largest number of heights in one attachment.
+_MAX_PART_HEIGHTS = 4 * 2**20
 
 
 class _File(SetupModel):
@@ -92,7 +93,7 @@ class _File(SetupModel):
     file_schema: Annotated[str, Field(alias="schema", pattern=f"^{TERRAIN_SCHEMA}$")] = TERRAIN_SCHEMA
     encoding: Annotated[str, Field(max_length=200)] = _ENCODING
     rows: Annotated[int, Field(ge=2)]
-    cols: Annotated[int, Field(ge=2, le=_PART_PIXELS)]
+    cols: Annotated[int, Field(ge=2, le=_MAX_PART_HEIGHTS)]
     spacing_m: Annotated[Finite, Field(gt=0.0)]
     source: str
     sha256: str
@@ -128,8 +129,8 @@ def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
 def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
     """Rebuild the packed terrain, bit for bit.
 
-    attachments: what `pack_terrain` gave, among others.  source: names the log in messages.  Raises LogError for
-    heights that are missing, damaged or of another size, and for a map that is none.
+    attachments: attachments from `pack_terrain`, among others.  source: name of the log for messages.  Raises LogError
+    for heights that are missing, damaged or of wrong size, and for an invalid map.
     """
     try:
         file = _File.model_validate_json(attachments[TERRAIN_FILE])
@@ -159,7 +160,7 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
 
 
 def _row_blocks(rows: int, cols: int) -> list[tuple[int, int]]:
-    step = max(1, _PART_PIXELS // cols)
+    step = max(1, _MAX_PART_HEIGHTS // cols)
     return [(first, min(rows, first + step)) for first in range(0, rows, step)]
 
 
@@ -173,7 +174,7 @@ def _pack(heights: NDArray[np.float32]) -> bytes:
 def _unpack(data: bytes, rows: int, cols: int, where: str) -> NDArray[Any]:
     size = rows * cols * 4
     try:
-        # A reader, not decompress(): the size that the frame declares is not to be believed.
+        # Use a reader, not decompress(): the size declared by the frame cannot be trusted.
         raw = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(data).read(size + 1)
     except zstandard.ZstdError as error:
         raise LogError(f"{where}: cannot be decompressed: {error}", file=where) from error
@@ -228,11 +229,11 @@ class _Setup(SetupModel):
     guidance: Guidance
     nav: Navigation
     guidance_hz: Literal[30, 60]
-    fdm_hz: Literal[60, 120] = 120  # a log of before it could be chosen
-    parameters: ParametersTable | None = None  # a log of before there were any was flown by planfly's guidance
+    fdm_hz: Literal[60, 120] = 120  # default for logs from before it could be chosen
+    parameters: ParametersTable | None = None  # older logs have none: they were flown by planfly's guidance
     program: ProgramTable | None = None
-    autopilot: str | None = None  # left out where guidance, parameters and program say who flew
-    autopilot_version: str | None = None  # left out where all releases of it fly alike
+    autopilot: str | None = None  # left out if guidance, parameters and program identify the autopilot
+    autopilot_version: str | None = None  # left out if all its releases fly alike
     source: ImportedLog | None = None
     mission: MissionTable
     route: RouteTable
@@ -243,7 +244,7 @@ class _Setup(SetupModel):
 
 @dataclass(frozen=True, slots=True)
 class StoredSetup:
-    """A setup as recorded, and the versions of the packages that flew it."""
+    """A setup as recorded, with the versions of the packages of its flight."""
 
     setup: FlightSetup
     versions: dict[str, str]
@@ -255,7 +256,7 @@ def _versions() -> tuple[tuple[str, str], ...]:
 
 
 def package_versions() -> dict[str, str]:
-    """Versions of Python and of the packages whose arithmetic or formats a log depends on, those installed.
+    """Return versions of Python and the packages whose arithmetic or formats a log depends on, if installed.
 
     >>> versions = package_versions()
     >>> versions["numpy"] == metadata.version("numpy")
@@ -275,7 +276,7 @@ def _find_versions() -> dict[str, str]:
 
 
 def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
-    """Pack all that a log needs of a setup as attachments, bytes by name, `SETUP_FILE` first.
+    """Pack a setup as the attachments that a log needs, bytes by name, `SETUP_FILE` first.
 
     The same setup and packages give the same bytes.
     """
@@ -321,8 +322,8 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
 def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
     """Rebuild the setup from its attachments; no file is opened.
 
-    attachments: by name.  source: names the log in messages.  Raises LogError, in one line, for one that is missing,
-    altered or does not fit.
+    attachments: bytes by name.  source: name of the log for messages.  Raises LogError, in one line, for an attachment
+    that is missing, altered or inconsistent.
     """
     if SETUP_FILE not in attachments:
         raise LogError(f"{source}: not a planfly log: an MCAP file without {SETUP_FILE}", file=source)
@@ -379,7 +380,7 @@ def _json(data: Any) -> bytes:
 
 
 def _finite_or_text(data: Any) -> Any:
-    """Spell non-finite numbers as strings, which JSON can hold."""
+    """Replace non-finite numbers by strings, as JSON has no such numbers."""
     if isinstance(data, float) and not math.isfinite(data):
         return str(float(data))
     if isinstance(data, dict):
@@ -427,7 +428,7 @@ def _plan(attachments: dict[str, bytes], source: str, terrain: Terrain | None) -
 
 
 def _refuse_outside_terrain(spec: Any, terrain: Terrain | None, where: str) -> None:
-    """Refuse a log that would make its reader open the elevation file that it names."""
+    """Raise LogError for a log that would make its reader open an elevation file."""
     table = spec.get("terrain") if isinstance(spec, dict) else None
     kind = table.get("kind") if isinstance(table, dict) else None
     if terrain is None and kind != "none":

@@ -1,9 +1,9 @@
 """The tables of `setup.json`: mission, route, envelope and parameters of a `FlightSetup`.
 
-A table has the fields of its dataclass under keys that carry units: pydantic writes it from the dataclass's attributes,
-and the dataclass is made of its values.  Numbers are written as Python's repr, which reads back to the same float.
+A table has the fields of its dataclass under keys with units: pydantic writes it from the attributes of the dataclass,
+and the dataclass is made from its values.  Numbers are written as Python's repr, which reads back to the same float.
 
-cattrs 26 renames fields in as many lines, but reads 1.7 as the integer 1, "12" as a number and NaN as any number.
+cattrs 26 needs as many lines to rename fields, but reads 1.7 as the integer 1, "12" as a number and NaN as any number.
 """
 
 import math
@@ -31,14 +31,14 @@ _Finites = Annotated[list[Finite], _LISTED]
 _Column = Annotated[list[float], _LISTED]
 _Table = Annotated[list[list[float]], _LISTED]  # by airspeed, then by height
 _Place = Annotated[list[Finite], Field(min_length=3, max_length=3)]
-# A height that need not be known: NaN in the dataclass, null in the file.
+# A height that may be unknown: NaN in the dataclass, null in the file.
 _Height = Annotated[Finite | None, BeforeValidator(lambda value: None if value != value else value)]
 
 
 class SetupModel(BaseModel):
-    """A table of `setup.json`: unknown keys are refused.
+    """A table of `setup.json`; unknown keys are refused.
 
-    name: its key there.
+    name: key of the table in the file.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -46,17 +46,17 @@ class SetupModel(BaseModel):
 
     @classmethod
     def of(cls, value: object) -> Self:
-        """Return the table of a dataclass, by its fields."""
+        """Return the table of a dataclass, from its fields."""
         return cls.model_validate(value, from_attributes=True, by_alias=False, by_name=True)
 
     def fault(self, file: str, field: str, message: str) -> LogError:
-        """Return an error of a field, by its key in the file."""
+        """Return an error on a field, named by its key in the file."""
         key = f"{self.name}.{type(self).model_fields[field].alias or field}"
         return LogError(f"{file}: {key}: {message}", file=file, field=key)
 
 
 def _made(kind: type[Made], table: SetupModel, **changed: Any) -> Made:
-    """Return a dataclass of a table's values, some of them changed."""
+    """Make a dataclass from the values of a table, with some values replaced."""
     return kind(**(dict(table) | changed))
 
 
@@ -117,7 +117,7 @@ class MissionTable(SetupModel):
 
 
 class RouteTable(SetupModel):
-    """A `Route` as a table: a value a waypoint, and a value a leg for airspeed."""
+    """A `Route` as a table: one value a waypoint, and for airspeed one value a leg."""
 
     name = "route"
     waypoints: Annotated[list[_Place], Field(min_length=2, alias="waypoints_east_north_amsl_m"), _LISTED]
@@ -143,7 +143,10 @@ class RouteTable(SetupModel):
     open_items: Annotated[tuple[OpenItem, ...], Field(alias="open_items_item_text")] = ()
 
     def route(self, file: str) -> Route:
-        """Return the route of the table.  Raises LogError for columns that do not fit, and for a leg without length."""
+        """Return the route of the table.
+
+        Raises LogError for inconsistent columns, and for a leg without length.
+        """
         waypoints = np.array(self.waypoints)
         if not (leg_runs(waypoints) > 0.0).all():
             raise self.fault(file, "waypoints", "a leg without horizontal length")
@@ -172,7 +175,7 @@ class RouteTable(SetupModel):
 
 
 class EnvelopeTable(SetupModel):
-    """An `Envelope` as a table; its power is empty where it is not known."""
+    """An `Envelope` as a table; its power is empty if unknown."""
 
     name = "envelope"
     aircraft: str
@@ -197,7 +200,10 @@ class EnvelopeTable(SetupModel):
     battery_guessed: bool = False
 
     def envelope(self, file: str) -> Envelope:
-        """Return the envelope of the table.  Raises LogError for tables that do not fit, and for axes out of order."""
+        """Return the envelope of the table.
+
+        Raises LogError for inconsistent tables, and for axes out of order.
+        """
         for field in ("airspeed", "amsl"):
             if (np.diff(getattr(self, field)) <= 0.0).any():
                 raise self.fault(file, field, "not increasing")
@@ -205,7 +211,7 @@ class EnvelopeTable(SetupModel):
         shapes = {field: [speeds, heights] for field in ("climb", "descent")}
         shapes |= {field: [heights] for field in ("level_speed_min", "level_speed_max")}
         powers = ("power_idle", "power_level", "power_full")
-        # A log of before there was any has none.
+        # Logs from before power was recorded have none.
         unknown = {} if self.power_level else {field: np.zeros((0, 0)) for field in powers}
         shapes |= {field: [speeds, heights] for field in powers if not unknown}
         for field, shape in shapes.items():
@@ -217,7 +223,7 @@ class EnvelopeTable(SetupModel):
 
 
 class ParametersTable(SetupModel):
-    """An autopilot's parameters as a table, in its units: each value, and who states it."""
+    """Parameters of an autopilot as a table, in its units: each value with its source."""
 
     values: dict[str, Finite]
     origins: dict[str, Origin]
@@ -226,7 +232,7 @@ class ParametersTable(SetupModel):
 
 
 def parameters_table(parameters: StoredParameters) -> ParametersTable:
-    """Write an autopilot's parameters as a table."""
+    """Return the parameters of an autopilot as a table."""
     return ParametersTable(
         values={name: value for name, value, _ in parameters.values},
         origins={name: origin for name, _, origin in parameters.values},
@@ -236,7 +242,7 @@ def parameters_table(parameters: StoredParameters) -> ParametersTable:
 
 
 def read_parameters(table: ParametersTable) -> StoredParameters:
-    """Read an autopilot's parameters of a table; the autopilot says whether they are allowed."""
+    """Read the parameters of an autopilot from a table; the autopilot checks them."""
     values = (ParameterValue(name, value, table.origins.get(name, "default")) for name, value in table.values.items())
     return StoredParameters(tuple(values), table.unused, table.source)
 

@@ -1,4 +1,4 @@
-"""The `/state` channel: a row of the track as a protobuf message, its schema, and numpy's view of its bytes.
+"""The `/state` channel: rows of the track as protobuf messages, their schema, and their bytes as numpy arrays.
 
 Every field is a fixed32 or fixed64 and every field is written, zero or not, so that a message has one layout and n
 messages are one structured array.  Any protobuf parser reads them.  The schema is built here, so that no protoc is
@@ -29,32 +29,33 @@ if TYPE_CHECKING:
 # ----------------------------------------------------------------------
 # Many protobuf messages of doubles at once, as numpy structured arrays of their encoding.
 #
-# Message objects of the protobuf library cost some microseconds each: ten thousand of them as much as minutes of
+# Message objects of the protobuf library cost some microseconds each: ten thousand of them cost as much as minutes of
 # flight.
 
-# wire types
+# Wire type of a 64-bit value.
 _FIXED64 = 1
+# Wire type of bytes with a length before them.
 _LENGTH_DELIMITED = 2
 
 
 def tagged_doubles(names: Sequence[str]) -> list[tuple[str, str]]:
-    """Give the numpy fields of doubles, each behind its one-byte tag ``tag_<name>``."""
+    """Return the numpy fields of doubles, each after its one-byte tag ``tag_<name>``."""
     return [field for name in names for field in ((f"tag_{name}", "u1"), (name, "<f8"))]
 
 
 def submessage(names: Sequence[str]) -> np.dtype[np.void]:
-    """Make the type of a message of doubles as a field of another: its tag, its size, and the tagged doubles."""
+    """Return the type of a message of doubles within another: tag, size, and the tagged doubles."""
     return np.dtype([("tag", "u1"), ("size", "u1"), *tagged_doubles(names)])
 
 
 def fill_doubles(out: Encoded, names: Sequence[str], values: Floats) -> None:
-    """Write the doubles (n, m) and their tags into ``out`` (n,); the names are those of the fields 1 to m."""
+    """Write the doubles (n, m) and their tags into ``out`` (n,); names: of the fields 1 to m."""
     for number, (name, column) in enumerate(zip(names, values.T, strict=True), 1):
         out[f"tag_{name}"], out[name] = number << 3 | _FIXED64, column
 
 
 def fill_submessage(out: Encoded, number: int, names: Sequence[str], values: Floats) -> None:
-    """Write messages of doubles into ``out``, (n,) of `submessage`, as the field ``number`` of others."""
+    """Write messages of doubles into ``out``, (n,) of `submessage`, as the field ``number`` of other messages."""
     out["tag"], out["size"] = number << 3 | _LENGTH_DELIMITED, out.dtype.itemsize - 2
     fill_doubles(out, names, values)
 
@@ -67,7 +68,7 @@ def repeated_submessages(number: int, names: Sequence[str], values: Floats) -> b
 
 
 def length_delimited(number: int, data: bytes) -> bytes:
-    """Encode a message's bytes as the field ``number`` of another."""
+    """Encode the bytes of a message as the field ``number`` of another message."""
     size, head = len(data), bytearray([number << 3 | _LENGTH_DELIMITED])
     while size > 127:
         head.append(size & 127 | 128)
@@ -102,10 +103,10 @@ _KINDS = {
 class StateField(NamedTuple):
     """A field of the message.
 
-    name: with its unit.
+    name: name with its unit.
     kind: its numpy type.
-    source: the field of `Track` that it holds.
-    component: which of that field's columns; None for a field of one.
+    source: field of `Track` with the values.
+    component: column of that field; None for a field of one column.
     """
 
     name: str
@@ -114,12 +115,12 @@ class StateField(NamedTuple):
     component: int | None
 
     def of(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return its column of the values (t,) or (t, n) of the track's field."""
+        """Return the column of this field from the values (t,) or (t, n) of the track's field."""
         return values if self.component is None else values[:, self.component]
 
 
 def _fields() -> tuple[StateField, ...]:
-    """Return every field of the message after `row`, in order."""
+    """Return all fields of the message after `row`, in order."""
     found = []
     for source, names in COLUMN_NAMES.items():
         kind = "<f8" if source in _DOUBLES else "<i4" if source == "leg" else "<f4"
@@ -140,12 +141,12 @@ def _file() -> descriptor_pb2.FileDescriptorProto:
 
 
 def _layout() -> tuple[np.dtype[np.void], dict[str, int]]:
-    """Lay the message out as a packed structured type: a tag before each value; and the tags."""
+    """Return the message as a packed structured type with a tag before each value, and the tags."""
     parts: list[tuple[str, str]] = []
     tags: dict[str, int] = {}
     for number, (name, kind) in enumerate(_MESSAGE_FIELDS, 1):
         tag = number << 3 | _KINDS[kind][1]
-        # From field 16 on the tag is a varint of two bytes, low seven bits first.
+        # From field 16 on, the tag is a varint of two bytes, low seven bits first.
         tags[f"tag_{name}"] = tag if tag < 128 else (tag & 127 | 128) | (tag >> 7) << 8
         parts += [(f"tag_{name}", "u1" if tag < 128 else "<u2"), (name, kind)]
     return np.dtype(parts), tags
@@ -155,7 +156,7 @@ STATE_FILE = _file()
 _LAYOUT = _layout()
 STATE_BODY = _LAYOUT[0]
 _TAGS = _LAYOUT[1]
-# One MCAP message record of this channel, header included.
+# One MCAP message record of this channel, including its header.
 RECORD = np.dtype(
     [
         ("opcode", "u1"),
@@ -170,7 +171,7 @@ RECORD = np.dtype(
 
 
 def state_class() -> "type[Message]":
-    """Make the protobuf class of a state message, in a pool of its own."""
+    """Make the protobuf class of a state message, in its own pool."""
     pool = descriptor_pool.DescriptorPool()
     pool.Add(STATE_FILE)
     return message_factory.GetMessageClass(pool.FindMessageTypeByName(STATE_NAME))
@@ -182,7 +183,7 @@ def state_schema() -> bytes:
 
 
 def schema_of(descriptor: "Descriptor") -> bytes:
-    """Return the FileDescriptorSet of any message, each file after the files that it imports."""
+    """Return the FileDescriptorSet of a message, with each file after the files that it imports."""
     files: dict[str, FileDescriptor] = {}
 
     def visit(file: "FileDescriptor") -> None:
@@ -199,7 +200,7 @@ def schema_of(descriptor: "Descriptor") -> bytes:
 
 
 def times_ns(time: NDArray[np.float64]) -> NDArray[np.int64]:
-    """log_time of each simulation time (s): ns since 1970, time 0 being `EPOCH_NS`."""
+    """Return the log_time of each simulation time (s): ns since 1970; time 0 is `EPOCH_NS`."""
     return np.rint(time * 1e9).astype(np.int64) + EPOCH_NS
 
 
@@ -243,7 +244,7 @@ def join_records(parts: list[StateRecords], kind: np.dtype[np.void]) -> StateRec
 
 
 def decode_rows(records: StateRecords) -> Track:
-    """Decode message records, (t,) of `RECORD`, to the track that they hold."""
+    """Decode message records, (t,) of `RECORD`, to a track."""
     rows = records["state"]
     columns: dict[str, list[NDArray[np.generic]]] = {name: [] for name in COLUMNS}
     for field in FIELDS:
@@ -265,7 +266,7 @@ def parse_row(data: bytes, parser: "type[Message]") -> StateRecords:
 
 @compiled
 def _count_matching(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> int:
-    """Count the first records, rows of bytes, that have the expected bytes in these columns."""
+    """Count the records (rows of bytes) from the first that have the expected bytes in these columns."""
     for row in range(len(raw)):
         for k in range(len(columns)):
             if raw[row, columns[k]] != expected[k]:
@@ -274,10 +275,10 @@ def _count_matching(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> 
 
 
 class RowMatcher:
-    """Finds state messages of the known layout, one after the other, in a chunk's bytes."""
+    """Finder of successive state messages of the known layout in the bytes of a chunk."""
 
     def __init__(self, channel: int) -> None:
-        """channel: the MCAP channel of the state messages in this file."""
+        """Prepare for a file.  channel: MCAP channel of its state messages."""
         sample = _TEMPLATE.copy()
         sample["channel"] = channel
         fixed: StateRecords = np.zeros(1, dtype=RECORD)
@@ -288,7 +289,7 @@ class RowMatcher:
         self._expected = sample.view(np.uint8)[self._columns]
 
     def match(self, data: bytes, offset: int) -> StateRecords:
-        """Give the records that follow each other from ``offset`` on and have the layout, (n,) of `RECORD`."""
+        """Return the successive records with this layout from ``offset`` on, (n,) of `RECORD`."""
         count = (len(data) - offset) // RECORD.itemsize
         raw = np.frombuffer(data, np.uint8, count * RECORD.itemsize, offset).reshape(count, RECORD.itemsize)
         found = _count_matching(raw, self._columns, self._expected)

@@ -1,4 +1,4 @@
-"""Pictures of an aircraft: its envelope, its trims and modes over speed, and its responses to the controls."""
+"""Draw an aircraft: its envelope, trims and modes over airspeed, and responses to the controls."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -15,10 +15,13 @@ from logs import theme
 from logs.views.drawing import clean_style, new_figure
 from world.arrays import Floats
 
+# Bank angles of the turns, degrees.
 _BANKS_DEG = (15, 20, 30, 40)
+# Winds of the slopes over the ground, m/s.
 _WINDS = (-10.0, -5.0, 0.0, 5.0, 10.0)
-# Solid to dotted as `theme.SHADES` goes from dark to light.
+# Line styles from solid to dotted, in the order of `theme.SHADES` from dark to light.
 _DASHES: tuple[Any, ...] = ("-", (0, (7, 2)), (0, (4, 2)), (0, (2, 2)), (0, (1, 1.5)))
+# Marker of each mode.
 _MARKS = {"short period": "o", "phugoid": "s", "Dutch roll": "D", "roll-spiral": "P", "roll": "^", "spiral": "v"}
 _MODE_COLORS = dict(zip(_MARKS, theme.MODES, strict=True))
 _ROWS = {
@@ -35,7 +38,7 @@ _ROWS = {
 
 
 def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
-    """Four panels: slopes over airspeed by height, level speeds over height, slopes over the ground in wind, turns.
+    """Draw four panels: slopes over airspeed, level speeds over altitude, slopes over ground in wind, turn radii.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from logs.recording.example_log import example_log
@@ -117,9 +120,11 @@ def _turns(axes: Any, aircraft: Aircraft) -> None:
 
 
 def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[float, Sequence[Mode]]) -> Figure:
-    """Four panels: angle of attack and controls, throttle and power over airspeed; the modes' roots by airspeed.
+    """Draw four panels: angle of attack and controls, throttle and power, roots of the modes.
 
-    trims: in order of airspeed.  modes: by airspeed, m/s.
+    All panels but the roots are drawn over airspeed.
+
+    trims: trims in order of airspeed.  modes: modes by airspeed, m/s.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.characteristics import modes_at, trim_table
@@ -178,7 +183,7 @@ def _power(axes: Any, aircraft: Aircraft, speeds: Floats, trims: Sequence[TrimRo
 
 
 def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool) -> None:
-    """The upper half of the plane of roots; the slow ones near the origin on their own if not the whole."""
+    """Draw the upper half of the root plane: all modes, or only the slow ones near the origin."""
     slow = {"phugoid", "spiral", "roll-spiral"}
     labelled: set[str] = set()
     for speed, found in modes.items():
@@ -186,7 +191,7 @@ def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool)
         for mode in found:
             if not all_modes and mode.name not in slow:
                 continue
-            # Filled at the fastest speed, so that the way over speed can be followed.
+            # Markers are filled at the highest airspeed, to show the direction of the root locus.
             axes.plot(
                 mode.root.real,
                 mode.root.imag,
@@ -209,7 +214,9 @@ def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool)
 
 
 def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
-    """Return a column for each control; each panel one quantity's change from level flight, over time (s).
+    """Draw a column for each control.
+
+    A panel shows the change of one quantity from level flight over time (s).
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.characteristics import step_responses
@@ -262,7 +269,7 @@ def _step_title(step: StepResponse) -> str:
 
 
 def _legend_above(axes: Any, title: str, columns: int) -> None:
-    """Write the legend in the panel's upper part, and raise its upper limit until no line comes near it."""
+    """Write the legend in the upper part of the panel, and raise the axis limit to keep lines clear of it."""
     legend = axes.legend(title=title or None, loc="upper right", ncols=columns, columnspacing=1.2, handlelength=1.8)
     renderer = axes.figure.canvas.get_renderer()
     share = (axes.bbox.y1 - legend.get_window_extent(renderer).y0) / axes.bbox.height

@@ -1,7 +1,7 @@
 """A chart as plain data: panels of lines, bands, bars and dots with names, units and roles.
 
-Both renderers draw what is described here: `logs.views.drawing` with matplotlib, for PNG, SVG and paper, and the page's
-script with plotly.js, from `chart_json`.  A role is a word ("missile", "planned") that `logs.theme` gives a look.
+Two renderers draw a chart: `logs.views.drawing` with matplotlib, for PNG, SVG and paper, and the script of the page
+with plotly.js, from `chart_json`.  A role is a word ("missile", "planned") that `logs.theme` gives a look.
 """
 
 import math
@@ -19,25 +19,25 @@ Json = dict[str, Any]
 
 LayerKind = Literal["line", "band", "area", "bars", "dots", "rings", "dashes"]
 LabelRank = Literal["fail", "end", "number", "name"]
-# Blocks that a series is thinned to; each keeps its lowest and highest row.
+# Number of blocks that a series is thinned to; each block keeps its lowest and highest row.
 BLOCKS = 600
 
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """One thing that a panel shows.
+    """One graphical layer of a panel.
 
-    kind: "band" is filled from `low` up to `y`, "area" is the inside of closed outlines, "dashes" are short level
-    strokes, "rings" mark what fails.
-    name: in legend and read-out; "" leaves it out of both.
-    role: what it stands for, which `logs.theme` gives its look.
-    x, y: (n,) in the panel's units; NaN parts a line or an outline.
+    kind: "band" is filled from `low` up to `y`, "area" is the inside of closed outlines, "dashes" are short horizontal
+    strokes, "rings" mark failures.
+    name: name in legend and read-out; "" leaves the layer out of both.
+    role: meaning of the layer; `logs.theme` assigns its look.
+    x, y: (n,) in the panel's units; NaN separates parts of a line or an outline.
     low: (n,) lower edge of a band.
-    dashed: the second of two lines of one role.
-    quiet: in the legend, and not in the page's read-out.
-    legend: what the legend calls several layers together; "" for the name.
-    words: what the page says of each point, or of the whole where it is one; none for its values.
-    flight: of a map, number of the flight whose moments are the points; the page has them already.
+    dashed: True for the second of two lines of one role.
+    quiet: True for a layer in the legend but not in the read-out of the page.
+    legend: common legend text of several layers; "" for the name.
+    words: text of the page on each point, or one text on the whole layer; empty to show the values.
+    flight: in a map, the number of the flight whose moments are the points; the page already has them.
     """
 
     kind: LayerKind
@@ -55,10 +55,12 @@ class Layer:
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A name written at a place of a panel, moved aside where others stand; a "name" is left out where none is free.
+    """A text at a position of a panel, moved away from other labels.
 
-    rank: "fail" is framed, "end" and "number" are bold; the page writes those two and tells the rest when pointed at.
-    prefer: direction that is tried first, (0, 0) for its middle.
+    A "name" without free space is left out.
+
+    rank: "fail" is framed, "end" and "number" are bold; the page writes these two and shows the others on hover.
+    prefer: direction tried first; (0, 0) centers the text on the position.
     """
 
     text: str
@@ -73,14 +75,14 @@ class Label:
 class Panel:
     """Layers over one pair of axes.
 
-    title, unit: of what is shown upwards; unit "" for none.
-    layers: from the lowest.
-    limits: level lines, label and value.
-    min_span: the smallest range of values that it shows where `span` is not given.
-    span: the range shown upwards, (low, high); None for what layers and limits need.
-    along: of the level axis where the panels share none, else "".
-    note: what the panel does not show; "" for nothing.
-    labels: the most important first.
+    title, unit: quantity and unit of the vertical axis; unit "" for none.
+    layers: layers from the lowest.
+    limits: label and value of horizontal lines.
+    min_span: smallest range of values shown if `span` is not given.
+    span: range of the vertical axis, (low, high); None for the range that layers and limits need.
+    along: title of the horizontal axis if the panels do not share one, else "".
+    note: note on values that the panel does not show; "" for none.
+    labels: labels, the most important first.
     """
 
     title: str
@@ -121,17 +123,17 @@ class Panel:
 class Chart:
     """Panels one above the other, or side by side.
 
-    title: of a picture; a page has headings of its own.
-    along, unit: what the level axis shows, and its unit, of panels that share one.
-    reach: range of that axis; None for what the layers need.
-    shared: whether the panels share the level axis: zoomed and read out together.
-    marks: where legs begin, as value along the axis and words.
-    timed: whether the level axis is the time of flight, so that a click on it can move the aircraft there.
+    title: title of a picture; a page has its own headings.
+    along, unit: quantity and unit of a shared horizontal axis.
+    reach: range of that axis; None for the range that the layers need.
+    shared: True if the panels share the horizontal axis: they are zoomed and read out together.
+    marks: starts of legs, as value along the axis and text.
+    timed: True if the horizontal axis is the time of flight, so that a click on it can move the aircraft there.
     tall: height of a panel on a page, pixels.
-    inches: height of a panel in print.
-    widths: of panels that stand side by side in print, as shares of its width; none where they are stacked.
-    legend: in print, right of each panel (once above all where they share it), or below all.
-    scaled: whether print says how many times heights are stretched against distances.
+    inches: height of a panel in print, inches.
+    widths: widths of panels side by side in print, as fractions of its width; empty for stacked panels.
+    legend: position in print: right of each panel (once above all if the panels share it), or below all.
+    scaled: True if print states the factor by which heights are stretched against distances.
     """
 
     title: str
@@ -149,7 +151,7 @@ class Chart:
     scaled: bool = False
 
     def shown_panels(self) -> tuple[Panel, ...]:
-        """Return the panels that have a value; the first where none has any."""
+        """Return the panels that have a value, or the first panel if none has any."""
         return tuple(panel for panel in self.panels if panel.has_values()) or self.panels[:1]
 
     def shown_reach(self) -> tuple[float, float]:
@@ -172,14 +174,14 @@ def series(name: str, role: str, along: Floats, values: ArrayLike, **more: Any) 
 
 
 def filled_series(name: str, role: str, along: Floats, values: ArrayLike) -> Layer:
-    """As `series`, filled from zero."""
+    """Return a line as `series` does, filled from zero."""
     column = np.asarray(values, dtype=np.float64)
     rows = outline_rows(column, BLOCKS)
     return Layer("band", name, role, along[rows], column[rows], np.zeros(len(rows)))
 
 
 def parted(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Return lines (k, 2) one behind another, a gap behind each: x and y of one layer.
+    """Join lines (k, 2), with a gap after each, and return x and y of one layer.
 
     >>> x, y = parted([np.zeros((2, 2)), np.ones((1, 2))])
     >>> x.tolist()
@@ -191,7 +193,7 @@ def parted(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
 
 
 def held_band(held: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
-    """Stretches of a long axis (t,) that a panel shades over all its height."""
+    """Shade the stretches of a long axis (t,) at which a control is held at its limit, over the full height."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(np.int8)))
     starts, ends = along[edges[::2]], along[edges[1::2] - 1]
     gap = np.full(len(starts), np.nan)
@@ -209,7 +211,7 @@ def leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...
 def outline_rows(values: ArrayLike, count: int) -> Indices:
     """Return rows that keep the outline of a long series: lowest and highest of each of `count` equal blocks, in order.
 
-    values: (t,); rows that are NaN are left out unless a block has nothing else.  Short series come back in full.
+    values: (t,); NaN rows are left out unless a block has no other rows.  All rows of a short series are returned.
     """
     column = np.asarray(values, dtype=np.float64)
     if column.size <= 2 * count:
@@ -219,14 +221,14 @@ def outline_rows(values: ArrayLike, count: int) -> Indices:
     rows = starts[:, None] + np.arange(np.diff(edges).max())
     blocks = column[np.minimum(rows, column.size - 1)]
     known = (rows < ends[:, None]) & np.isfinite(blocks)
-    # A block with nothing known keeps its first row.
+    # A block without known values keeps its first row.
     lowest = starts + np.where(known, blocks, np.inf).argmin(axis=1)
     highest = starts + np.where(known, blocks, -np.inf).argmax(axis=1)
     return np.unique(np.concatenate([[0, column.size - 1], lowest, highest]))
 
 
 def nice_step(span: float, parts: int) -> float:
-    """Find the step of 1, 2 or 5 times a power of ten that cuts `span` into at most `parts` pieces."""
+    """Return the step of 1, 2 or 5 times a power of ten that cuts `span` into at most `parts` pieces."""
     raw = max(span, 1e-9) / parts
     power = 10.0 ** np.floor(np.log10(raw))
     for factor in (1.0, 2.0, 5.0, 10.0):
@@ -245,7 +247,7 @@ def shorten(text: str, length: int) -> str:
 
 
 def numbers(values: Iterable[float], digits: int) -> list[float | None]:
-    """Return numbers for JSON: rounded, None for what is not finite.
+    """Return numbers for JSON: rounded, with None for non-finite values.
 
     >>> numbers([1.26, math.nan], 1)
     [1.3, None]
@@ -255,7 +257,7 @@ def numbers(values: Iterable[float], digits: int) -> list[float | None]:
 
 
 def telling_digits(values: Floats) -> int:
-    """Decimals that show a ten-thousandth of the range of values: as fine as a screen can.
+    """Return the decimals that show a ten-thousandth of the range of values, the resolution of a screen.
 
     >>> telling_digits(np.array([0.0, 90.0])), telling_digits(np.array([0.001, 0.002]))
     (3, 7)
@@ -267,7 +269,7 @@ def telling_digits(values: Floats) -> int:
 
 
 def chart_json(chart: Chart) -> Json:
-    """Return the chart as what JSON can hold.
+    """Return the chart as JSON data.
 
     >>> line = Layer("line", "flown", "flown", np.array([0.0, 1.0]), np.array([2.0, np.nan]))
     >>> made = chart_json(Chart("a flight", "time", "s", (Panel("bank", "°", (line,)),)))
@@ -286,7 +288,7 @@ def chart_json(chart: Chart) -> Json:
 
 
 def panel_json(panel: Panel) -> Json:
-    """Return a panel as what JSON can hold; layers without a value and limits that are NaN are left out."""
+    """Return a panel as JSON data; layers without a value and NaN limits are left out."""
     labels = [label for label in panel.labels if label.rank in ("end", "number")]
     return {
         "title": panel.title,
@@ -313,7 +315,7 @@ def _layer_json(layer: Layer) -> Json:
 
 @dataclass(frozen=True, slots=True)
 class LegendEntry:
-    """One line of a legend: its text and the layers that it stands for, of which one is drawn."""
+    """One line of a legend: its text and its layers, of which one is drawn."""
 
     text: str
     layers: tuple[Layer, ...] = field(default=())

@@ -1,4 +1,4 @@
-"""Two flights in one chart: over the first one's map, over the distance flown, and as flown and simulated."""
+"""Chart two flights together: on one map, over the distance flown, and as flown and simulated."""
 
 from dataclasses import dataclass, replace
 
@@ -16,12 +16,13 @@ from world.arrays import Floats
 
 # Roles of the first and the second flight.
 ROLES = ("flown", "other")
+# Number of points along the distance flown.
 _POINTS = 3000
 
 
 @dataclass(frozen=True, slots=True)
 class NamedFlight:
-    """A flight to draw, and the name that its lines have in the legend."""
+    """A flight to draw, and the name of its lines in the legend."""
 
     name: str
     setup: FlightSetup
@@ -29,7 +30,7 @@ class NamedFlight:
 
 
 def both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
-    """Return the first flight's map and route with both tracks over it, and both winds where they differ."""
+    """Return map and route of the first flight with both tracks, and both winds if they differ."""
     first, _ = flights
     winds = [
         NamedWind(flight.setup.scenario.wind, flight.name, role) for flight, role in zip(flights, ROLES, strict=True)
@@ -51,9 +52,9 @@ def both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
 
 
 def both_along(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
-    """Return height, height above ground, airspeed, bank, cross-track and throttle of both over the distance flown.
+    """Return altitude, height above ground, airspeed, bank, cross-track error and throttle of both over distance flown.
 
-    Without terrain, that of the height above it is left out.
+    Without terrain there is no panel of the height above ground.
     """
     flown = [_distance(flight.track) for flight in flights]
     along = np.linspace(0.0, max(float(distance[-1]) for distance in flown), _POINTS)
@@ -100,9 +101,9 @@ def _above(flight: NamedFlight) -> Floats:
     return np.asarray(position[:, 2] - terrain.height(position[:, 0], position[:, 1]))
 
 
-# An imported flight and the model's of the same mission: a chart for each quantity, over the way.
+# An imported flight and the simulated flight of the same mission: one chart a quantity, over the distance.
 
-# File name, field of a profile, title, unit, factor, smallest range that is shown.
+# File name, field of a profile, title, unit, factor, smallest range shown.
 _REFLOWN = (
     ("refly-cross-track.png", "cross_track", "right of the legs", "m", 1.0, 4.0),
     ("refly-height.png", "height_error", "above the legs", "m", 1.0, 4.0),
@@ -113,7 +114,9 @@ _REFLOWN = (
 
 
 def refly_charts(again: Reflight) -> dict[str, Chart]:
-    """Return each quantity over the way, as flown and as simulated, by the name of its PNG; only what the log holds.
+    """Return charts over the distance, as flown and as simulated, by name of the PNG.
+
+    Quantities that the log lacks have no chart.
 
     >>> from flight.simulation.setup import MissionStretch
     >>> from logs.recording.example_log import example_log

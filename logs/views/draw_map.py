@@ -1,4 +1,4 @@
-"""The map as PNG and SVG: relief with contours, what the description puts on it, compass, colour bar and legend."""
+"""Draw the map: relief with contours, layers of the chart, compass, colour bar and legend."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -19,22 +19,28 @@ from logs.views.relief import relief
 from world.arrays import Floats
 from world.terrain import Terrain
 
-# Inches: the map's own width, what stands around it, its legend, and the column beside it.
+# Margin left of the map, inches.
 _LEFT = 0.72
+# Width of the map, inches.
 _MAP_WIDTH = 7.72
+# Margin above the map, inches.
 _TOP = 0.5
+# Margin below the map, inches.
 _BOTTOM = 0.55
+# Least height of the legend, inches.
 _LEGEND = 1.0
+# Left edge of the column right of the map, inches.
 _COLUMN = 8.72
-# Inches of a line of the legend.
+# Height of a line of the legend, inches.
 _LEGEND_LINE = 0.165
+# Least height of the map, inches.
 _MIN_HEIGHT = 3.6
-# Inches from a line of the wind's note to the next.
+# Line spacing of the notes on winds, inches.
 _LINE = 0.145
 
 
 def draw_map(chart: MapChart) -> Figure:
-    """Top view, north up, equal scales, axes in m labelled in km from the scenario's origin."""
+    """Draw the top view: north up, equal scales, axes in m labelled in km from the scenario's origin."""
     with clean_style():
         handles = [legend_handle(entry) for entry in legend_entries([chart.panel])]
         legend = _legend_height(handles)
@@ -51,13 +57,16 @@ def draw_map(chart: MapChart) -> Figure:
 
 
 def _legend_height(handles: list[Any]) -> float:
-    """Inches that a legend of four columns takes, the contours' entry included; `_LEGEND` at least."""
+    """Return the height (inches) of a legend of four columns with contours, at least `_LEGEND`."""
     lines = [1 + str(handle.get_label()).count("\n") for handle in handles] + [1]
     return max(_LEGEND, 0.08 + _LEGEND_LINE * max(int(column.sum()) for column in np.array_split(lines, 4)))
 
 
 def map_frame(east: tuple[float, float], north: tuple[float, float], legend: float) -> tuple[Figure, Any]:
-    """Figure and axes of a map of these ranges (m).  legend: inches below it."""
+    """Make figure and axes of a map with these ranges (m).
+
+    legend: height of the legend below the map, inches.
+    """
     height = _MAP_WIDTH * (north[1] - north[0]) / (east[1] - east[0])
     tall = max(height, _MIN_HEIGHT)
     total = _TOP + tall + _BOTTOM + legend
@@ -74,9 +83,10 @@ def map_frame(east: tuple[float, float], north: tuple[float, float], legend: flo
 
 
 def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: float, top: float) -> list[Any]:
-    """Shaded heights with labelled contours and a colour bar, or a note where there is no terrain.
+    """Draw shaded relief with labelled contours and a colour bar, or a note if there is no terrain.
 
-    column: left edge (inches) of the column beside the map.  top: inches above it.  Returns what the legend shows.
+    column: left edge of the column right of the map, inches.  top: margin above the map, inches.
+    Returns the handles for the legend.
     """
     note: dict[str, Any] = {"x": column / WIDTH, "y": 0.6, "color": theme.colour("quiet")}
     east_range, north_range = axes.get_xlim(), axes.get_ylim()
@@ -125,9 +135,9 @@ def _colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, column:
 
 
 def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, legend: float = 0.0) -> None:
-    """Show north, and where each wind blows to, in the column (its left edge in inches) beside the map.
+    """Draw north and the direction of each wind in the column right of the map (left edge in inches).
 
-    legend: inches below the map, which the notes on the winds stay above: it may reach below them.
+    legend: height of the legend below the map, inches; the notes on winds stay above its upper edge.
     """
     total = float(figure.get_figheight())
     side = 1.0
@@ -145,7 +155,7 @@ def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, lege
     blowing = [named for named in winds if named.wind.speed > 0.0]
     for k, named in enumerate(blowing):
         east, north = np.sin(named.wind.from_course), np.cos(named.wind.from_course)
-        # A second arrow is dashed and shorter, so that both show where they lie on each other.
+        # The second arrow is dashed and shorter, so that both show if they overlap.
         arrow: dict[str, Any] = {"arrowstyle": "-|>", "linewidth": 1.8, "shrinkA": 0, "shrinkB": 0}
         arrow |= {"color": theme.colour(named.role), "linestyle": (0, (3, 1.5)) if k else "-"}
         length = 0.8 - 0.25 * k

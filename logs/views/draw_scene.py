@@ -1,4 +1,4 @@
-"""The 3-D picture: ground, threats, plan and flight from aside, for paper and for where no script runs."""
+"""Draw the 3-D picture for paper and pages without scripts: ground, threats, plan and flight."""
 
 import math
 from dataclasses import dataclass
@@ -23,18 +23,27 @@ from world.airspace.zones_on_map import zone_walls
 from world.arrays import Floats
 from world.terrain import Terrain
 
+# Margin left of the picture, inches.
 _LEFT = 0.15
+# Margin right of the picture, inches.
 _RIGHT = 0.15
+# Margin above the picture, inches.
 _TOP = 0.5
+# Margin below the picture, inches.
 _BOTTOM = 0.8
+# Elevation of the view, rad.
 _ELEVATION = math.radians(36.0)
+# Largest number of ground samples along a side.
 _MAX_CELLS = 130
+# Largest number of drawn points of the track.
 _MAX_TRACK = 1600
-# Of the ground drawn, the shorter side of the longer one, at least; what is narrower is seen from this much further
-# round, rad.
-_MIN_SIDE = 0.3
-_ASLANT = math.radians(45.0)
+# Smallest ratio of the shorter to the longer side of the drawn ground.
+_MIN_SIDE_RATIO = 0.3
+# Additional azimuth of the view of a narrower scene, rad.
+_NARROW_SCENE_AZIMUTH_RAD = math.radians(45.0)
+# With more waypoints than this, only every n-th waypoint is numbered.
 _MAX_NUMBERS = 40
+# Largest number of named threats.
 _MAX_NAMES = 30
 
 
@@ -42,8 +51,8 @@ _MAX_NAMES = 30
 class Projection:
     """A parallel projection.
 
-    azimuth: rad, from east to north, of the direction from the middle to the viewer.  middle: (3,) m.  stretch: of
-    heights.
+    azimuth: direction from the center to the viewer, rad, from east to north.  middle: center (3,), m.  stretch: factor
+    on heights.
     """
 
     azimuth: float
@@ -51,7 +60,7 @@ class Projection:
     stretch: float
 
     def project(self, points: Floats) -> Floats:
-        """Picture coordinates in m and, as the third, depth towards the viewer: (..., 3) from (..., 3)."""
+        """Return picture coordinates and depth towards the viewer, m: (..., 3) from points (..., 3)."""
         e, n, u = np.moveaxis(points - self.middle, -1, 0)
         out, side = math.cos(self.azimuth), math.sin(self.azimuth)
         across = -side * e + out * n
@@ -62,15 +71,17 @@ class Projection:
 
     @property
     def toward(self) -> Floats:
-        """Step in world axes, 1 m on the ground, that leads to the viewer."""
+        """Step towards the viewer in world axes, 1 m long on the ground."""
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth), math.tan(_ELEVATION) / self.stretch])
 
 
 def draw_scene(view: SceneView) -> Figure:
-    """Draw the scene from aside of the line from start to destination, heights stretched by the factor in the title.
+    """Draw the scene from the side of the line from start to destination.
 
-    Lines are dashed and thin behind a ridge.  A long and narrow scene is seen more from its end, with ground about it,
-    so that it is no strip.
+    The title states the stretch of heights.
+
+    Lines are dashed and thin behind a ridge.  A long and narrow scene is seen more from its end, with ground around it,
+    so that it does not appear as a strip.
     """
     setup, track, failed = view.setup, view.track, view.failed
     all_of_it = scene_bounds(setup, track)
@@ -97,9 +108,9 @@ def draw_scene(view: SceneView) -> Figure:
 
 
 def _widened(bounds: Floats) -> Floats:
-    """Return ground about a narrow scene, (2, 2) m: no side is less than a share of the other."""
+    """Widen the bounds of a narrow scene, (2, 2) m, to the smallest allowed ratio of the sides."""
     sides = np.ptp(bounds, axis=1)
-    more = 0.5 * np.maximum(_MIN_SIDE * sides.max() - sides, 0.0)
+    more = 0.5 * np.maximum(_MIN_SIDE_RATIO * sides.max() - sides, 0.0)
     return np.asarray(bounds + np.stack([-more, more], axis=1))
 
 
@@ -108,7 +119,7 @@ def _projection(route: Floats, bounds: Floats, stretch: float, narrow: bool) -> 
     azimuth = math.atan2(step[1], step[0]) - math.pi / 2.0
     if math.sin(azimuth) > 0.0:
         azimuth += math.pi
-    azimuth += _ASLANT if narrow else 0.0
+    azimuth += _NARROW_SCENE_AZIMUTH_RAD if narrow else 0.0
     return Projection(azimuth, np.array([*bounds.mean(axis=1), float(route[:, 2].mean())]), stretch)
 
 
@@ -132,7 +143,7 @@ def _frame(setup: FlightSetup, projection: Projection, bounds: Floats, grid: Gro
     padding = 0.03 * float((most - least).max())
     least, most = least - padding, most + padding
     wide = WIDTH - _LEFT - _RIGHT
-    # A flat scene gets air above and below it.
+    # Add space above and below a flat scene.
     short = max(0.0, 3.0 / wide * (most[0] - least[0]) - (most[1] - least[1]))
     least[1], most[1] = least[1] - 0.5 * short, most[1] + 0.5 * short
     tall = float(np.clip(wide * (most[1] - least[1]) / (most[0] - least[0]), 3.0, 8.0))
@@ -148,7 +159,7 @@ def _frame(setup: FlightSetup, projection: Projection, bounds: Floats, grid: Gro
 
 
 def _ground_surface(axes: Any, projection: Projection, grid: GroundGrid | None, bounds: Floats) -> list[Any]:
-    """Cells from the farthest to the nearest, shaded by light from the north-west."""
+    """Draw the cells of the ground from the farthest to the nearest, shaded by light from the north-west."""
     if grid is None:
         base = float(projection.middle[2])
         corners = np.array(
@@ -177,7 +188,7 @@ def _ground_surface(axes: Any, projection: Projection, grid: GroundGrid | None, 
     faces = 0.25 * (colours[:-1, :-1] + colours[:-1, 1:] + colours[1:, 1:] + colours[1:, :-1]).reshape(-1, 4)
     good = np.isfinite(cells).all(axis=(1, 2))
     order = np.flatnonzero(good)[np.argsort(cells[good][:, :, 2].mean(axis=1), kind="stable")]
-    # Edges in the cells' own colour close the seams that antialiasing leaves.
+    # Draw edges in the colour of the cells, to close the seams left by antialiasing.
     axes.add_collection(
         PolyCollection(
             list(cells[order][:, :, :2]),
@@ -192,10 +203,13 @@ def _ground_surface(axes: Any, projection: Projection, grid: GroundGrid | None, 
 
 
 def _threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Failures) -> list[Any]:
-    """Outlines of the spheres' upper halves, on the height of their centres; broad where they are entered."""
+    """Draw outlines of the upper halves of spheres, at the altitude of their centers.
+
+    Entered spheres are broad.
+    """
     threats = setup.scenario.threats
     handles: list[Any] = []
-    # A stretched dome of radius 1: the far half of its outline, and the near half of its foot.
+    # Stretched dome of radius 1: far half of its outline, and near half of its base.
     tall = math.hypot(math.sin(_ELEVATION), projection.stretch * math.cos(_ELEVATION))
     round_it = np.linspace(0.0, 2.0 * math.pi, 97)
     high = np.where(round_it < math.pi, tall, math.sin(_ELEVATION)) * np.sin(round_it)
@@ -219,7 +233,7 @@ def _threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Fail
 
 
 def _zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
-    """Walls of the zones, from ground or floor to the ceiling, or to above the path."""
+    """Draw walls of the zones, from ground or floor to the ceiling, or to above the path."""
     zones, route = setup.scenario.zones, setup.route.waypoints
     low, top = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0
     for zone in zones:
@@ -239,13 +253,13 @@ def _zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
 
 
 def _handle(kind: LayerKind, role: str, text: str) -> Any:
-    """Return a line of the legend."""
+    """Return the handle of a line in the legend."""
     none = np.zeros(0)
     return legend_handle(LegendEntry(text, (Layer(kind, text, role, none, none),)))
 
 
 def _hidden(projection: Projection, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:
-    """Return whether the ground hides each point (n, 3) from the viewer."""
+    """Return flags of the points (n, 3) that the ground hides from the viewer."""
     hidden = np.zeros(len(points), dtype=bool)
     if terrain is None:
         return hidden
@@ -316,7 +330,7 @@ def _line(
     projected = projection.project(points)
     hidden = _hidden(projection, terrain, points)
     open_part = np.where(hidden[:, None], np.nan, projected[:, :2])
-    # The hidden rows and their neighbours, so that the two parts meet.
+    # Include the neighbours of hidden rows, so that the two parts meet.
     near = hidden | np.roll(hidden, 1) | np.roll(hidden, -1)
     shut_part = np.where(near[:, None], projected[:, :2], np.nan)
     axes.plot(*open_part.T, color=colour, linewidth=width, zorder=order, solid_capstyle="round")
@@ -339,7 +353,7 @@ def _labels(setup: FlightSetup, projection: Projection, route: Floats, failed: F
     threats = setup.scenario.threats
     entered = failed.threat_names()
     named = list(zip(threats.names, projection.project(threats.position), strict=True))
-    # Entered ones first: they have the best places.
+    # Entered spheres first: they get the best places.
     for k in sorted(range(min(len(named), _MAX_NAMES)), key=lambda k: k not in entered):
         name, point = named[k]
         write(shorten(name, 20), point, "number" if k in entered else "name", "fail" if k in entered else "ink")

@@ -1,4 +1,4 @@
-"""Charts as PNG and SVG: drawn with matplotlib from their descriptions, and the settings that all pictures share."""
+"""Draw charts as PNG and SVG with matplotlib, with settings that all pictures share."""
 
 import io
 import math
@@ -29,7 +29,7 @@ from logs.views.charts import Chart, Label, Layer, LegendEntry, Panel, legend_en
 from logs.views.labels import DPI, LabelPlacer
 from world.files import write_whole
 
-# Every picture is 10 in and 1500 px wide.
+# Width of every picture, inches; 1500 pixels.
 WIDTH = 10.0
 _SETTINGS: Any = {
     "font.family": ["DejaVu Sans"],
@@ -43,7 +43,7 @@ _SETTINGS: Any = {
     "grid.color": theme.colour("grid"),
     "grid.linewidth": 0.5,
     "text.color": theme.colour("ink"),
-    # A scenario's or a threat's name may hold a dollar sign; it is never a formula.
+    # The name of a scenario or threat may contain a dollar sign; it is never a formula.
     "text.parse_math": False,
     "xtick.color": theme.colour("ink"),
     "ytick.color": theme.colour("ink"),
@@ -52,32 +52,42 @@ _SETTINGS: Any = {
     "legend.fontsize": 8.0,
     "legend.frameon": False,
     "path.simplify": True,
-    # Names inside an SVG would be random.
+    # Without a salt the names inside an SVG are random.
     "svg.hashsalt": "planfly",
 }
-# Inches around the panels and between them; right of panels that have legends of their own there.
+# Margin left of the panels, inches.
 _LEFT = 0.85
+# Margin right of panels without legends there, inches.
 _RIGHT = 0.25
+# Margin above panels whose legends are at their right or above them, inches.
 _TOP = 0.72
+# Margin above panels with the legend below, inches.
 _PLAIN_TOP = 0.58
+# Margin below the panels, inches.
 _BOTTOM = 0.6
+# Gap between panels with a common axis, inches.
 _GAP = 0.2
+# Gap between panels with axes of their own, inches.
 _OWN_AXIS_GAP = 0.62
+# Margin right of panels with legends there, inches.
 _LEGENDS = 2.15
-# Inches: the legend above panels that share it, a line of one below them, and from a panel to the middle of its label.
+# Height of the common legend above the panels, inches.
 _SHARED_LEGEND = 0.28
+# Height of a line of a legend below the panels, inches.
 _LEGEND_LINE = 0.2
+# Distance from a panel to the center of its label, inches.
 _LABEL = 0.44
+# Marker of matplotlib by its name in the theme.
 _MARKERS = {"circle": "o", "triangle": "^", "star": "*", "cross": "x"}
-# Waypoints and legs that an axis can number.
+# Largest number of waypoints or legs that an axis numbers.
 _MAX_TICKS = 45
 
 
 @contextmanager
 def clean_style() -> Iterator[None]:
-    """Draw under matplotlib's own defaults and the settings above, whatever the user's matplotlibrc holds.
+    """Use matplotlib's defaults and the settings above instead of the user's matplotlibrc.
 
-    The settings in force before come back at the end.
+    The previous settings are restored at the end.
 
     >>> with clean_style():
     ...     mpl.rcParams["font.size"]
@@ -112,7 +122,9 @@ def png_bytes(figure: Figure) -> bytes:
 
 
 def few_colours(png: bytes) -> bytes:
-    """Return a PNG with 256 colours at most: of shaded ground a fifth of its size, with no difference to see on paper.
+    """Return a PNG with at most 256 colours.
+
+    Shaded ground then takes a fifth of its size, without a visible change on paper.
 
     >>> few_colours(png_bytes(new_figure(1.0)))[1:4]
     b'PNG'
@@ -130,9 +142,9 @@ def svg_bytes(figure: Figure) -> bytes:
 
 
 def page_svg(figure: Figure, words: str) -> str:
-    """The figure as an element of a page, in the colours of the page's style, light and dark (`theme.css_variables`).
+    """Return the figure as a page element, in the light and dark colours of the page (`theme.css_variables`).
 
-    words: what it shows, for those who do not see it.
+    words: description for readers who cannot see the figure.
 
     >>> page_svg(new_figure(2.0), "nothing")[:62]
     '<svg role="img" aria-label="nothing" viewBox="0 0 720 144" xml'
@@ -142,9 +154,9 @@ def page_svg(figure: Figure, words: str) -> str:
     opening, rest = text.split(">", 1)
     box = re.search(r'viewBox="[^"]*"', opening)
     names = re.findall(r'xmlns(?::\w+)?="[^"]*"', opening)
-    # Nobody asks for the names of groups, which would come twice in a page of several pictures.
+    # Remove the unused names of groups: they would be duplicates in a page of several pictures.
     drawn = re.sub(r'<g id="[^"]*"', "<g", re.sub(r"<metadata>.*?</metadata>", "", rest, flags=re.DOTALL))
-    # And those that are asked for are the picture's own.
+    # Make the used names unique to the picture.
     own = f"p{zlib.crc32(words.encode()):x}-"
     drawn = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{own}", drawn)
     head = " ".join(['<svg role="img"', f'aria-label="{escape(words)}"', box[0] if box else "", *sorted(names)])
@@ -154,7 +166,7 @@ def page_svg(figure: Figure, words: str) -> str:
 def _rendered(figure: Figure, kind: str, metadata: Any) -> bytes:
     buffer = io.BytesIO()
     with clean_style(), warnings.catch_warnings():
-        # A name in a script that the font lacks shows as boxes; that is no reason to stop or to talk.
+        # A name in letters that the font lacks shows as boxes, without a warning.
         warnings.filterwarnings("ignore", message="Glyph .* missing from font", category=UserWarning)
         figure.savefig(buffer, format=kind, dpi=DPI, metadata=metadata)
     return buffer.getvalue()
@@ -173,9 +185,9 @@ def write_png(figure: Figure, path: FilePath) -> None:
 
 
 def draw_chart(chart: Chart) -> Figure:
-    """Draw a chart of panels; those without a value are left out, as far as another has any.
+    """Draw a chart of panels; panels without a value are left out if another one has any.
 
-    Where each look means one thing in all stacked panels, and some mean it in several, one legend stands above them.
+    Stacked panels get one common legend if each look has the same meaning in all, and some looks repeat.
     """
     panels = chart.shown_panels() if chart.panels else ()
     shared = chart.legend == "beside" and shares_legend(panels)
@@ -211,7 +223,7 @@ def draw_chart(chart: Chart) -> Figure:
 
 
 def _across(chart: Chart, k: int, right: float) -> tuple[float, float]:
-    """Left edge and width of a panel as shares of the picture's."""
+    """Return left edge and width of a panel as fractions of the width of the picture."""
     full = WIDTH - _LEFT - right
     if not chart.widths:
         return _LEFT / WIDTH, full / WIDTH
@@ -231,7 +243,7 @@ def _axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
 
 
 def shares_legend(panels: Sequence[Panel]) -> bool:
-    """Return True if one legend can stand for all panels: no look has two meanings, no meaning two looks, some repeat.
+    """Return True if all panels can share a legend: each look has one meaning, each meaning one look, and some repeat.
 
     >>> none = np.zeros(2)
     >>> flown, asked = Layer("line", "flown", "flown", none, none), Layer("line", "asked", "commanded", none, none)
@@ -286,7 +298,7 @@ def _wrapped(panel: Panel) -> list[str]:
 
 
 def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, numbered: bool) -> None:
-    """Part the legs by thin lines; number them above the topmost panel, as far as the numbers fit."""
+    """Separate the legs by thin lines, and number them above the topmost panel as far as the numbers fit."""
     for value, _ in marks[1:]:
         axes.axvline(value, color=theme.colour("rim"), linewidth=0.6, alpha=0.7, zorder=1)
     if not numbered or not marks:
@@ -305,7 +317,7 @@ def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, numbered: bool
 
 
 def _number_places(axes: Any, panel: Panel) -> None:
-    """Number the level axis by waypoints or legs; those that fail in their colour."""
+    """Number the horizontal axis by waypoints or legs, with failing ones in the colour of failures."""
     at = np.unique(np.concatenate([layer.x for layer in panel.layers]))
     failing = {float(x) for layer in panel.layers if layer.kind == "rings" for x in layer.x}
     step = -(-len(at) // _MAX_TICKS)
@@ -321,9 +333,9 @@ def _number_places(axes: Any, panel: Panel) -> None:
 
 
 def draw_layers(axes: Any, panel: Panel, above: float = 2.0) -> None:
-    """Draw a panel's layers from the lowest, and its limits over bands and under lines.
+    """Draw the layers of a panel from the lowest, with its limits between bands and lines.
 
-    above: matplotlib's order of the lowest.
+    above: zorder of the lowest layer.
     """
     for label, value in panel.limits:
         look = theme.LOOKS["limit"]
@@ -336,7 +348,7 @@ def draw_layers(axes: Any, panel: Panel, above: float = 2.0) -> None:
             zorder=above + 0.95,
         )
     for k, layer in enumerate(panel.layers):
-        # Bands lie below limits, all else above.
+        # Draw bands below the limits, and all other layers above them.
         low = layer.kind in ("band", "area") and layer.role != "terrain"
         order = above + (0.0 if low else 1.0) + 0.9 * k / len(panel.layers)
         _DRAWERS[layer.kind](
@@ -390,7 +402,7 @@ def _area_look(look: theme.Look) -> dict[str, Any]:
 
 
 def _draw_area(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
-    """All rings as one path, so that holes stay open."""
+    """Draw all rings as one path, so that holes stay open."""
     points = np.column_stack([layer.x, layer.y])
     gaps = np.flatnonzero(np.isnan(layer.x))
     rings = [ring[np.isfinite(ring[:, 0])] for ring in np.split(points, gaps)]
@@ -451,7 +463,7 @@ _DRAWERS: dict[str, Any] = {
 
 
 def write_labels(axes: Any, panel: Panel) -> None:
-    """Write a panel's names, the most important first, off each other and off the paths."""
+    """Write the labels of a panel, the most important first, clear of each other and of the paths."""
     placer = LabelPlacer(axes)
     for layer in panel.layers:
         if layer.kind == "line" and layer.role in ("planned", "flown", "other"):
@@ -461,7 +473,7 @@ def write_labels(axes: Any, panel: Panel) -> None:
 
 
 def write_label(placer: LabelPlacer, label: Label) -> None:
-    """Write one name as its rank asks."""
+    """Write one label in the style of its rank."""
     size, gap = theme.LABELS[label.rank]
     look: dict[str, Any] = {"size": size, "gap": gap if label.prefer != (0, 0) else 0.0, "prefer": label.prefer}
     look["color"] = theme.colour(label.role)
@@ -476,7 +488,7 @@ def write_label(placer: LabelPlacer, label: Label) -> None:
 
 
 def legend_handle(entry: LegendEntry) -> Any:
-    """Return what a legend shows beside an entry's text."""
+    """Return the handle that a legend shows next to the text of an entry."""
     layer = entry.layers[0]
     look, text = theme.LOOKS[layer.role], textwrap.fill(entry.text, 36)
     if layer.kind in ("band", "area"):
@@ -492,9 +504,9 @@ def legend_handle(entry: LegendEntry) -> Any:
 
 
 def draw_legend(figure: Figure, handles: list[Any], left: float, top: float, columns: int = 4) -> None:
-    """Write the legend below the picture, where it hides nothing.
+    """Draw the legend below the picture, where it hides nothing.
 
-    left: inches from the figure's edge.  top: its upper edge as a share of the figure's height.
+    left: distance from the edge of the figure, inches.  top: upper edge as a fraction of the height of the figure.
     """
     figure.legend(
         handles=handles,
@@ -510,7 +522,7 @@ def draw_legend(figure: Figure, handles: list[Any], left: float, top: float, col
 
 
 def _columns(entries: Sequence[LegendEntry]) -> int:
-    """Return the number of columns of a legend that fit into a picture, at most four."""
+    """Return the number of legend columns that fit into a picture, at most four."""
     for columns in (4, 3, 2):
         rows = -(-len(entries) // columns)
         widest = [max(len(e.text[:36]) for e in entries[k : k + rows]) for k in range(0, len(entries), rows or 1)]
@@ -534,7 +546,10 @@ def _legend_beside(axes: Any) -> None:
 
 
 def _legend_above(figure: Figure, top: float) -> None:
-    """Write each entry of the panels once, in a row.  top: its upper edge, of the figure's height."""
+    """Draw each entry of the panels once, in a row.
+
+    top: upper edge as a fraction of the height of the figure.
+    """
     entries = {
         str(label): handle
         for axes in figure.axes

@@ -1,4 +1,4 @@
-"""The aircraft's envelope and a flight in it: climb and descent over airspeed, and bank over airspeed."""
+"""Chart the aircraft's envelope and a flight in it: climb, descent and bank over airspeed."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,12 +11,16 @@ from logs.views.charts import Chart, Layer, Panel, shorten
 from world.arrays import Floats
 from world.geometry import leg_slopes
 
+# Largest number of drawn moments of a flight.
 _MAX_DOTS = 2000
 
 
 @dataclass(frozen=True, slots=True)
 class EnvelopeLine:
-    """Steepest steady path angles (°) at one height (m AMSL) over true airspeed (m/s), (120,); descents negative."""
+    """Steepest steady path angles (°) at one altitude (m AMSL) over true airspeed (m/s), (120,).
+
+    Descents have negative angles.
+    """
 
     amsl: int
     airspeed: Floats
@@ -25,7 +29,7 @@ class EnvelopeLine:
 
 
 def envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
-    """Return the envelope at the lowest and the highest height of the route."""
+    """Return the envelope at the lowest and the highest altitude of the route."""
     envelope, up = setup.envelope, setup.route.waypoints[:, 2]
     speeds = np.linspace(envelope.airspeed[0], envelope.airspeed[-1], 120)
     lines = []
@@ -37,7 +41,7 @@ def envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
 
 @dataclass(frozen=True, slots=True)
 class FlownMoments:
-    """True airspeed (m/s), path angle through the air and bank to either side (°) at moments of a flight, (n,) each."""
+    """True airspeed (m/s), air-relative path angle and absolute bank (°) at moments of a flight, (n,) each."""
 
     airspeed: Floats
     angle: Floats
@@ -45,7 +49,7 @@ class FlownMoments:
 
 
 def flown_moments(track: Track, count: int = _MAX_DOTS) -> FlownMoments:
-    """At most so many moments of a track, those that are numbers."""
+    """Return at most ``count`` moments of a track with finite values."""
     rows = np.unique(np.linspace(0, len(track) - 1, min(len(track), count)).astype(np.intp))
     air = (track.velocity[rows] - track.wind[rows]).astype(np.float64)
     east, north, up = air.T
@@ -58,10 +62,10 @@ def flown_moments(track: Track, count: int = _MAX_DOTS) -> FlownMoments:
 
 
 def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
-    """Two panels over true airspeed (m/s): path angle through the air with the trims' limits, and bank with its limit.
+    """Return two panels over true airspeed (m/s): air-relative path angle and bank, with their limits.
 
-    Limits at the lowest and highest height of the route.  Dots: the flight, one each fraction of a second; a pull-up
-    or a gust may stand outside for a moment, a leg may not.
+    Limits apply at the lowest and highest altitude of the route.  Dots are moments of the flight; a pull-up or a gust
+    may exceed the limits for a moment, a leg may not.
 
     >>> from logs.recording.example_log import example_log
     >>> [panel.title for panel in envelope_chart(example_log().setup, None).panels]

@@ -1,4 +1,4 @@
-"""Places of a verdict's failures on a route, their names in charts, and the progress of a flight along the route."""
+"""Find the places of failures on a route, their names in charts, and the progress of a flight."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ from world.arrays import Floats
 from world.geometry import leg_runs
 from world.threats import Threats
 
-# More labels than these would cover the places that they describe.
+# Largest number of labels; more would cover the places that they describe.
 _MAX_LABELS = 16
 
 
@@ -25,8 +25,8 @@ _MAX_LABELS = 16
 class Failures:
     """Rules that failed, by leg and by waypoint number (each rule once, in the verdict's order).
 
-    threats: missiles and radars whose reach was entered, each once.
-    places: of legs and waypoints that fail, by kind and number, as the verdict has them.
+    threats: missiles and radars whose range was entered, each once.
+    places: failing legs and waypoints by kind and number, as in the verdict.
     """
 
     legs: dict[int, tuple[str, ...]]
@@ -35,7 +35,7 @@ class Failures:
     places: dict[tuple[PlaceKind, int], Place] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
-        """Something failed at a place."""
+        """Return True if anything failed at a place."""
         return bool(self.legs or self.waypoints or self.threats)
 
     def name(self, kind: PlaceKind, number: int) -> str:
@@ -55,7 +55,7 @@ class Failures:
 
 
 def failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
-    """Find the failing places of a verdict; places that the route does not have are left out."""
+    """Find the failing places of a verdict; places outside the route are left out."""
     failed = [finding for finding in verdict.findings if finding.ok is False] if verdict is not None else []
     places = [finding.place for finding in failed if finding.place.index is not None]
     return Failures(
@@ -80,7 +80,7 @@ def _rules_at(failed: list[Finding], kind: PlaceKind, count: int) -> dict[int, t
 
 
 def stop_rows(stops: Sequence[int]) -> list[int]:
-    """Return waypoints at which a stop begins: of a loiter's corners the first.
+    """Return the waypoints at which a stop begins: for a loiter, the first of its corners.
 
     stops: number of the stop of each waypoint, in flying order.
 
@@ -91,12 +91,12 @@ def stop_rows(stops: Sequence[int]) -> list[int]:
 
 
 def route_distance(waypoints: Floats) -> Floats:
-    """Horizontal distance of each waypoint along the route, (w,) m."""
+    """Return the horizontal distance of each waypoint along the route, (w,) m."""
     return np.concatenate([[0.0], np.cumsum(leg_runs(waypoints))])
 
 
 def route_samples(waypoints: Floats, step: float) -> tuple[Floats, Floats]:
-    """Points along the route: distance (s,) m and position (s, 3) m, at most `step` apart, waypoints included."""
+    """Return distance (s,) m and position (s, 3) m of waypoints and points between, at most `step` apart."""
     at = route_distance(waypoints)
     count = max(2, int(np.ceil(at[-1] / step)) + 1) if at[-1] > 0.0 else 2
     distance = np.union1d(np.linspace(0.0, at[-1], count), at)
@@ -104,7 +104,7 @@ def route_samples(waypoints: Floats, step: float) -> tuple[Floats, Floats]:
 
 
 def paths_differ(a: Floats, b: Floats, tolerance: float) -> bool:
-    """Return True if a corner of one path is further than `tolerance` (m) from the other, in any order.
+    """Return True if any corner of either path is further than `tolerance` (m) from the other path.
 
     a, b: (n, 3) and (m, 3) m.
     """
@@ -112,7 +112,7 @@ def paths_differ(a: Floats, b: Floats, tolerance: float) -> bool:
 
 
 def _farthest(points: Floats, path: Floats) -> float:
-    """Return largest distance (m) from any of the points to the path."""
+    """Return the largest distance (m) of the points from the path."""
     start, step = path[:-1], np.diff(path, axis=0)
     length2 = (step**2).sum(axis=1)
     farthest = 0.0
@@ -144,7 +144,8 @@ def track_distance(waypoints: Floats, track: Track) -> Floats:
 def fail_labels(failed: Failures, corners: Floats, threats_at: Mapping[int, tuple[float, float]]) -> tuple[Label, ...]:
     """Name the failing rules at the first failing legs, threats and waypoints, as in the verdict.
 
-    corners: (w, 2) drawn positions of the route's waypoints.  threats_at: of threats by their index; others get none.
+    corners: (w, 2) drawn positions of the route's waypoints.  threats_at: positions of threats by index; other
+    threats get no label.
     """
     middles = 0.5 * (corners[:-1] + corners[1:])
     labels = [(f"{failed.name('leg', k)}: {', '.join(rules)}", *middles[k]) for k, rules in failed.legs.items()]
@@ -162,7 +163,7 @@ def radius_of(threats: Threats, place: Place) -> float:
 
 
 def inside_threats(failed: Failures, threats: Threats, track: Track) -> NDArray[np.bool_]:
-    """Return rows (t,) of the track inside a sphere whose rule fails."""
+    """Return flags (t,) of the rows of the track inside a sphere whose rule fails."""
     inside = np.zeros(len(track), dtype=bool)
     for place in failed.threats:
         away = track.position - threats.position[place.index or 0]

@@ -1,7 +1,7 @@
-"""The figures of a plan and its flight: one list, which PNG files, the page's charts and its captions read.
+"""List the figures of a plan and its flight, for PNG files and for charts and captions of the page.
 
-A figure is described by a builder in a module of its own (`logs.views.profile`, ...) and drawn by both renderers.
-To add one, write its module and one entry here.
+Each figure has a module of its own that builds its description (`logs.views.profile`, ...); both renderers draw it.
+To add a figure, write its module and one entry here.
 """
 
 from collections.abc import Callable, Mapping
@@ -36,11 +36,11 @@ View = Chart | MapChart | SceneView
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """Data that figures are drawn of.
+    """Data for the figures.
 
-    setup: with the mission's fence among the zones.
-    track: with at least one row; None for a plan that was not flown.
-    returns: None where none were judged.
+    setup: setup with the mission's fence among the zones.
+    track: track of at least one row; None for a plan that was not flown.
+    returns: judged returns; None if none were judged.
     """
 
     setup: FlightSetup
@@ -56,7 +56,7 @@ class Subject:
         return f"{ground}, {threats} threats, the planned path of {legs} legs{self.flown(' and the flown track')}."
 
     def flown(self, words: str, otherwise: str = "") -> str:
-        """Return words that are true of a flight, and others of a bare plan."""
+        """Return ``words`` for a flight, and ``otherwise`` for a plan that was not flown."""
         return words if self.track is not None else otherwise
 
 
@@ -64,12 +64,12 @@ class Subject:
 class FigureEntry:
     """One figure.
 
-    name: of its section in the page and of its file.
+    name: name of its section in the page and of its file.
     title: its heading.
-    view: builds its description; None where there is nothing to draw.
-    alternative: its text for those who cannot see it.
-    caption: how to read it.
-    file: whether it is a file, too, beside the page.
+    view: function that builds its description; None if there is nothing to draw.
+    alternative: text for readers who cannot see it.
+    caption: explanation of the figure.
+    file: True if the figure is also written as a file.
     """
 
     name: str
@@ -104,7 +104,7 @@ def _of_flight(build: Callable[[FlightSetup, Track], Chart | None]) -> Callable[
     return lambda subject: None if subject.track is None else build(subject.setup, subject.track)
 
 
-# What is drawn of returns, by the figure's name.
+# Builders of the figures on returns, by name.
 RETURN_FIGURES: dict[str, Callable[[FlightSetup, DrawnReturns, Track | None], View | None]] = {
     "returns": lambda setup, drawn, _: returns_map(setup, drawn),
     "worst-returns": lambda setup, drawn, _: worst_returns_chart(setup, drawn),
@@ -114,7 +114,7 @@ RETURN_FIGURES: dict[str, Callable[[FlightSetup, DrawnReturns, Track | None], Vi
 
 
 def return_views(setup: FlightSetup, drawn: DrawnReturns, track: Track | None) -> dict[str, View]:
-    """Descriptions of what is drawn of returns, by name; what has no data is left out."""
+    """Build the descriptions of figures on returns, by name; figures without data are left out."""
     setup = with_fence_zones(setup)
     found = ((name, build(setup, drawn, track)) for name, build in RETURN_FIGURES.items())
     return {name: view for name, view in found if view is not None and drawn.returns.each}
@@ -324,7 +324,9 @@ def subject_of(
 
 
 def figure_views(subject: Subject) -> dict[str, View]:
-    """Descriptions of all figures of a flight, or of a plan that was not flown, by name; what has no data is left out.
+    """Build the descriptions of all figures of a flight or of a plan, by name.
+
+    Figures without data are left out.
 
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.judge_geometry import judge_geometry
@@ -348,14 +350,14 @@ def draw(view: View) -> "Figure":
 
 
 def view_json(view: View) -> dict[str, Any]:
-    """Return a description as what JSON can hold, for the page."""
+    """Return a description as JSON data, for the page."""
     if isinstance(view, MapChart):
         return map_json(view)
     return scene_data(view) if isinstance(view, SceneView) else chart_json(view)
 
 
 def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, "Figure"]:
-    """Draw all figures by name, those that are files first; what has no data is left out."""
+    """Draw all figures by name, figures with a file first; figures without data are left out."""
     views = figure_views(subject_of(setup, track, verdict))
     order = sorted(FIGURES, key=lambda entry: not entry.file)
     return {entry.name: draw(views[entry.name]) for entry in order if entry.name in views}
@@ -364,7 +366,7 @@ def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> d
 def draw_pictures(views: Mapping[str, View], *, svg: bool = False) -> dict[str, bytes]:
     """Render figures, each 1500 px wide: file names (`map.png`) and bytes.
 
-    svg: those that are files as `map.svg` and so on, too.
+    svg: True to render the figures with a file as `map.svg` and so on, too.
     """
     from logs.views.drawing import png_bytes, svg_bytes
 

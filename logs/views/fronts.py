@@ -1,4 +1,4 @@
-"""A front of plans: all of them from above, and what each gains for its length."""
+"""Chart a front of plans: all plans from above, and the objectives of each over its length."""
 
 import math
 from dataclasses import dataclass
@@ -9,15 +9,17 @@ from logs.views.charts import Chart, Label, Layer, Panel
 from logs.views.map import MapChart, NamedWind, end_labels, map_extent, world_map
 from planner.search.plan_front import Front
 
+# One watt hour, J.
 _WATT_HOUR = 3600.0
-# What axes span at least: in s, m and Wh, and of the length as a share. Plans that are closer are alike.
+# Smallest range of an axis, s, m or Wh; plans that differ less are alike.
 LEAST_SPAN = 1.0
+# Smallest range of the axis of lengths, as a fraction of the length.
 LEAST_LENGTH = 0.01
 
 
 @dataclass(frozen=True, slots=True)
 class _Named:
-    """The best plan in one objective: its number from 0, what it is called, and its role."""
+    """Best plan in one objective: its number from 0, name and role."""
 
     row: int
     name: str
@@ -25,7 +27,10 @@ class _Named:
 
 
 def _named(front: Front) -> list[_Named]:
-    """Return the best plan in each objective; one that is best in two is named once, for the first."""
+    """Return the best plan in each objective.
+
+    A plan that is best in several is named for the first of them.
+    """
     rows = front.objectives()
     names = ("shortest", "least exposed", "highest above ground", f"least {front.fourth}")
     roles = ("front-shortest", "front-unseen", "front-high", "front-sparing")
@@ -38,7 +43,10 @@ def _named(front: Front) -> list[_Named]:
 
 
 def front_map(front: Front) -> MapChart:
-    """All plans of a front with at least one from above; the best in each objective stand out, with their numbers."""
+    """Return all plans of a non-empty front from above.
+
+    The best in each objective are numbered and stand out.
+    """
     scenario, named = front.plans[0].plan.scenario, _named(front)
     marked = {one.row for one in named}
     layers, labels = [], []
@@ -66,7 +74,7 @@ def front_map(front: Front) -> MapChart:
 
 
 def front_chart(front: Front) -> Chart:
-    """Exposure, height above ground, and energy or time of each plan over its length."""
+    """Return exposure, height above ground, and energy or time of each plan over its length."""
     named, plans = _named(front), front.plans
     along = np.array([one.length for one in plans]) / 1e3
     rest = np.setdiff1d(np.arange(len(plans)), [one.row for one in named])

@@ -1,4 +1,4 @@
-"""Without its engine: from how low home is reached, what is flat, and what of it is in reach along the way."""
+"""Chart flight without an engine: least heights to reach home, flat ground, and destinations within reach."""
 
 import numpy as np
 
@@ -11,12 +11,15 @@ from logs.views.charts import Label, Layer
 from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, world_map
 from logs.views.returns import way_layers
 
-# Of what can be reached without an engine: role and name of the way.
+# Role and name of the path by destination within reach without an engine.
 _LOOKS: dict[Reach, tuple[str, str]] = {reach: (f"reach-{reach}", reached_text(reach)) for reach in REACHES}
 
 
 def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
-    """The glide's footprint from above, and the way coloured by what is in reach; None where nothing was judged."""
+    """Return the glide footprint from above, and the path coloured by destination in reach.
+
+    Return None if glides were not judged.
+    """
     glides, scenario, route = drawn.glides, setup.scenario, setup.route.waypoints
     if not glides.each:
         return None
@@ -51,7 +54,10 @@ def _said(one: Glide, drawn: DrawnReturns) -> str:
 
 
 def footprint_layers(drawn: DrawnReturns, extent: Extent) -> list[Layer]:
-    """Bands of the least height above ground that leads to a chosen place, and flat ground; none without a map."""
+    """Return bands of the least height above ground to reach a chosen place, and flat ground.
+
+    The list is empty without a map.
+    """
     footprint = drawn.glides.footprint
     if footprint is None:
         return []

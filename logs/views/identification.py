@@ -1,4 +1,4 @@
-"""Charts of an identification: each equation as measured and as predicted, and a log replayed by the models."""
+"""Chart an identification: measured and predicted values of equations, and a replayed log."""
 
 from collections.abc import Sequence
 
@@ -8,12 +8,12 @@ from aircraft.identification.estimate import Equation
 from logs.views.charts import Chart, Panel, filled_series, series
 from world.arrays import Floats
 
-# Degrees in place of radians, by unit.
+# Displayed unit and factor, by unit: degrees in place of radians.
 _SHOWN = {"rad": ("°", 180.0 / np.pi), "rad/s2": ("°/s²", 180.0 / np.pi), "m/s2": ("m/s²", 1.0)}
 
 
 def equation_chart(equation: Equation) -> Chart:
-    """Measured and predicted over the time of all stretches behind each other, and what is left.
+    """Return measured and predicted values over the joined time of all stretches, and their difference.
 
     >>> wave = np.sin(np.arange(500) / 20.0)
     >>> chart = equation_chart(Equation("pitch acceleration", "rad/s2", 25.0, wave, 0.9 * wave, 0.99, 0.1))
@@ -35,9 +35,9 @@ def equation_chart(equation: Equation) -> Chart:
 
 
 def replay_chart(names: Sequence[str], units: Sequence[str], logged: Floats, identified: Floats, hertz: float) -> Chart:
-    """Return some windows of a replay behind each other: a panel a quantity.
+    """Return some windows of a replay one after the other, with one panel a quantity.
 
-    names, units: of the k quantities.  logged, identified: (t, k).
+    names, units: names and units of the k quantities.  logged, identified: (t, k).
     """
     time = np.arange(len(logged)) / hertz
     panels = tuple(

@@ -1,4 +1,4 @@
-"""Small labels near their points, placed so that they cover neither each other nor the lines."""
+"""Place small labels near their points so that they cover neither each other nor the lines."""
 
 import math
 from dataclasses import dataclass, field
@@ -11,18 +11,20 @@ from numpy.typing import ArrayLike
 from logs import theme
 from world.arrays import Floats
 
+# Resolution of pictures, pixels an inch.
 DPI = 150
 
 Box = tuple[float, float, float, float]
 
-# What covering another label costs: more than any distance, and than any line that a label can cover.
-_OVERLAP = 200.0
-# How far from its gap a label may move, in its own heights: a framed one has a line to its point, however far it is;
-# one that may be left out stays close.
-_RINGS_FRAMED = (0.0, 1.0, 2.2, 3.4, 4.6, 6.0, 7.5, 9.0, 11.0)
-_RINGS = _RINGS_FRAMED[:3]
-_RINGS_OPTIONAL = _RINGS_FRAMED[:2]
-# Directions that are tried for a label, best first: right-up, left-up, right-down, left-down, up, down, right, left.
+# Cost of covering another label: above the cost of any distance and any covered lines.
+_OVERLAP_COST = 200.0
+# Distances tried for a framed label beyond its gap, in label heights; a line to its point allows long distances.
+_FRAMED_DISTANCES = (0.0, 1.0, 2.2, 3.4, 4.6, 6.0, 7.5, 9.0, 11.0)
+# Distances tried for an unframed label.
+_UNFRAMED_DISTANCES = _FRAMED_DISTANCES[:3]
+# Distances tried for an optional label, which stays close to its point.
+_OPTIONAL_DISTANCES = _FRAMED_DISTANCES[:2]
+# Directions tried for a label, best first: right-up, left-up, right-down, left-down, up, down, right, left.
 _DIRECTIONS = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
 
 
@@ -30,7 +32,7 @@ _DIRECTIONS = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1,
 class LabelPlacer:
     """Greedy placement in pixels on one axes, whose limits and position must be final.
 
-    lines: (n, 2) pixel positions that labels should not cover.  boxes: what labels already cover.
+    lines: (n, 2) pixel positions that labels should not cover.  boxes: areas of the labels already placed.
     """
 
     axes: Any
@@ -61,15 +63,15 @@ class LabelPlacer:
         optional: bool = False,
         **style: Any,
     ) -> None:
-        """Write the text beside data position (x, y), where it disturbs least.
+        """Write the text next to data position (x, y), at the place of lowest cost.
 
-        size: of the font, points.
+        size: font size, points.
         gap: pixels between text and position.
         prefer: the direction tried first; (0, 0) centres the text on the position.
-        optional: left out where it would cover another label.
-        style: of the text.
+        optional: leave the label out if it would cover another one.
+        style: style of the text.
 
-        A framed label, and one that had to move away, gets a line to its point.
+        A framed label, and a label that had to move away, gets a line to its point.
         """
         (px, py) = self._pixels([x], [y])[0]
         if not (math.isfinite(px) and math.isfinite(py)):
@@ -78,7 +80,9 @@ class LabelPlacer:
         width = 0.62 * size * len(text) * DPI / 72.0 + 2 * pad
         height = 1.25 * size * DPI / 72.0 + 2 * pad
         best, best_cost, moved = self._box(px, py, width, height, gap, prefer), math.inf, 0
-        for ring, heights in enumerate(_RINGS_FRAMED if "bbox" in style else _RINGS_OPTIONAL if optional else _RINGS):
+        for ring, heights in enumerate(
+            _FRAMED_DISTANCES if "bbox" in style else _OPTIONAL_DISTANCES if optional else _UNFRAMED_DISTANCES
+        ):
             for rank, direction in enumerate((prefer, *_DIRECTIONS)):
                 box = self._box(px, py, width, height, gap + heights * height, direction)
                 cost = self._cost(box) + 0.05 * rank + 1.5 * ring
@@ -119,7 +123,7 @@ class LabelPlacer:
     @staticmethod
     def _box(x: float, y: float, width: float, height: float, distance: float, direction: tuple[int, int]) -> Box:
         dx, dy = direction
-        # A diagonal label touches the point's surroundings with its corner, so it may come closer.
+        # A diagonal label approaches the point with its corner, so it may stand closer.
         near = distance * (0.7 if dx and dy else 1.0)
         middle_x = x + dx * (near + 0.5 * width)
         middle_y = y + dy * (near + 0.5 * height)
@@ -137,7 +141,7 @@ class LabelPlacer:
             cost += 60.0
         for other in self.boxes:
             if _overlap(box, other):
-                cost += _OVERLAP
+                cost += _OVERLAP_COST
         if len(self.lines):
             inside = (
                 (self.lines[:, 0] > box[0])

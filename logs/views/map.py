@@ -1,4 +1,4 @@
-"""The map: terrain, threats, zones, the planned path and the flown track from above."""
+"""Map: terrain, threats, zones, planned path and flown track from above."""
 
 import math
 from collections.abc import Sequence
@@ -17,14 +17,17 @@ from world.scenario import Scenario
 from world.terrain import Terrain
 from world.wind import Wind
 
-# Height over width of the map: a longer or flatter area is drawn with ground around it.  The rim, of the longer side:
-# of an area, and of a mission that has none.
+# Smallest and largest ratio of height to width; other areas are drawn with ground around them.
 _ASPECTS = (0.4, 1.25)
+# Margin around an area, as a fraction of its longer side.
 _RIM = 0.015
+# The same margin around a mission without an area.
 _MISSION_RIM = 0.1
-# Beyond these numbers waypoints are numbered in steps, and their dots are small; points of a track.
+# With more waypoints than this, only every n-th waypoint is numbered.
 _MAX_NUMBERS = 40
+# With more waypoints than this, their dots are small.
 _MAX_DOTS = 80
+# Largest number of points of a drawn track.
 _MAX_POINTS = 6000
 
 # East and north range, m.
@@ -33,7 +36,7 @@ Extent = tuple[tuple[float, float], tuple[float, float]]
 
 @dataclass(frozen=True, slots=True)
 class NamedWind:
-    """A wind of the compass; name: of the flight that it belongs to, "" where there is one wind alone."""
+    """A wind shown at the compass; name: the flight that it belongs to, "" if there is only one wind."""
 
     wind: Wind
     name: str = ""
@@ -44,7 +47,7 @@ class NamedWind:
 class DrawnTrack:
     """A flown track, its name and its role.
 
-    flight: number of the flight in the page's data, which has its moments.
+    flight: number of the flight in the page's data, which hold its moments.
     """
 
     label: str
@@ -55,13 +58,13 @@ class DrawnTrack:
 
 @dataclass(frozen=True, slots=True)
 class MapChart:
-    """A top view, north up, of equal scales; lengths in m, labelled in km.
+    """Top view with north up and equal scales; lengths in m, labelled in km.
 
-    panel: threats, zones, paths and their names, from the lowest; its span is that of north.
-    east: range shown.
-    origin: what the axes count from, as text.
-    terrain: under everything; None where none was given.
-    winds: of the compass.
+    panel: threats, zones, paths and their names, from the lowest; its span is the north range.
+    east: east range shown.
+    origin: origin of the axes, as text.
+    terrain: terrain under all layers; None if none was given.
+    winds: winds shown at the compass.
     """
 
     title: str
@@ -86,10 +89,11 @@ def flight_map(
     """Return the map of a plan, or of its flight.
 
     plan_waypoints: (p, 3) m or None; route_waypoints: (w, 3) m as flown, or None for a plan alone.  The route is
-    numbered and carries the verdict's marks; a plan that differs from it by more than 1 m is drawn beside it.
-    Missiles are drawn as the sphere's circle (line) and as its cut at the height of the path nearest to it (fill).
-    waypoint_words: what the page says of each waypoint.
-    stops: number of each waypoint of the route as people count them; None where each waypoint is a stop.
+    numbered and carries the verdict's marks; a plan that differs from it by more than 1 m is drawn as a second line.
+    Missiles are drawn as the outline of the sphere (line) and its section at the altitude of the nearest path point
+    (fill).
+    waypoint_words: text of the page on each waypoint.
+    stops: displayed number of each waypoint of the route; None if each waypoint is a stop.
     """
     return map_chart(
         scenario,
@@ -116,7 +120,10 @@ def map_chart(
     waypoint_words: Sequence[str] = (),
     stops: Sequence[int] | None = None,
 ) -> MapChart:
-    """As `flight_map`, with any number of tracks and winds.  subject: of the title, after the scenario's name."""
+    """Return a map as `flight_map` does, with any number of tracks and winds.
+
+    subject: part of the title after the name of the scenario.
+    """
     route = route_waypoints if route_waypoints is not None else plan_waypoints
     failed = failures(verdict, len(route) if route is not None else 0)
     stops = range(0 if route is None else len(route)) if stops is None else stops
@@ -152,8 +159,8 @@ def world_map(
 ) -> MapChart:
     """Return a map of a scenario: its area, threats and zones under layers, start and destination over them.
 
-    labels: before the names of threats and zones.  extent: as of `map_extent`.  route: (w, 3) m, at whose heights
-    missiles are filled; entered: threats whose rule fails.
+    labels: labels that take precedence over the names of threats and zones.  extent: range as from `map_extent`.
+    route: (w, 3) m, whose altitudes determine the filled sections of missiles.  entered: threats whose rule fails.
     """
     east, north = extent
     around = [*_area(scenario), *threat_circles(scenario.threats, route, entered), *zone_shapes(scenario.zones)]
@@ -172,7 +179,7 @@ def world_map(
 
 
 def map_json(chart: MapChart) -> Json:
-    """Return the map as what JSON can hold, lengths in m; its ground is the 3-D view's."""
+    """Return the map as JSON data, lengths in m; its ground is in the data of the 3-D view."""
     return {
         "origin": chart.origin,
         "east": numbers(chart.east, 1),
@@ -182,10 +189,10 @@ def map_json(chart: MapChart) -> Json:
 
 
 def map_extent(scenario: Scenario, route: Floats | None, ways: Sequence[Floats]) -> Extent:
-    """East and north range of the scenario's area, widened to what lies outside it, with a rim, m.
+    """Return the east and north range of the scenario's area and everything outside, with a margin, m.
 
-    ways: (t, 3) m; rows that are not known are left out.
-    Bounds made around an external mission limit nothing: its way is shown, and of zones what lies in them.
+    ways: paths (t, 3) m; unknown rows are left out.
+    Bounds made around an external mission limit nothing: the range covers its path, and the parts of zones within them.
     """
     points = [scenario.start[None, :2], scenario.destination[None, :2]]
     if scenario.external:
@@ -207,7 +214,10 @@ def map_extent(scenario: Scenario, route: Floats | None, ways: Sequence[Floats])
 
 
 def _area(scenario: Scenario) -> list[Layer]:
-    """Edge of the scenario's area; bounds made around an external mission limit nothing and are not drawn."""
+    """Draw the edge of the scenario's area.
+
+    Bounds made around an external mission limit nothing and are not drawn.
+    """
     if scenario.external:
         return []
     (west, east), (south, north) = scenario.bounds.tolist()
@@ -216,7 +226,7 @@ def _area(scenario: Scenario) -> list[Layer]:
 
 
 def _paths(route: Floats, plan: Floats | None, failed: Failures) -> list[Layer]:
-    """Failing legs under the route, and the plan where it differs."""
+    """Draw failing legs under the route, and the plan if it differs."""
     differs = plan is not None and paths_differ(plan, route, 1.0)
     legs = [route[k : k + 2] for k in failed.legs]
     layers = [Layer("line", "leg that fails a rule", "failing-leg", leg[:, 0], leg[:, 1], quiet=True) for leg in legs]
@@ -261,9 +271,9 @@ def _ends(scenario: Scenario) -> list[Layer]:
 
 
 def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int] | None = None) -> list[Label]:
-    """Start and destination, in one label where they are at one place.
+    """Label start and destination, with one label if they are at one place.
 
-    The route's first and last number stand in their labels where they coincide.
+    Where the first or last waypoint coincides with them, its number is part of the label.
     """
     labels = []
     for point, row, name in ((scenario.start, 0, "start"), (scenario.destination, -1, "destination")):
@@ -279,7 +289,7 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int] | 
 
 
 def _same(a: Floats, b: Floats) -> bool:
-    """Return two points lie within 50 m on the ground: one marker stands for both."""
+    """Return True if two points lie within 50 m on the ground, so that one marker stands for both."""
     return float(np.hypot(*(a[:2] - b[:2]))) < 50.0
 
 
@@ -296,7 +306,7 @@ def _numbers(scenario: Scenario, route: Floats, stops: Sequence[int], failed: Fa
 
 
 def position_text(lat_deg: float, lon_deg: float) -> str:
-    """Return a place as an axis names it; "" for one that is not known.
+    """Format a position as an axis shows it; "" for an unknown position.
 
     >>> position_text(46.0, -8.5)
     '46.0000°, −8.5000°'

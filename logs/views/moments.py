@@ -1,4 +1,4 @@
-"""The flight moment by moment: what the page's slider, read-out and map say of it, and the aircraft's model."""
+"""Build the data of a flight by moment for the page, and the aircraft model."""
 
 from typing import Any
 
@@ -13,15 +13,16 @@ from logs.verdict.wording import place_text
 from logs.views.charts import numbers
 from logs.views.scene import drawn_rows
 
+# Largest number of moments of a flight in a page.
 MAX_MOMENTS = 2000
 
 
 def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", role: str = "flown") -> dict[str, Any]:
-    """Return columns of at most `MAX_MOMENTS` rows of a flight, from its first to its last known place.
+    """Return columns of at most `MAX_MOMENTS` rows of a flight, from its first to its last known position.
 
     time (s); east, north, up (m AMSL), above (m above ground, null without terrain); airspeed, climb (m/s); bank (right
-    positive), pitch, heading (°); leg.  What is not a number is null.  Beside them legs: what each leg is called.
-    name, role: of its line.
+    positive), pitch, heading (°); leg.  Unknown values are null.  In addition, legs: names of the legs.
+    name, role: name and role of the line.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -81,7 +82,7 @@ def _known(item: int) -> int | None:
 
 
 def aircraft_model() -> dict[str, Any]:
-    """The log's aircraft: corners of its triangles, forward, left and up, one unit wide, and each one's colour."""
+    """Return the aircraft model: coloured triangles with corners forward, left, up, one unit wide."""
 
     def rounded(values: NDArray[np.float32]) -> Any:
         return np.round(values.astype(np.float64), 4).tolist()

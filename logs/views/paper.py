@@ -1,4 +1,4 @@
-"""Figures of the paper's experiment: paths of many searches, one of each encoding, convergence over generations."""
+"""Draw figures of the paper's experiment: paths of searches, a path of each encoding, convergence."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,13 +19,17 @@ from logs.views.threats_and_zones import threat_circles
 from world.arrays import Floats
 from world.scenario import Scenario
 
-# Inches: left of the map, height of the legend, of one with a line pair for each encoding, and the column beside.
+# Margin left of the map, inches.
 _LEFT = 0.72
+# Margin above the map, inches.
 _TOP = 0.5
+# Height of the legend, inches.
 _LEGEND = 0.85
+# Height of a legend with two lines for each encoding, inches.
 _TALL_LEGEND = 1.2
+# Left edge of the column right of the map, inches.
 _COLUMN = 8.72
-# One look for each algorithm of a figure, distinct without colour too.
+# One line style for each algorithm of a figure, distinct even without colour.
 _DASHES: tuple[Any, ...] = (
     "-",
     (0, (5, 1.5)),
@@ -50,7 +54,7 @@ class PaperPath:
 
 
 def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -> Figure:
-    """Return paths of one algorithm over contours, missile and radar circles (Yang, Tang and Lozano 2014, Figs. 5-8).
+    """Draw paths of one algorithm over contours, missile and radar circles (Yang, Tang and Lozano 2014, Figs. 5-8).
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
@@ -79,7 +83,7 @@ def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -
 
 
 def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: int) -> Figure:
-    """Return one path of each encoding over the same map (Yang, Tang and Lozano 2014, Figs. 9-12).
+    """Draw one path of each encoding over the same map (Yang, Tang and Lozano 2014, Figs. 9-12).
 
     chosen: paths by encoding.
 
@@ -106,7 +110,10 @@ def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: in
 
 
 def _map(scenario: Scenario, title: str, legend: float) -> tuple[Figure, Any, list[Any]]:
-    """Ground and threats; returns figure, axes and the legend's entries for them.  legend: its height, inches."""
+    """Draw ground and threats; return figure, axes and their legend handles.
+
+    legend: height of the legend, inches.
+    """
     low, high = scenario.bounds[:, 0], scenario.bounds[:, 1]
     padding = 0.02 * float((high - low).max())
     (west, south), (east, north) = (low - padding).tolist(), (high + padding).tolist()
@@ -114,14 +121,14 @@ def _map(scenario: Scenario, title: str, legend: float) -> tuple[Figure, Any, li
     axes.set(xlabel="east (km)", ylabel="north (km)")
     axes.set_title(title, fontweight="bold")
     around = draw_ground(figure, axes, scenario.terrain, _COLUMN, _TOP)
-    # Seen from above, whatever a path's height: a path inside a circle may pass over the sphere.
+    # The circles do not depend on altitude: a path inside a circle may pass over the sphere.
     threats = Panel("north", "m", threat_circles(scenario.threats, None, frozenset()))
     draw_layers(axes, threats)
     return figure, axes, around + [legend_handle(entry) for entry in legend_entries([threats])]
 
 
 def _ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
-    """Start and destination, labelled clear of the paths."""
+    """Draw start and destination, with labels clear of the paths."""
     placer = LabelPlacer(axes)
     for path in paths:
         placer.avoid(path[:, 0], path[:, 1])
@@ -134,9 +141,9 @@ def _ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
 
 
 def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) -> Figure:
-    """Over generations: how many searches hold a safe path, and the length ratio of the safe ones.
+    """Draw the number of searches with a safe path, and the length ratio of safe paths, over generations.
 
-    histories: for each number of threats and each algorithm the searches' (g, 3) length ratio, kill exposure and
+    histories: by number of threats and algorithm, the history (g, 3) of each search: length ratio, kill exposure and
     violations of the best path yet.
 
     >>> history = np.array([[1.4, 0.2, 1.0], [1.2, 0.0, 0.0], [1.1, 0.0, 0.0]])
@@ -188,7 +195,7 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
 
 
 def _converge(upper: Any, lower: Any, histories: Sequence[Floats], look: Mapping[str, Any]) -> None:
-    """One algorithm on one problem; a search that ended early keeps its last value."""
+    """Draw one algorithm on one problem; a search that ended early keeps its last value."""
     length = max(len(history) for history in histories)
     stacked = np.stack(
         [np.vstack([history, np.repeat(history[-1:], length - len(history), axis=0)]) for history in histories]

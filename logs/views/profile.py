@@ -1,4 +1,4 @@
-"""The profile: terrain, plan, flight and threats in the vertical plane along the path."""
+"""Profile: terrain, plan, flight and threats in the vertical plane along the path."""
 
 from collections.abc import Sequence
 
@@ -21,11 +21,15 @@ from logs.views.threats_and_zones import PathPlane, entered_cuts, threat_cuts, z
 from world.arrays import Floats
 from world.scenario import Scenario
 
-# Samples along the path and of the flight, and the smallest range of heights that is shown, m.
+# Number of samples along the path.
 _SAMPLES = 1200
+# Number of blocks that the flight is thinned to.
 _BLOCKS = 800
+# Smallest range of altitudes shown, m.
 _MIN_SPAN = 50.0
+# With more waypoints than this, only every n-th waypoint is numbered.
 _MAX_NUMBERS = 40
+# With more waypoints than this, their dots are small.
 _MAX_DOTS = 80
 
 
@@ -39,13 +43,13 @@ def profile_chart(
     stops: Sequence[int] | None = None,
     above_ground: Floats | None = None,
 ) -> Chart:
-    """Return heights (m AMSL) over the distance along the route (km).
+    """Return a chart of altitudes (m AMSL) over the distance along the route (km).
 
-    The route is route_waypoints (w, 3), or plan_waypoints where there is none; without either, the straight line
-    from start to destination.  The ground and the spheres' cuts are those under and about the route: a sphere or a zone
-    is cut where the path runs through it.  Flown heights stand at the flight's progress along it, which never falls.
-    stops: number of each waypoint of the route as people count them; None where each waypoint is a stop.
-    above_ground: (w,) m, as of `flight.mission.route.Route`; None where no leg follows the ground.
+    The route is route_waypoints (w, 3), or plan_waypoints if that is None; without either, the straight line from start
+    to destination.  Ground, spheres and zones are cut by the vertical plane along the route.  Flown altitudes are drawn
+    at the progress of the flight along the route, which never decreases.
+    stops: displayed number of each waypoint of the route; None if each waypoint is a stop.
+    above_ground: (w,) m, as in `flight.mission.route.Route`; None if no leg follows the ground.
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
@@ -91,7 +95,10 @@ def profile_chart(
 
 
 def _chart(scenario: Scenario, at: Floats, first: list[int], panel: Panel, *, straight: bool) -> Chart:
-    """The panel as a chart; at: distance of each waypoint along the route, m; first: waypoints that begin a stop."""
+    """Return the panel as a chart.
+
+    at: distance of each waypoint along the route, m.  first: waypoints at which a stop begins.
+    """
     path = "the straight line from start to destination" if straight else "the planned path"
     title = f"{shorten(scenario.name, 60)}: heights along the path"
     return Chart(
@@ -100,7 +107,7 @@ def _chart(scenario: Scenario, at: Floats, first: list[int], panel: Panel, *, st
         "km",
         (panel,),
         reach=(0.0, max(float(at[-1]), 1.0) / 1000.0),
-        # The leg to a loiter goes on around it.
+        # The leg to a loiter includes the loiter.
         marks=tuple((float(at[end]) / 1000.0, f"leg {n}") for n, end in enumerate(_leg_begins(first, len(at)))),
         tall=420,
         inches=4.05,
@@ -110,14 +117,14 @@ def _chart(scenario: Scenario, at: Floats, first: list[int], panel: Panel, *, st
 
 
 def _leg_begins(first: list[int], count: int) -> list[int]:
-    """Return waypoints at which a leg as people count them begins: where the stop before it ends."""
+    """Return the waypoints at which the displayed legs begin: each at the end of the stop before it."""
     return [0, *(k - 1 for k in first[2:])] if count > 1 else []
 
 
 def _over_ground(
     at: Floats, route: Floats, above: Floats, distance: Floats, up: Floats, ground: Floats, scenario: Scenario
 ) -> Floats:
-    """Return the planned altitudes (s,) m, with the legs that follow the ground above it.
+    """Return the planned altitudes (s,) m; legs that follow the ground are drawn above the ground.
 
     at: distance of each waypoint along the route, m.  above: (w,) m, NaN at the end of a straight leg.
     distance, up, ground: (s,) m, samples of the route.
@@ -131,7 +138,7 @@ def _over_ground(
 
 
 def ground_under(scenario: Scenario, points: Floats) -> Floats | None:
-    """Return terrain height (s,) under the points, None where there is none at all."""
+    """Return the terrain elevation (s,) under the points, or None if unknown at all of them."""
     if scenario.terrain is None:
         return None
     heights = scenario.terrain.height(points[:, 0], points[:, 1])
@@ -139,7 +146,10 @@ def ground_under(scenario: Scenario, points: Floats) -> Floats | None:
 
 
 def _span(scenario: Scenario, route: Floats, track: Track | None, ground: Floats | None) -> tuple[float, float]:
-    """Range that holds ground, plan and flight, and greatest height and ceiling if those do not press them flat."""
+    """Return an altitude range that holds ground, plan and flight.
+
+    Height limit and ceiling are included if they do not flatten the others.
+    """
     heights = [route[:, 2]] + ([] if track is None else [track.position[:, 2]])
     if ground is not None:
         heights.append(ground)
@@ -157,7 +167,7 @@ def _span(scenario: Scenario, route: Floats, track: Track | None, ground: Floats
 
 
 def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
-    """Return the ground, the band above it that the path must stay out of, and the greatest height."""
+    """Return the ground, the band of the minimum clearance above it, and the height limit."""
     ground, along = plane.ground, plane.kilometres
     if ground is None:
         return []
@@ -177,7 +187,7 @@ def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
 def _flown(
     scenario: Scenario, route: Floats, track: Track | None, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
-    """Flown heights, and threats that are entered over the flight, or over a plan that was not flown."""
+    """Return flown altitudes, and entered threats along the flight, or along a plan that was not flown."""
     if track is None:
         return entered_cuts(scenario.threats, failed, plane)
     progress, heights = track_distance(route, track) / 1000.0, track.position[:, 2]
@@ -221,7 +231,7 @@ def _numbers(at: Floats, route: Floats, stops: Sequence[int], failed: Failures) 
 
 
 def _bounds(scenario: Scenario, low: float, high: float) -> tuple[tuple[tuple[str, float], ...], str]:
-    """Ceiling and floor as level lines, and a note of a ceiling that lies outside the picture."""
+    """Return ceiling and floor as level lines, and a note on a ceiling outside the picture."""
     if scenario.external:
         return (), ""
     ceiling, floor = f"ceiling, {scenario.ceiling:.0f} m AMSL", f"floor, {scenario.floor:.0f} m AMSL"

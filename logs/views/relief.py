@@ -1,4 +1,4 @@
-"""Brightness of ground under light from the north-west, by which relief is seen on a map."""
+"""Shade the ground of a map by light from the north-west, to show relief."""
 
 import numpy as np
 
@@ -6,10 +6,12 @@ from world.arrays import Floats
 
 
 def relief(heights: Floats, pitch: float, span: float) -> Floats:
-    """Brightness of each place, about 0.75 to 1.1 clipped at 1; of level ground where the height is not known.
+    """Return the brightness, about 0.75 to 1.1 clipped at 1.
 
-    heights: (rows, columns) m, rows from south to north.  pitch: m between them.  span: m from the lowest to the
-    highest.
+    Unknown heights have the brightness of level ground.
+
+    heights: (rows, columns) m, rows from south to north.  pitch: distance between rows, m.  span: difference between
+    lowest and highest height, m.
 
     >>> slope = np.arange(3.0)[None, :] * np.ones((3, 1))
     >>> bool(relief(-slope, 1.0, 2.0).mean() < relief(slope, 1.0, 2.0).mean())  # falls to the east, then rises
@@ -17,7 +19,7 @@ def relief(heights: Floats, pitch: float, span: float) -> Floats:
     """
     filled = np.where(np.isfinite(heights), heights, np.nanmean(heights))
     up_north, up_east = np.gradient(filled, pitch)
-    # Gentle country is exaggerated, so that its ridges show.
+    # Exaggerate gentle terrain, so that its ridges show.
     gain = float(np.clip(600.0 / span, 0.5, 4.0))
     slope_e, slope_n = gain * up_east, gain * up_north
     lit = (0.5 * slope_e - 0.5 * slope_n + 0.707) / np.sqrt(1.0 + slope_e**2 + slope_n**2)

@@ -1,4 +1,4 @@
-"""Returns to launch: the way coloured by what comes of them, the worst in profile, and how low each could begin."""
+"""Chart returns to launch: path by outcome, profiles of the worst returns, and least start heights."""
 
 from collections.abc import Callable, Sequence
 from typing import TypeVar
@@ -18,10 +18,11 @@ from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_bands
 from world.arrays import Floats
 from world.scenario import Scenario
 
-# Role and name of the way where returns come to this; the safe lies lowest.
+# Role and name of the path by outcome of the returns; the safe outcome is drawn lowest.
 _LOOKS: dict[Kind, tuple[str, str]] = {kind: (f"return-{kind}", way_text(kind)) for kind in reversed(KINDS)}
-# The smallest range of heights that a profile shows, m; points of the ground under a flight.
+# Smallest range of altitudes that a profile shows, m.
 _MIN_SPAN = 100.0
+# Number of ground samples under a flight.
 _GROUND_POINTS = 1200
 
 Key = TypeVar("Key", bound=str)
@@ -34,9 +35,9 @@ def way_layers(
     place: Callable[[One], tuple[float, float]],
     words: Callable[[One], str],
 ) -> list[Layer]:
-    """Return the way in one layer for each look, in the order of the looks.
+    """Return the path in one layer for each look, in the order of the looks.
 
-    looks: role and name of each kind of stretch.  place: what of a point is drawn.  words: what the page says of it.
+    looks: role and name of each kind of stretch.  place: coordinates of a point.  words: text of the page on a point.
     """
     layers = []
     for role, name in dict.fromkeys(looks.values()):
@@ -48,7 +49,7 @@ def way_layers(
 
 
 def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
-    """Return the way from above, coloured by what comes of a return from there, and the ways of the worst."""
+    """Return the path from above, coloured by the outcome of returns, and the paths of the worst returns."""
     scenario, route = setup.scenario, setup.route.waypoints
     limit = drawn.returns.limit
 
@@ -94,11 +95,14 @@ def _targets(targets: dict[str, tuple[float, float, float]]) -> list[Layer]:
 
 
 # ----------------------------------------------------------------------
-# The worst in profile.
+# The worst returns in profile.
 
 
 def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None:
-    """Return heights of the worst returns over what lies under them, a panel each; None where there is none."""
+    """Return altitude profiles of the worst returns with the ground below, one panel each.
+
+    Return None without returns.
+    """
     if not drawn.worst:
         return None
     scenario = setup.scenario
@@ -118,7 +122,7 @@ def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None
 
 
 def _span(scenario: Scenario, one: WorstReturn) -> tuple[float, float]:
-    """Return lowest and highest of a way and the ground under it, with a margin, m."""
+    """Return lowest and highest altitude of a path and the ground under it, with a margin, m."""
     ground = ground_under(scenario, one.way)
     heights = np.concatenate([one.way[:, 2], np.zeros(0) if ground is None else ground])
     low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
@@ -143,13 +147,13 @@ def _profile(scenario: Scenario, one: WorstReturn, number: int, span: tuple[floa
 
 
 # ----------------------------------------------------------------------
-# Over time.
+# Heights over time.
 
 
 def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track | None) -> Chart | None:
-    """Return heights over time: the flight's by what comes of a return, and the least; what a glide has left over.
+    """Return flown altitudes over time by outcome of a return, least altitudes, and margins of glides.
 
-    None where nothing was judged.
+    None if no returns were judged.
     """
     if not drawn.returns.each:
         return None
@@ -182,7 +186,7 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
 
 
 def _flown_places(drawn: DrawnReturns, track: Track | None) -> tuple[Floats, Floats]:
-    """Return times (t,) and places (t, 3) of the way: of the track, or of where returns begin."""
+    """Return times (t,) and positions (t, 3) of the path: from the track, or from the starts of returns."""
     first, last = drawn.returns.each[0].time, max(one.time for one in drawn.returns.each)
     if track is not None and drawn.returns.flown:
         whole = np.isfinite(track.position).all(axis=1) & (track.time >= first) & (track.time <= last)
@@ -195,7 +199,7 @@ def _flown_places(drawn: DrawnReturns, track: Track | None) -> tuple[Floats, Flo
 
 
 def _left_over(glides: Glides) -> Panel:
-    """Return height left over for what can be reached without the engine, by time."""
+    """Return the height margin over time for destinations within reach without the engine."""
     time = np.array([one.time for one in glides.each])
 
     def line(name: str, role: str, values: list[float]) -> Layer:

@@ -1,4 +1,4 @@
-"""The 3-D scene as data: ground, threats, zones and plan, for the page as what JSON can hold."""
+"""Build the data of the 3-D scene: ground, threats, zones and plan, as JSON data for the page."""
 
 import base64
 import json
@@ -14,15 +14,17 @@ from world.airspace.zones_on_map import zone_walls
 from world.arrays import Floats
 from world.terrain import Terrain
 
-MAX_GROUND = 250  # vertices a side: index numbers of the mesh stay below 65,536
+# Largest number of vertices along a side of the ground: indices of the mesh stay below 65,536.
+MAX_GROUND = 250
+# Value of an unknown height.
 MISSING = 65535
 
 
 @dataclass(frozen=True, slots=True)
 class SceneView:
-    """Data of the 3-D picture and of the 3-D view of the page.
+    """Data of the 3-D picture and the 3-D view of the page.
 
-    setup: with the mission's fence among the zones.  track: None for a plan that was not flown.
+    setup: setup with the mission's fence among the zones.  track: None for a plan that was not flown.
     """
 
     setup: FlightSetup
@@ -40,7 +42,7 @@ class GroundGrid:
 
 
 def scene_bounds(setup: FlightSetup, track: Track | None) -> Floats:
-    """East and north range (2, 2) m of area, route and flight."""
+    """Return the east and north range (2, 2) m of area, route and flight."""
     points = [setup.scenario.bounds.T, setup.route.waypoints[:, :2]]
     if track is not None:
         points.append(track.position[np.isfinite(track.position).all(axis=1), :2])
@@ -49,7 +51,7 @@ def scene_bounds(setup: FlightSetup, track: Track | None) -> Floats:
 
 
 def ground_grid(terrain: Terrain | None, bounds: Floats, most: int) -> GroundGrid | None:
-    """Sample the ground at no more than ``most`` crossings a side, square as far as that goes; None without any."""
+    """Sample the ground at up to ``most`` crossings a side, with nearly square cells; None without ground."""
     if terrain is None:
         return None
     spans = np.ptp(bounds, axis=1)
@@ -73,13 +75,13 @@ def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) ->
 
 
 def drawn_rows(track: Track, most: int) -> NDArray[np.intp]:
-    """At most ``most`` rows of the track at which its position is a number, first and last of those among them."""
+    """Return at most ``most`` rows of the track with a known position, including the first and last."""
     good = np.flatnonzero(np.isfinite(track.position).all(axis=1))
     return good[np.unique(np.linspace(0, max(len(good) - 1, 0), min(len(good), most)).astype(np.intp))]
 
 
 def script_json(data: object) -> str:
-    """JSON that may stand inside an HTML script element: "<" would end that early where a name holds one.
+    """Return JSON for an HTML script element, with "<" escaped: in a name it could end the element early.
 
     >>> "<" in script_json({"name": "</script>"}), json.loads(script_json({"name": "</script>"}))
     (False, {'name': '</script>'})
@@ -89,9 +91,9 @@ def script_json(data: object) -> str:
 
 
 def scene_data(view: SceneView) -> dict[str, object]:
-    """Return the scene as what JSON can hold; of the flight only how far the scene reaches.
+    """Return the scene as JSON data; the flight only determines the extent of the scene.
 
-    Lengths are in m; heights of the ground are 16-bit shares of their range, little-endian, in base64.
+    Lengths are in m; heights of the ground are 16-bit fractions of their range, little-endian, in base64.
     """
     setup, failed = view.setup, view.failed
     bounds = scene_bounds(setup, view.track)
@@ -118,7 +120,10 @@ def scene_data(view: SceneView) -> dict[str, object]:
 
 
 def _zone_walls(setup: FlightSetup) -> dict[str, object]:
-    """Return names, kinds and rings of zones, each corner's foot and upper edge; nothing where there are none."""
+    """Return names, kinds and rings of zones, with lower and upper end of each corner.
+
+    The result is empty without zones.
+    """
     zones, up = setup.scenario.zones, setup.route.waypoints[:, 2]
     if not zones:
         return {}

@@ -1,4 +1,4 @@
-"""The photo lines of a survey from above: what of each can be used, what is lost, and the track beside them."""
+"""Chart the photo lines of a survey from above: usable parts, lost parts, and the track."""
 
 import numpy as np
 
@@ -11,13 +11,17 @@ from logs.verdict.measures.track_alignment import align_track
 from logs.views.charts import Chart, Label, Layer, Panel, parted
 from world.arrays import Floats
 
-# Beyond this number of lines every second is numbered, and so on; points of a track that are drawn.
-_NUMBERED = 24
+# Largest number of lines that are all numbered; of more lines every second, third, ... is numbered.
+_MAX_NUMBERED_LINES = 24
+# Largest number of drawn points of a track.
 _POINTS = 8000
 
 
 def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
-    """Return each survey of a flight, its lines laid level; None where there is none, or nothing was flown of it."""
+    """Return a panel for each survey, rotated so that its lines are horizontal.
+
+    Return None without a flown survey.
+    """
     if not surveys_of(setup):
         return None
     requirements = route_requirements(setup)
@@ -53,7 +57,7 @@ def _panel(
 
     used, lost = [np.zeros((0, 2))], [np.zeros((0, 2))]
     labels = []
-    step = -(-len(survey.lines) // _NUMBERED)
+    step = -(-len(survey.lines) // _MAX_NUMBERED_LINES)
     for number, (line, measure) in enumerate(zip(survey.lines, measured, strict=True), 1):
         corners = laid(requirements.points[line.first : line.last + 1])
         for to, stretches in ((lost, _lost(measure)), (used, _used(measure))):
@@ -71,12 +75,12 @@ def _panel(
 
 
 def _lost(measure: LineMeasure | None) -> tuple[tuple[float, float], ...]:
-    """Stretches of a line that are lost, as shares of its length are not known: all of one that was not flown."""
+    """Return the lost stretches of a line, m; a line that was not flown is lost as a whole."""
     return ((0.0, np.inf),) if measure is None else measure.lost
 
 
 def _used(measure: LineMeasure | None) -> list[tuple[float, float]]:
-    """Stretches of a line that can be used, m."""
+    """Return the usable stretches of a line, m."""
     if measure is None:
         return []
     edges = [0.0, *(metres for stretch in measure.lost for metres in stretch), measure.length]

@@ -1,4 +1,4 @@
-"""Threats and zones on the map (their outlines) and on the profile (the part of each that stands over the path)."""
+"""Draw threats and zones on the map (their outlines) and on the profile (their sections above the path)."""
 
 from dataclasses import dataclass
 
@@ -13,20 +13,23 @@ from world.airspace.zones_on_map import level_heights, zone_rings
 from world.arrays import Floats
 from world.threats import Threats
 
-# Beyond these numbers, names would be a grey mat: of threats and zones on the map, and on the profile.
+# Largest number of named threats on the map; more names would be unreadable.
 _MAX_NAMES = 80
+# Largest number of named zones on the map.
 _MAX_ZONE_NAMES = 40
+# Largest number of named sections on the profile.
 _MAX_CUT_NAMES = 24
-_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
+# Angles of the points of a circle, rad.
+_CIRCLE_ANGLES_RAD = np.linspace(0.0, 2.0 * np.pi, 73)
 
 
 # Threats.
 
 
 def threat_circles(threats: Threats, route: Floats | None, entered: frozenset[int]) -> tuple[Layer, ...]:
-    """Circles of missiles and radars from above, m: a line for the sphere, filled as far as it reaches at the path.
+    """Return circles of missiles and radars from above, m: the sphere as a line, its section at the path filled.
 
-    route: (w, 3) m, or None where the spheres alone are shown.  entered: threats whose rule fails.
+    route: (w, 3) m, or None to show the spheres alone.  entered: threats whose rule fails.
     """
     radars, reach, missiles, units = [], [], [], []
     shown = np.flatnonzero(threats.kill_radius > 0.0)
@@ -74,12 +77,12 @@ def _threat_words(name: str, kill: float, detection: float) -> str:
 
 
 def circle(centre: Floats, radius: float) -> tuple[Floats, Floats]:
-    """East and north (73,) of a circle, closed."""
-    return centre[0] + radius * np.cos(_TURN), centre[1] + radius * np.sin(_TURN)
+    """Return east and north (73,) of a closed circle."""
+    return centre[0] + radius * np.cos(_CIRCLE_ANGLES_RAD), centre[1] + radius * np.sin(_CIRCLE_ANGLES_RAD)
 
 
 def threat_names(threats: Threats, named: frozenset[int] = frozenset()) -> tuple[Label, ...]:
-    """Return names of threats at their places on the map.  named: those that have labels of their own."""
+    """Return the names of threats at their positions on the map.  named: threats with their own labels."""
     if len(threats) > _MAX_NAMES:
         return ()
     return tuple(
@@ -90,7 +93,7 @@ def threat_names(threats: Threats, named: frozenset[int] = frozenset()) -> tuple
 
 
 def kill_radius_at_path(threats: Threats, chosen: NDArray[np.intp], route: Floats | None) -> Floats:
-    """Return radius (m) of each chosen missile sphere's cut at the height of the path where it passes nearest."""
+    """Return the section radius (m) of each chosen missile sphere at the nearest altitude of the path."""
     radius = threats.kill_radius[chosen]
     if route is None:
         return radius
@@ -105,7 +108,7 @@ def kill_radius_at_path(threats: Threats, chosen: NDArray[np.intp], route: Float
 
 
 def sphere_cuts(centre: Floats, radius: float, points: Floats) -> tuple[Floats, Floats]:
-    """Lower and upper surface (m AMSL) of a sphere over each of the points, NaN where none stands over them.
+    """Return lower and upper surface (m AMSL) of a sphere at each of the points, NaN outside the sphere.
 
     centre: (3,), points: (s, 3) m.
     """
@@ -119,8 +122,8 @@ def outline_anchor(
 ) -> tuple[float, float, tuple[int, int]] | None:
     """Find where a name touches the section of a sphere inside a picture from low to high (m AMSL).
 
-    kilometres, lower, upper: (s,), NaN where no sphere stands; low: (s,), the ground where that hides it.  Returns km,
-    m AMSL and the side of the name; None where nothing of the outline is in the picture.
+    kilometres, lower, upper: (s,), NaN outside the sphere; low: (s,), the ground where it hides the sphere.  Returns
+    km, m AMSL and the side of the name; None if no part of the outline is in the picture.
     """
     over = np.flatnonzero(np.isfinite(upper))
     top, foot = over[np.argmax(upper[over])], over[np.argmin(lower[over])]
@@ -129,7 +132,7 @@ def outline_anchor(
     if low[foot] < lower[foot] < high:
         return float(kilometres[foot]), float(lower[foot]), (0, -1)
     for edge in (upper, lower):
-        # From the left: where the outline stays in the picture, its last point below the picture's upper rim.
+        # From the left: the highest point of the first part of the outline within the picture.
         seen = over[(edge[over] > low[over]) & (edge[over] < high - 0.04 * (high - low.min()))]
         if seen.size:
             first = seen[: np.flatnonzero(np.diff(seen, append=seen[-1] + 2) > 1)[0] + 1]
@@ -140,10 +143,10 @@ def outline_anchor(
 
 @dataclass(frozen=True, slots=True)
 class PathPlane:
-    """The vertical plane through a path, in which its profile stands.
+    """Vertical plane through a path, for its profile.
 
-    kilometres: (s,) along the path.  points: (s, 3) m.  ground: (s,) m AMSL under them, None where there is none.
-    low, high: what the profile shows, m AMSL.
+    kilometres: (s,) along the path.  points: (s, 3) m.  ground: (s,) m AMSL under the points, or None if unknown.
+    low, high: altitude range of the profile, m AMSL.
     """
 
     kilometres: Floats
@@ -153,7 +156,7 @@ class PathPlane:
     high: float
 
     def visible_low(self) -> Floats:
-        """Lower end of what is seen at each sample, (s,) m AMSL: the ground where it stands in the picture."""
+        """Return the lowest visible altitude at each sample, (s,) m AMSL: the ground, if it is in the picture."""
         base = np.full(len(self.points), self.low)
         return base if self.ground is None else np.fmax(self.ground, self.low)
 
@@ -161,7 +164,7 @@ class PathPlane:
 def threat_cuts(threats: Threats, plane: PathPlane, named: frozenset[int]) -> tuple[list[Layer], list[Label]]:
     """Return the sections of missile and radar spheres, radars first, and their names, once for each unit.
 
-    named: threats that have labels of their own.
+    named: threats with their own labels.
     """
     layers: list[Layer] = []
     labels: dict[int, Label] = {}
@@ -173,7 +176,7 @@ def threat_cuts(threats: Threats, plane: PathPlane, named: frozenset[int]) -> tu
             over = np.flatnonzero(np.isfinite(upper))
             if not over.size:
                 continue
-            # One sample more on either side, so that the outline ends where the sphere does.
+            # Add one sample on either side, so that the outline ends at the edge of the sphere.
             cut = slice(max(0, int(over[0]) - 1), int(over[-1]) + 2)
             name, legend = f"{threats.names[k][:40]} ({kind})", f"{kind}'s sphere over the path"
             layers.append(Layer("band", name, kind, plane.kilometres[cut], upper[cut], lower[cut], legend=legend))
@@ -187,7 +190,7 @@ def threat_cuts(threats: Threats, plane: PathPlane, named: frozenset[int]) -> tu
 def entered_cuts(
     threats: Threats, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
-    """The cut of each sphere whose rule fails, where it stands over the flight, and where to label it, by its index."""
+    """Return the section along the flight of each sphere whose rule fails, and its label position, by index."""
     layers, places = [], {}
     for place in failed.threats:
         k = place.index or 0
@@ -206,7 +209,7 @@ def entered_cuts(
 
 
 def zone_label(zone: Zone) -> str:
-    """Return a zone's name and band of heights.
+    """Return name and altitude band of a zone.
 
     >>> from world.airspace.zones import Cylinder
     >>> zone_label(Zone("mast", "exclusion", Cylinder(0.0, 0.0, 90.0), ceiling=ZoneLevel(120.0, "ground")))
@@ -227,7 +230,7 @@ def _level_text(level: ZoneLevel) -> str:
 
 
 def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
-    """Return zones from above, m: exclusions as areas, holes left open, inclusions as lines."""
+    """Return zones from above, m: exclusion zones as areas with open holes, inclusion zones as lines."""
     layers = []
     for zone in zones:
         gap = np.full((1, 2), np.nan)
@@ -241,7 +244,7 @@ def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
 
 
 def zone_names(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
-    """Exclusions' names and heights in their middles, inclusions' at their northernmost corner."""
+    """Label zones: exclusion zones at the center, inclusion zones at their northernmost corner."""
     if len(zones) > _MAX_ZONE_NAMES:
         return ()
     found = []
@@ -257,9 +260,9 @@ def zone_names(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
 class ZoneCut:
     """Part of the vertical plane through a path that a zone forbids.
 
-    zone: which one.
-    bottom, top: (s,) m AMSL at each of the path's samples.
-    where: (s,) bool, the samples at which that is forbidden.
+    zone: the zone.
+    bottom, top: (s,) m AMSL at each sample of the path.
+    where: (s,) bool, True at samples with a forbidden range.
     """
 
     zone: Zone
@@ -288,7 +291,7 @@ def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
 
 
 def zone_bands(zones: tuple[Zone, ...], plane: PathPlane) -> tuple[list[Layer], list[Label]]:
-    """Return the sections of zones in the plane, and the names of exclusion zones, in the middle of each."""
+    """Return the sections of zones in the plane, and the names of exclusion zones in the center of each."""
     layers, labels = [], []
     for cut in zone_cuts(zones, plane):
         keep_out = cut.zone.kind == "exclusion"

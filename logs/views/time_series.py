@@ -1,4 +1,4 @@
-"""The flight over time: speed, bank, tracking errors and clearance; controls and their limits; energy; exposure."""
+"""Chart a flight over time: tracking, controls and their limits, energy, and exposure."""
 
 from dataclasses import replace
 
@@ -14,26 +14,26 @@ from world.geometry import segment_exposure
 from world.kernels import compiled
 
 _SEEN = "as guidance saw it"
-# Power is the battery's energy over this long, s: less would show its float32 steps.
-_POWER_WINDOW = 2.0
+# Window for power from battery energy, s: a shorter one would show the float32 steps of the energy.
+_POWER_WINDOW_S = 2.0
 
 
 def doubles(values: NDArray[np.float32]) -> Floats:
-    """Widen a column of the track to float64, so that what is computed from it is not rounded again."""
+    """Convert a column of the track to float64, so that computed values are not rounded again."""
     return values.astype(np.float64)
 
 
 def over_time(setup: FlightSetup, subject: str, panels: list[Panel], track: Track) -> Chart:
-    """Return a chart over the time since the start, with the legs marked."""
+    """Return a chart over time since the start, with marked legs."""
     title = f"{shorten(setup.scenario.name, 60)}: {subject}"
     marks = leg_marks(track.leg, track.time)
     return Chart(title, "time since the start", "s", tuple(panels), marks=marks, timed=True)
 
 
 def time_chart(setup: FlightSetup, track: Track) -> Chart:
-    """Return airspeed, bank, climb, load factor, wind, cross-track error, height error and clearance over time.
+    """Return airspeed, bank, climb, load factor, wind, cross-track error, altitude error and clearance over time.
 
-    Clearance is computed from track and terrain, not read from the log; its panel is missing without terrain.
+    Clearance is computed from track and terrain, not read from the log; without terrain there is no such panel.
     """
     time = track.time
     roll, _, _ = track.attitude.T
@@ -67,9 +67,9 @@ def time_chart(setup: FlightSetup, track: Track) -> Chart:
 
 
 def control_chart(setup: FlightSetup, track: Track) -> Chart:
-    """Elevator, aileron, rudder and throttle over time, as commanded and as they stood.
+    """Return commanded and actual elevator, aileron, rudder and throttle over time.
 
-    Shaded: the command is at or beyond the control's limit, and the aircraft can give no more.
+    Shaded stretches: the command is at or beyond the limit of the control.
     """
     panels = []
     limits = control_limits(setup.aircraft)
@@ -90,9 +90,9 @@ def control_chart(setup: FlightSetup, track: Track) -> Chart:
 
 
 def energy_chart(setup: FlightSetup, track: Track) -> Chart:
-    """Battery energy used, power, current, and the aircraft's specific energy as a height, over time.
+    """Return battery energy used, power, current, and the aircraft's specific energy as a height, over time.
 
-    Of an aircraft that burns fuel, its heat is shown, and no current.
+    For an aircraft that burns fuel, the heat of the fuel is shown, and no current.
     """
     burns = setup.envelope.power_level.size > 0 and not setup.envelope.volts
     store, unit, power_unit, scale = (
@@ -100,7 +100,7 @@ def energy_chart(setup: FlightSetup, track: Track) -> Chart:
     )
     time = track.time
     used = doubles(track.energy)
-    late = np.searchsorted(time, time - _POWER_WINDOW)
+    late = np.searchsorted(time, time - _POWER_WINDOW_S)
     lasts = np.maximum(time - time[late], 1e-9)
     power = np.where(late < np.arange(len(track)), 3600.0 * (used - used[late]) / lasts, np.nan)
     height = track.position[:, 2]
@@ -111,7 +111,7 @@ def energy_chart(setup: FlightSetup, track: Track) -> Chart:
     )
     panels = [
         Panel(f"{store} used", unit, (filled_series("used", "difference", time, scale * used),)),
-        Panel("power", power_unit, (series(f"mean of {_POWER_WINDOW:g} s", "flown", time, scale * power),)),
+        Panel("power", power_unit, (series(f"mean of {_POWER_WINDOW_S:g} s", "flown", time, scale * power),)),
         *([] if burns else [Panel("battery current", "A", (series("current", "flown", time, track.current),))]),
         Panel("energy as height", "m", as_height),
     ]
@@ -121,15 +121,15 @@ def energy_chart(setup: FlightSetup, track: Track) -> Chart:
 
 # Exposure along the flown track.
 
-# Segments that the track is joined to for the curve; the sums stay those of straight segments.
+# Largest number of straight segments that replace the track for the curve; the sums are those over these segments.
 _MAX_SEGMENTS = 12_000
 
 
 def exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
-    """Mean of (scale/d)^4 inside each of m spheres on each segment (paper eq. 9 and 10), summed over the spheres.
+    """Return the mean of (scale/d)^4 on each segment (paper eq. 9, 10), summed over spheres around it.
 
-    position: (t, 3) m.  centres: (m, 3).  radii, scales: (m,).  Returns (t - 1,), 1 at one scale's
-    distance; NaN where the track is not a number.
+    position: (t, 3) m.  centres: (m, 3).  radii, scales: (m,).  Returns (t - 1,), 1 at a distance of one scale; NaN
+    where the track is unknown.
     """
     return _rates(
         np.ascontiguousarray(position), np.ascontiguousarray(centres), np.ascontiguousarray(radii), scales.copy()
@@ -149,9 +149,9 @@ def _rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> 
 
 
 def exposure_chart(setup: FlightSetup, track: Track) -> Chart | None:
-    """Strength and sum of kill and of detection along the flown distance (km), of those that the flight was exposed to.
+    """Return strength and sum of kill and detection exposure along the flown distance (km).
 
-    None where it was exposed to nothing.
+    Only exposure that occurred is shown; None if there was none.
     """
     threats = setup.scenario.threats
     if not len(threats) or len(track) < 2:

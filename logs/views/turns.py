@@ -1,4 +1,4 @@
-"""Turn by turn and leg by leg: planned, flown and limit of each finding that has a place on the route."""
+"""Chart the findings with a place on the route, by turn and leg: planned value, flown value and limit."""
 
 import math
 from collections.abc import Sequence
@@ -11,9 +11,10 @@ from logs.verdict.verdict import Verdict
 from logs.views.charts import Chart, Layer, Panel, shorten
 from world.arrays import Floats
 
-# Margin above and below what a panel shows, of its span; and a limit so many times as high is left out of it.
+# Margin of a panel above and below its values, as a fraction of their span.
 _MARGIN = 0.12
-_FAR = 4.0
+# A limit above the largest value times this ratio is left out.
+_MAX_LIMIT_RATIO = 4.0
 # Rule, kind of place, title and unit.
 PLACE_PANELS = (
     ("turn", "waypoint", "turn", "°"),
@@ -26,7 +27,7 @@ PLACE_PANELS = (
 
 @dataclass(frozen=True, slots=True)
 class PlaceValue:
-    """Values of a finding at one waypoint or leg, in its unit; NaN if not stated."""
+    """Values of a finding at one waypoint or leg, in the unit of the finding; NaN if not stated."""
 
     number: int
     planned: float
@@ -36,7 +37,7 @@ class PlaceValue:
 
 
 def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
-    """List a rule's findings by number of waypoint or leg, without findings of the whole flight."""
+    """List the findings of a rule by number of waypoint or leg, without findings on the whole flight."""
     found = []
     for finding in findings:
         place = finding.place
@@ -49,10 +50,10 @@ def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
 
 
 def turn_chart(name: str, verdict: Verdict) -> Chart:
-    """Panels of turns, slopes, clearances, waypoints and corridor; none where the verdict has none of them.
+    """Return panels of turns, slopes, clearances, waypoints and corridor, as far as the verdict has findings.
 
-    Bars stand for the plan, dots for the flight, dashes for limits; what fails is ringed.
-    name: of the scenario.
+    Bars stand for the plan, dots for the flight, dashes for limits; rings mark failures.
+    name: name of the scenario.
 
     >>> turn_chart("a plan", Verdict((), flyable=False, complete=False, lines=(), level="plan")).panels
     ()
@@ -95,6 +96,6 @@ def _panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue
 
 
 def _is_near(limits: Floats, rule: str, largest: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Return which limits are shown: of turns and corridors, one far above everything else would press that flat."""
-    far = _FAR * max(largest, 1e-9) if rule in ("turn", "corridor") else math.inf
+    """Return the limits to show; a far higher limit of turns or corridors would flatten everything else."""
+    far = _MAX_LIMIT_RATIO * max(largest, 1e-9) if rule in ("turn", "corridor") else math.inf
     return np.asarray(limits <= far, dtype=np.bool_)

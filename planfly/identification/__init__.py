@@ -1,1 +1,1 @@
-"""From flight logs to an aircraft's folder: logs read and cut, a model estimated, written, replayed and shown."""
+"""Identify an aircraft from flight logs: estimate a model, then write, replay and show it."""

@@ -1,4 +1,4 @@
-"""The base aircraft of an identification as numbers, taken off its JSBSim model about level flight at cruise."""
+"""Extract the numbers of a base aircraft from its JSBSim model in level flight at cruise."""
 
 import math
 from collections.abc import Callable
@@ -18,19 +18,23 @@ from flight.dynamics.trim import straight
 from world.arrays import Floats
 from world.errors import FlightError
 
-# Height at which it is taken, m; steps of angles (rad), of rates (rad/s) and of surfaces (rad).
+# Altitude of the trim, m AMSL.
 _AMSL = 500.0
-_ANGLE = 1e-3
+# Step of flow angles for central differences, rad.
+_ANGLE_STEP_RAD = 1e-3
+# Step of angular rates, rad/s.
 _RATE = 1e-3
-_SURFACE = 1e-3
+# Step of surface deflections, rad.
+_SURFACE_STEP_RAD = 1e-3
+# Moment of inertia of 1 slug ft^2, kg m^2.
 _SLUG_FT2 = 1.3558179483314004
 
 
 def base_model(aircraft: Aircraft) -> BaseModel:
-    """Return numbers of an aircraft.
+    """Return the model values of an aircraft.
 
-    Raises FlightError for one without steady flight at cruise, and for one whose motor is neither in the form of the
-    Aerosonde's nor in that of the Zagi's or the X8's.
+    Raises FlightError for an aircraft without steady flight at cruise, and for a motor model in neither the form of the
+    Aerosonde nor the form of Zagi and X8.
 
     >>> from aircraft.catalog import load_aircraft
     >>> numbers = base_model(load_aircraft("aerosonde")).coefficients
@@ -54,7 +58,7 @@ def base_model(aircraft: Aircraft) -> BaseModel:
 
 
 class _Probe:
-    """Forces and moments of a model at chosen flows, rates and surfaces, as coefficients."""
+    """Coefficients of a model's forces and moments at given flow angles, rates and surface deflections."""
 
     def __init__(self, aircraft: Aircraft) -> None:
         self._fdm = fdm = Fdm(aircraft)
@@ -68,21 +72,21 @@ class _Probe:
         fdm.balance(found.vector())
         self.mass = read("inertia/mass-slugs")() * 14.593902937206364
         ixx, iyy, izz, ixz = (read(f"inertia/i{axes}-slugs_ft2")() * _SLUG_FT2 for axes in ("xx", "yy", "zz", "xz"))
-        # JSBSim's product of inertia has the other sign.
+        # JSBSim's product of inertia has the opposite sign.
         self.inertia = (ixx, iyy, izz, -ixz)
         self._pressure = read("aero/qbar-psf")() * 47.88025898033584 * self._area
 
     def coefficients(self) -> Coefficients:
-        """Central differences about the trim, the throttle closed but for what windmills."""
+        """Return central differences about the trim with closed throttle; the propeller may windmill."""
         zero = self._at(0.0)
-        # Drag against lift over the straight part of the curve.
+        # Fit drag over lift on the straight part of the lift curve.
         angles = np.radians([-2.0, 0.0, 2.0, 4.0, 6.0])
         table = np.array([self._at(angle)[:2] for angle in angles])
         induced, linear, constant = np.polyfit(table[:, 1], table[:, 0], 2)
         least = -0.5 * linear / induced
-        alpha = self._slope(self._at, _ANGLE)
-        beta = self._slope(lambda step: self._at(0.0, beta=step), _ANGLE)
-        elevator, aileron, rudder = (self._slope(partial(self._surface, k), _SURFACE) for k in range(3))
+        alpha = self._slope(self._at, _ANGLE_STEP_RAD)
+        beta = self._slope(lambda step: self._at(0.0, beta=step), _ANGLE_STEP_RAD)
+        elevator, aileron, rudder = (self._slope(partial(self._surface, k), _SURFACE_STEP_RAD) for k in range(3))
         across, along = self._span / (2.0 * self._airspeed), self.chord / (2.0 * self._airspeed)
         roll, pitch, yaw = (
             self._slope(partial(self._rate, k), _RATE) / size for k, size in enumerate((across, along, across))
@@ -129,7 +133,7 @@ class _Probe:
     def _at(
         self, alpha: float, beta: float = 0.0, rates: Floats | None = None, surfaces: Floats | None = None
     ) -> Floats:
-        """(6,) coefficients of drag, lift and side force, and of the moments, aerodynamic alone, throttle closed."""
+        """Return aerodynamic coefficients (6,) of drag, lift, side force and moments, with closed throttle."""
         turning = np.zeros(3) if rates is None else rates
         deflections = np.zeros(3) if surfaces is None else surfaces
         speed = self._airspeed
@@ -146,20 +150,23 @@ class _Probe:
 
 
 def is_flying_wing(aircraft: Aircraft) -> bool:
-    """Return True if a model has elevons: mixed from elevator and aileron in the model itself."""
+    """Return True if a model has elevons and mixes them from elevator and aileron itself."""
     root = _model(aircraft)
     return root is not None and any(one.get("name") == "elevon/left-rad" for one in root.iter("actuator"))
 
 
 def _reacts(aircraft: Aircraft) -> bool:
-    """Return True if a model has the reaction to propeller torque; models of flying wings leave it out."""
+    """Return True if a model includes the reaction to propeller torque.
+
+    Models of flying wings leave it out.
+    """
     root = _model(aircraft)
     reactions = None if root is None else root.find("external_reactions")
     return reactions is None or reactions.find("moment") is not None
 
 
 def _model(aircraft: Aircraft) -> ElementTree.Element | None:
-    """Return the model's text as it is parsed; None of one that JSBSim will say is wrong."""
+    """Return the parsed model, or None if it cannot be parsed (JSBSim reports the fault later)."""
     try:
         return ElementTree.parse(aircraft.model_file).getroot()
     except (OSError, ElementTree.ParseError):
@@ -167,7 +174,10 @@ def _model(aircraft: Aircraft) -> ElementTree.Element | None:
 
 
 def read_motor(aircraft: Aircraft) -> Motor:
-    """Constants of a model's motor, or of its propeller as a disc.  Raises FlightError for any other form."""
+    """Return the constants of a model's motor, or of its propeller disc.
+
+    Raises FlightError for any other form.
+    """
     try:
         root = ElementTree.parse(aircraft.model_file).getroot()
         functions = {one.get("name", ""): one for one in root.iter("function")}
@@ -191,7 +201,7 @@ def _disc(functions: dict[str, ElementTree.Element], volts: float) -> PropellerD
     behind, pull, power = (functions[f"motor/{name}"] for name in ("exit-mps", "thrust-n", "battery-power-w"))
     (exit_speed,) = _numbers(behind)
     (area,) = (value for value in _numbers(pull) if value != 0.0)
-    # Half of the air's power by the efficiency.
+    # The factor is half the power given to the air, divided by the efficiency.
     (half,) = _numbers(power)
     ducted = any((one.text or "").strip() == "motor/airspeed-mps" for one in behind.iter("p"))
     return PropellerDisc(area, exit_speed, ducted, losses=2.0 * half - 1.0, voltage=volts, nominal=volts)
@@ -205,7 +215,7 @@ def _electric_motor(functions: dict[str, ElementTree.Element], volts: float) -> 
     (damping,) = numbers("motor/b")
     driven = numbers("motor/driven-rad_sec")
     per_volt = -next(value for value in driven if value < 0.0)
-    # The no-load torque stands there, or in a function of its own.
+    # The no-load torque stands in this function or in one of its own.
     own = functions.get("motor/loss-n_m")
     idle = numbers("motor/loss-n_m")[0] if own is not None else next(v for v in driven if 0.0 < v < 2.0)
     back = damping / per_volt
@@ -225,10 +235,10 @@ def _electric_motor(functions: dict[str, ElementTree.Element], volts: float) -> 
 def scaled(base: BaseModel, mass: float, span: float, area: float, volts: float | None = None) -> BaseModel:
     """Return the same kind of aircraft with another mass (kg), span (m) and area (m^2).
 
-    Inertia goes with mass and span squared.  The chord keeps its share of the mean chord.  Induced drag is CL^2 over
-    pi, the span efficiency and the aspect ratio (Anderson, Fundamentals of Aerodynamics, section 5.3.2): the efficiency
-    stays, as all other coefficients and the motor do.
-    volts: of the battery; another one has a motor for it, that turns as fast at full throttle.
+    Inertia scales with mass and span squared.  The ratio of chord to mean chord stays.  Induced drag is CL^2 divided by
+    pi, span efficiency and aspect ratio (Anderson, Fundamentals of Aerodynamics, section 5.3.2); the efficiency, all
+    other coefficients and the motor stay.
+    volts: battery voltage; for another voltage the motor is replaced by one of the same speed at full throttle.
     """
     weight, wide = mass / base.mass, span / base.span
     chord = base.chord * (area / span) / (base.area / base.span)

@@ -1,4 +1,4 @@
-"""Checks of an estimate for impossible results: reversed outputs, values at their bounds, a changing mass."""
+"""Check an estimate for impossible results: reversed outputs, values at their bounds, a changing mass."""
 
 import numpy as np
 
@@ -7,23 +7,25 @@ from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import INDEX, PARAMETERS
 from world.errors import LogError
 
-# Parameters whose sign depends on the sense of an output, and the control.
+# Control of each parameter whose sign depends on the direction of a servo output.
 _POWERS = {"aileron-power": "aileron", "elevator-power": "elevator", "rudder-power": "rudder"}
-# Share of an interval that is the log's from which on a sign counts.
+# The sign of a parameter is judged if the logs contribute at least this fraction of its interval.
 _KNOWN = 0.3
-# Slopes of lift curves, per rad, of wings as there are.
+# Lowest and highest plausible lift slope of a wing, per rad.
 LIFT_SLOPES = (3.0, 7.0)
-# A change of mass within the logs, as a share, and how many of its standard deviations it must be.
+# Largest accepted change of mass within the logs, as a fraction.
 MASS_CHANGE = 0.05
-_SURE = 4.0
+# A change of mass is reported only if it exceeds this number of standard deviations.
+_MASS_CHANGE_SIGMAS = 4.0
+# Duration of the blocks that are averaged for the trend of the mass, s.
 _BLOCK_SECONDS = 30.0
 
 
 def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int], source: str) -> None:
-    """Refuse an estimate that no aircraft can have.
+    """Raise LogError for an estimate that no aircraft can have.
 
-    outputs: number of the servo output of each control that has one of its own.  source: of the logs, for the message.
-    Raises LogError, in one line.
+    outputs: servo output number of each control that has its own output.  source: name of the logs, for the message.
+    The message is one line.
     """
     known = estimate.of_log()
     for name, control in _POWERS.items():
@@ -51,16 +53,16 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
             message = f"{parameter.title} ({parameter.name}) = {value:.2f} is at its bound: {allowed}"
             raise LogError(f"{source}: {message}", file=source, field=parameter.name, value=value, allowed=allowed)
     change, sd = mass_change(estimate, base)
-    if abs(change) > MASS_CHANGE and abs(change) > _SURE * sd:
+    if abs(change) > MASS_CHANGE and abs(change) > _MASS_CHANGE_SIGMAS * sd:
         message = f"the mass seems to change by {100.0 * change:+.0f} % within the logs: one mass is expected"
         raise LogError(f"{source}: {message}", file=source, value=change)
 
 
 def mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, float]:
-    """Change of mass over all logs, as a share of it, and its standard deviation.
+    """Return the change of mass over all logs, as a fraction of the mass, and its standard deviation.
 
-    A lighter aircraft needs less angle of attack than its supposed mass does, and ever less as it burns or drops
-    something: the trend of the angle over what the lift curve says, over the angle from zero lift.
+    An aircraft that burns fuel or drops a load needs less and less angle of attack for its supposed mass.  The change
+    is the trend of measured less predicted angle of attack, divided by the predicted angle above zero lift.
     """
     equation = estimate.equations[0]
     c = base.coefficients

@@ -1,4 +1,4 @@
-"""The folder of an identified aircraft: its model and all that goes with it."""
+"""Build the folder of an identified aircraft: its model and the files that go with it."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -26,10 +26,11 @@ from planfly.identification.servos import ServoOutput
 from world.arrays import Floats
 from world.files import temporary_folder
 
-# Height at which performance is stated, m, and the density of the standard atmosphere there, kg/m^3 (ISO 2533).
+# Altitude at which performance is stated, m AMSL.
 AMSL = 480.0
+# Density of the standard atmosphere at that altitude, kg/m^3 (ISO 2533).
 DENSITY = 1.1695
-# Parameters of a log that say how it flew, by their beginnings; the rest is of its hardware.
+# Prefixes of the parameters that determine flight behaviour; the others describe hardware.
 _FLYING = (
     "AIRSPEED_",
     "ARSPD_FBW_",
@@ -58,10 +59,10 @@ _FLYING = (
 
 @dataclass(frozen=True, slots=True)
 class Identified:
-    """All that was found out.
+    """Results of an identification.
 
-    base: the aircraft that it began with.  numbers: of that, scaled.  estimate, draws: (512, n).
-    logs: that it was identified from.  outputs: of the servos.
+    base: the aircraft that the identification started from.  numbers: model values of the base, scaled.
+    draws: (512, n) draws of the estimate.  logs: the logs used.  outputs: the servo outputs.
     """
 
     base: Aircraft
@@ -73,7 +74,7 @@ class Identified:
     cruise: float
 
     def performance(self) -> tuple[Performance, Performance]:
-        """Return the values of the estimate (1,), and of all draws (512,)."""
+        """Return the performance of the estimate (1,) and of all draws (512,)."""
         return (
             performance(self.numbers, self.estimate.values, self.cruise, DENSITY),
             performance(self.numbers, self.draws, self.cruise, DENSITY),
@@ -87,15 +88,15 @@ def make_identified(
     logs: Sequence[MotionLog],
     outputs: Mapping[str, ServoOutput],
 ) -> Identified:
-    """With 512 draws, at the cruise speed (true, at `AMSL`) of the last log."""
+    """Return an identification with 512 draws, at the cruise speed (true, at `AMSL`) of the last log."""
     cruise = _airspeeds(logs[-1], base)[0]
     return Identified(base, numbers, estimate, draw_aircraft(estimate), logs, outputs, cruise)
 
 
 def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> dict[str, str]:
-    """Return the files of its folder but for the page, by their names; battery: V and J.
+    """Return the files of the folder by name, except the page; battery: V and J.
 
-    The mission of manoeuvres begins at the logs' home, and is left out where none of them says where that is.
+    The mission of manoeuvres begins at the home position of the last log that has one; without any it is left out.
     Raises FlightError for an aircraft that does not trim.
     """
     xml = identified_xml(found.base, name, found.numbers, found.estimate.values)
@@ -128,9 +129,11 @@ def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> 
 
 
 def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
-    """Cruise, least and largest true airspeed at `AMSL`, m/s; the base's where the log does not say.
+    """Return cruise, lowest and highest true airspeed at `AMSL`, m/s.
 
-    ArduPlane's are equivalent airspeeds.
+    Values that the log does not state come from the base.
+
+    ArduPlane's parameters are equivalent airspeeds.
     """
     stated = flown_parameters(log)
     ratio = math.sqrt(1.225 / DENSITY)
@@ -182,9 +185,9 @@ def _metadata(found: Identified, battery: tuple[float, float], slow: float, fast
 
 
 def flown_parameters(log: MotionLog) -> dict[str, float]:
-    """Return parameters of a log that say how it flew, by their present names and units.
+    """Return the parameters of a log that determine flight behaviour, by their present names and units.
 
-    The log may have those of ArduPlane's law by the names of 4.4 and before; values out of range are left out.
+    The log may use the parameter names of ArduPlane 4.4 and before; values out of range are left out.
     """
     old = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
     present = {definition.name for definition in DEFINITIONS.values()}
@@ -222,7 +225,7 @@ def posterior_text(found: Identified) -> str:
     """Return the text of ``posterior.toml``."""
     estimate = found.estimate
     best, drawn = found.performance()
-    # As a share; more than the whole of it is as good as nothing known.
+    # As a fraction; a standard deviation above the value itself is no knowledge at all.
     power = min(1.0, float(np.std(drawn.power) / best.power[0]))
     climb, sink = (float(np.degrees(np.std(angles))) for angles in (drawn.climb, drawn.sink))
     fastest = fastest_level(found.numbers, found.draws, DENSITY)

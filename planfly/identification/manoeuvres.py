@@ -1,7 +1,6 @@
-"""The mission that shows an aircraft to its identification: climbs, glides, level runs at several speeds, and turns.
+"""Build the mission for an identification: climbs, glides, level runs at several speeds, and turns.
 
-It is flown in AUTO.  Doublets of the controls are no items of a mission: they are flown by hand in
-FBWA, or by AUTOTUNE.
+The mission is flown in AUTO.  Control doublets cannot be mission items: fly them by hand in FBWA, or with AUTOTUNE.
 """
 
 import math
@@ -14,26 +13,27 @@ from aircraft.envelope import Envelope
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
 from world.frames import GeoOrigin, to_geo
 
-# Share of the steepest climb and descent that its slopes ask for: a little less than full throttle, so that the mission
-# itself can be flown in the wind there may be.
+# Slopes of the mission as a fraction of the steepest climb and descent: slightly less than full throttle, so that the
+# mission can be flown in wind.
 _SHARE = 0.85
-# Seconds of a run, and of a climb or a glide.
+# Duration of a level run, s.
 _RUN = 25.0
-_SLOPE = 25.0
-# Height above home that it begins at, m.
-_UP = 150.0
+# Duration of a climb or a glide, s.
+_SLOPE_TIME_S = 25.0
+# Height above home at which the mission begins, m.
+_START_HEIGHT_M = 150.0
 
 
 def identification_mission(
     aircraft: Aircraft, envelope: Envelope, lat_deg: float, lon_deg: float, ground: float, repeats: int = 1
 ) -> Mission:
-    """Return the mission about a place.
+    """Return the mission around a home position.
 
-    lat_deg, lon_deg, ground: of home, degrees and m above sea level.  repeats: how often all of it is flown.
+    lat_deg, lon_deg, ground: home position, degrees and m AMSL.  repeats: number of times the sequence is flown.
 
-    Square after square, so that every manoeuvre is flown with the wind and against it.
+    The legs form squares, so that every manoeuvre is flown with the wind and against it.
     """
-    places = list(_places(aircraft, envelope, ground + _UP, repeats))
+    places = list(_places(aircraft, envelope, ground + _START_HEIGHT_M, repeats))
     east, north = np.array([place[:2] for place in places]).T
     lats, lons = to_geo(GeoOrigin(lat_deg, lon_deg), east, north)
     items: list[MissionItem] = []
@@ -56,32 +56,32 @@ def identification_mission(
 def _places(
     aircraft: Aircraft, envelope: Envelope, base: float, repeats: int
 ) -> Iterator[tuple[float, float, float, float]]:
-    """East, north and height (m), and the airspeed (m/s) towards each."""
+    """Yield east, north and altitude (m) of each waypoint, and the airspeed (m/s) towards it."""
     cruise = aircraft.airspeed
     slow = aircraft.airspeed_min + 0.15 * (cruise - aircraft.airspeed_min)
     fast = cruise + 0.6 * (aircraft.airspeed_max - cruise)
     between = 0.5 * (slow + cruise)
-    # Speed, seconds, and -1, 0 or 1 for down, level and up.
+    # Airspeed, duration (s), and -1, 0 or 1 for descent, level flight and climb.
     figure = (
         (cruise, _RUN, 0),
-        (cruise, _SLOPE, 1),
+        (cruise, _SLOPE_TIME_S, 1),
         (slow, _RUN, 0),
-        (cruise, _SLOPE, -1),
+        (cruise, _SLOPE_TIME_S, -1),
         (fast, _RUN, 0),
-        (between, _SLOPE, 1),
+        (between, _SLOPE_TIME_S, 1),
         (cruise, _RUN, 0),
-        (fast, _SLOPE, -1),
+        (fast, _SLOPE_TIME_S, -1),
         (between, _RUN, 0),
-        (cruise, _SLOPE, 1),
+        (cruise, _SLOPE_TIME_S, 1),
         (0.5 * (cruise + fast), _RUN, 0),
-        (cruise, _SLOPE, -1),
+        (cruise, _SLOPE_TIME_S, -1),
     )
     east = north = 0.0
     up, heading = base, 0.0
     yield east, north, up, cruise
     for _ in range(repeats):
         for number, (speed, seconds, way) in enumerate(figure):
-            # Turns take the ends of a leg.
+            # Add length for the turns at both ends of the leg.
             length = speed * seconds + 2.0 * speed * speed / 9.81
             climb, descent = envelope.air_angles(speed, up)
             angle = (climb if way > 0 else descent) * _SHARE if way else 0.0
@@ -89,5 +89,5 @@ def _places(
             east += length * math.sin(heading)
             north += length * math.cos(heading)
             yield east, north, up, speed
-            # Four corners to the right, then four to the left.
+            # Four right turns, then four left turns.
             heading += 0.5 * math.pi if number // 4 % 2 == 0 else -0.5 * math.pi

@@ -1,8 +1,8 @@
-"""The identified aircraft's JSBSim model: the base's text with what was estimated as properties ``ident/NAME``.
+"""Write the JSBSim model of an identified aircraft: its base with properties ``ident/NAME``.
 
-The base's own coefficients stay.  Beside each function of forces and moments stands another, of what the estimate adds
-to them; motor and propeller are written again, in the form that the base has them in.  The properties' defaults are the
-estimate: a draw of the aircraft is another set of them.
+The coefficients of the base stay.  Next to each function of forces and moments stands another with the terms that the
+estimate adds.  Motor and propeller are written again, in the form that they have in the base.  The default values of
+the properties are the estimate; a draw of the aircraft sets them to other values.
 """
 
 from xml.etree import ElementTree
@@ -17,20 +17,22 @@ from aircraft.xml_text import number
 from world.arrays import Floats
 from world.errors import FlightError
 
+# Moment of inertia of 1 slug ft^2, kg m^2.
 _SLUG_FT2 = 1.3558179483314004
+# One pound, kg.
 _POUND = 0.45359237
-# Angles of attack beyond this, rad, are not seen in flight: what was estimated is held from there on.
+# Largest angle of attack seen in flight, rad; the estimated terms stay constant beyond it.
 _LARGEST_ALPHA = 0.25
 
 
 def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats) -> str:
     """Return the text of ``name.xml``.
 
-    base: whose model's text it begins with.  numbers: scaled to the aircraft.  values: (n,) of
+    base: the aircraft whose model is extended.  numbers: scaled to the aircraft.  values: (n,) of
     `aircraft.identification.parameters.PARAMETERS`.
     """
     text = base.model_file.read_text(encoding="utf-8")
-    # A base from a data sheet has properties of these names: they stay at its own values, under another.
+    # A base from a data sheet has properties of these names: keep them, with their values, under another name.
     text = text.replace("ident/", "base/")
     root = ElementTree.fromstring(text, parser=ElementTree.XMLParser(target=ElementTree.TreeBuilder()))
     root.set("name", name)
@@ -39,7 +41,7 @@ def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats
     old = _part(root, "external_reactions", base)
     reactions = ElementTree.fromstring(_reactions(numbers, values, kept))
     root.remove(old)
-    # Its properties are read by what follows.
+    # Elements further down read these properties.
     root.insert(list(root).index(_part(root, "flight_control", base)), reactions)
     aerodynamics = _part(root, "aerodynamics", base)
     shared = f"<a>{_lift_functions(numbers)}</a>"
@@ -59,7 +61,7 @@ def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats
     return head + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-# What of a base's model is written anew, or beside which something is written.
+# Elements of a base model that are rewritten or extended.
 _PARTS = (
     *(f"metrics/{name}" for name in ("wingarea", "wingspan", "chord")),
     *(f"mass_balance/{name}" for name in ("ixx", "iyy", "izz", "ixz", "emptywt")),
@@ -68,7 +70,10 @@ _PARTS = (
 
 
 def check_base(base: Aircraft) -> None:
-    """Refuse a base whose model lacks a part that `identified_xml` needs.  Raises FlightError, in one line."""
+    """Refuse a base whose model lacks a part that `identified_xml` needs.
+
+    Raises FlightError, in one line.
+    """
     try:
         root = ElementTree.parse(base.model_file).getroot()
     except (OSError, ElementTree.ParseError) as error:
@@ -110,11 +115,11 @@ def _set_sizes(root: ElementTree.Element, numbers: BaseModel, base: Aircraft) ->
 
 
 # ----------------------------------------------------------------------
-# Aerodynamics: what the estimate adds, of the base's coefficients.
+# Aerodynamics: terms that the estimate adds, from the coefficients of the base.
 
 
 def _factor(name: str) -> str:
-    """Return a factor less 1."""
+    """Return the sum that subtracts 1 from a factor."""
     return f"<sum> <p> ident/{name} </p> <v> -1 </v> </sum>"
 
 
@@ -123,7 +128,7 @@ def _term(coefficient: float, *factors: str) -> str:
 
 
 def _lift_functions(numbers: BaseModel) -> str:
-    """Return coefficients of lift of the angle of attack alone, before and after the estimate, as far as seen."""
+    """Return lift coefficients of base and estimate from angle of attack, up to the largest angle seen."""
     c = numbers.coefficients
     return f"""
     <function name="ident/alpha-rad"> <min> <v> {_LARGEST_ALPHA} </v>
@@ -136,7 +141,7 @@ def _lift_functions(numbers: BaseModel) -> str:
 
 
 def _additions(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control: str) -> str:
-    """Return the function that joins an axis; none for an axis of which nothing was estimated."""
+    """Return the function added to an axis; empty for an axis without estimated terms."""
     c = numbers.coefficients
     surfaces = [
         f"<product> <p> {reading.name} </p> <v> {number(reading.factor)} </v> </product>{control}"
@@ -197,7 +202,7 @@ _AIR = "<p> motor/airspeed-mps </p>"
 
 
 def _reactions(numbers: BaseModel, values: Floats, kept: list[ElementTree.Element]) -> str:
-    """Return the text of ``<external_reactions>``: the properties, and what drives the propeller."""
+    """Return the text of ``<external_reactions>``: the properties, and the forces of motor and propeller."""
     own = "\n".join(
         f'<property value="{values[INDEX[parameter.name]]:.9g}"> {parameter.property_name} </property>'
         for parameter in PARAMETERS
@@ -226,7 +231,7 @@ def _reactions(numbers: BaseModel, values: Floats, kept: list[ElementTree.Elemen
 
 
 def _motor_functions(motor: Motor) -> dict[str, str]:
-    """Return the inside of each JSBSim function ``motor/NAME``, in the order in which they are computed."""
+    """Return the content of each JSBSim function ``motor/NAME``, in order of computation."""
     shared = {
         "rho-kg_m3": "<product> <p> atmosphere/rho-slugs_ft3 </p> <v> 515.3788183931961 </v> </product>",
         "airspeed-mps": "<product> <p> velocities/vt-fps </p> <v> 0.3048 </v> </product>",
@@ -248,7 +253,7 @@ def _disc_functions(disc: PropellerDisc) -> dict[str, str]:
         gained = f"<product> <p> motor/throttle-norm </p> <difference> {full} {_AIR} </difference> </product>"
         exit_speed, first = f"<sum> {_AIR} {gained} </sum>", behind
     pull = f"<v> {number(disc.pull)} </v> <p> ident/thrust </p> {_RHO} {first}"
-    # Power of the air, T (V + v_e) / 2, and what is lost beside it.
+    # Power given to the air, T (V + v_e) / 2, plus losses.
     power = f"<v> {number(0.5 * disc.power * (1.0 + disc.losses))} </v> <p> ident/propeller-torque </p>"
     return {
         "exit-mps": exit_speed,
@@ -262,7 +267,7 @@ def _disc_functions(disc: PropellerDisc) -> dict[str, str]:
 def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
     q2, q1, q0 = (number(value) for value in motor.torque)
     kv, r = motor.back_voltage, motor.resistance
-    # Over the factor on motor speed: KV is divided by it, and its square is KQ KV.
+    # Divide by the factor on motor speed: KV is divided by it, and its square is KQ KV.
     speed = "<p> ident/motor-speed </p>"
     loss = f"<quotient> <v> {number(kv * motor.idle_current)} </v> {speed} </quotient>"
     drive = f"<quotient> <product> <v> {number(-kv / r)} </v> <p> motor/input-v </p> </product> {speed} </quotient>"

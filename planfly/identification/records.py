@@ -1,4 +1,4 @@
-"""From a log's motion to stretches of flight on one grid of times: what can be used, or why not."""
+"""Resample a logged motion on one time grid, and select stretches that an identification can use."""
 
 from collections.abc import Mapping
 
@@ -12,24 +12,27 @@ from planfly.identification.servos import ServoOutput
 from world.arrays import Flags, Floats
 from world.errors import LogError
 
-# Rows a second that inertial sensors and outputs need for an estimate of the moments: 10 Hz are a little more or less
-# in a log.  With fewer than `PLENTY_HZ` the setting that records more is named.
+# Lowest rate of inertial sensors and servo outputs that allows an estimate of the moments, Hz: a nominal 10 Hz varies
+# slightly in a log.
 MIN_HZ = 9.5
+# Below this rate, Hz, the report names the setting that records more.
 PLENTY_HZ = 20.0
-# Flight that a log must have after what cannot be used is cut, s; and a stretch, s.
+# Least usable flight time of a log, after unusable parts are cut, s.
 MIN_SECONDS = 180.0
+# Least duration of a stretch, s.
 MIN_STRETCH = 30.0
-# A pause between rows that parts two stretches, s; of airspeed and wind, which come more slowly: PX4's wind once a
-# second, more or less.
+# A longer pause between rows of the sensors splits a stretch, s.
 _GAP = 0.5
-_AIR_GAP = 1.0
-_SLOW_WIND_GAP = 2.5
-# After taking off or being let go, s.
-_SETTLING = 15.0
-# Flight: faster than this share of AIRSPEED_MIN.
+# The same limit for airspeed and wind, which are logged more slowly, s.
+_MAX_AIR_GAP_S = 1.0
+# The same limit for PX4's wind, which is logged about once a second, s.
+_MAX_PX4_WIND_GAP_S = 2.5
+# Time after take-off or release that is cut, s.
+_SETTLING_TIME_S = 15.0
+# The aircraft flies above this fraction of AIRSPEED_MIN.
 _FLYING = 0.8
-# ArduPlane's modes of a quadplane (QSTABILIZE 17 to QACRO 23, QAUTOTUNE 22, LOITER_ALT_QLAND 25), and those without
-# surfaces under control: INITIALISING 16.
+# ArduPlane's quadplane modes (QSTABILIZE 17 to QACRO 23, QAUTOTUNE 22, LOITER_ALT_QLAND 25), and the mode that does not
+# control the surfaces: INITIALISING 16.
 _VTOL_MODES = frozenset({17, 18, 19, 20, 21, 22, 23, 25})
 # SERVOn_FUNCTION (ArduPilot's parameter list).
 _AILERON = 4
@@ -38,10 +41,12 @@ _RUDDER = 21
 _THROTTLE = 70
 _ELEVON_LEFT = 77
 _ELEVON_RIGHT = 78
+# Functions of mixed surfaces, which are refused.
 _MIXED = {79: "a V-tail", 80: "a V-tail"}
-# Outputs of a flying wing by their names: surfaces that are mixed into elevator and ailerons.
+# Names of the two outputs of a flying wing, each a mix of elevator and aileron.
 LEFT = "left elevon"
 RIGHT = "right elevon"
+# Functions of surfaces that must not move in flight.
 _FLAPS = {
     2: "flap",
     3: "automatic flap",
@@ -52,19 +57,20 @@ _FLAPS = {
     86: "spoiler",
     87: "spoiler",
 }
+# Functions of lifting motors.
 _LIFT_MOTORS = frozenset(range(33, 41))
-# ArduPlane's default LOG_BITMASK, which has both.
+# ArduPlane's default LOG_BITMASK, which logs both at a high rate.
 _BITMASK = 65535
-# PX4's SDLOG_PROFILE with its default set (1) and that of a high rate (16).
+# PX4's SDLOG_PROFILE: the default set (1) and the high-rate set (16).
 _PROFILE = 17
 
 
 def flight_records(
     log: MotionLog, aircraft: Aircraft, servos: Mapping[str, ServoOutput] | None = None
 ) -> list[FlightRecord]:
-    """Return the stretches of a log that an identification can use, as flown by wings alone.
+    """Return the stretches of a log that an identification can use: flight on the wing alone.
 
-    servos: which output moves what, where it is known better than the log's SERVOn_* say.
+    servos: the output of each control, if known better than from the SERVOn_* parameters of the log.
     Raises LogError, in one line, for a log that cannot be used.
     """
     _refuse(log)
@@ -76,7 +82,7 @@ def flight_records(
         controls = _shares_as_angles(_held(log.controls, grid), aircraft)
     else:
         controls = _controls(servos or log_outputs(log, aircraft), pulses)
-    # A surface that is commanded beyond its stop stays at the stop.
+    # A surface commanded beyond its stop stays at the stop.
     stops = np.array([aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder, 1.0])
     controls = np.clip(controls, -stops, stops)
     ratio = _at(log.ratio, grid)[:, 0] if len(log.ratio.time) else _ratio_of_height(_at(log.height, grid)[:, 0])
@@ -117,7 +123,10 @@ def flight_records(
 
 
 def _controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:
-    """(n, 4) elevator, aileron, rudder (rad) and throttle at pulses (n, m); elevons are half the sum and difference."""
+    """Return elevator, aileron, rudder (rad) and throttle, (n, 4), for pulses (n, m).
+
+    Elevator and aileron are half the sum and half the difference of the elevons.
+    """
     found = {name: output.control(pulses[:, output.output - 1]) for name, output in outputs.items()}
     if LEFT in found:
         left, right = found.pop(LEFT), found.pop(RIGHT)
@@ -127,13 +136,16 @@ def _controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:
 
 
 def _shares_as_angles(shares: Floats, aircraft: Aircraft) -> Floats:
-    """(n, 4) controls of shares of full travel, which is the base's largest deflection."""
-    # Nose up and yaw to the right are positive shares; the model's elevator and rudder count the other way.
+    """Convert fractions of full travel to controls (n, 4).
+
+    Full travel is the base aircraft's largest deflection.
+    """
+    # Positive fractions are nose up and yaw to the right; the model's elevator and rudder have the opposite sign.
     largest = np.array([-aircraft.max_elevator, aircraft.max_aileron, -aircraft.max_rudder, 1.0])
     return np.asarray(shares * largest)
 
 
-# What the series are called, by whose log it is.
+# Message and quantity of each series, by autopilot.
 _SERIES = {
     "ardupilot": {
         "inertial": "IMU, the inertial sensors",
@@ -158,7 +170,7 @@ _SERIES = {
 
 
 def _refuse(log: MotionLog) -> None:
-    """Refuse what no identification can use.  Raises LogError."""
+    """Raise LogError for a log that no identification can use."""
     if log.vehicle not in ("plane", "unknown"):
         raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): a plane is expected", file=log.source)
     named = _SERIES[log.program_kind]
@@ -180,17 +192,17 @@ def _refuse(log: MotionLog) -> None:
 
 
 def slowest_rows(log: MotionLog) -> float:
-    """Return rows a second of inertial sensors or of the commands to the surfaces, whichever are fewer."""
+    """Return the lower of the rates of the inertial sensors and the surface commands, rows a second."""
     return min(log.inertial.rate, log.moved.rate)
 
 
 def recording_setting(log: MotionLog) -> str:
-    """Return the parameter with its value that records both at a high rate."""
+    """Return the parameter, with its value, that records sensors and outputs at a high rate."""
     return f"SDLOG_PROFILE {_PROFILE}" if log.program_kind == "px4" else f"LOG_BITMASK {_BITMASK}"
 
 
 def _recording(log: MotionLog) -> str:
-    """Describe the setting that would record it."""
+    """Describe the setting that records the missing series."""
     if log.program_kind == "px4":
         return f"{recording_setting(log)}, the default set at a high rate, records them (PX4 1.14 or later)"
     mask = log.parameters.get("LOG_BITMASK")
@@ -204,7 +216,7 @@ def _range(log: MotionLog, number: int) -> tuple[float, float]:
 
 
 def _functions(log: MotionLog) -> dict[int, int]:
-    """SERVOn_FUNCTION by output; ArduPlane's own where the log has none."""
+    """Return SERVOn_FUNCTION by output, or ArduPlane's defaults if the log has none."""
     found = {
         k: int(log.parameters[f"SERVO{k}_FUNCTION"])
         for k in range(1, log.outputs.values.shape[1] + 1)
@@ -218,11 +230,11 @@ def _first(log: MotionLog, function: int) -> int:
 
 
 def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
-    """Assign servo outputs to controls by SERVOn_*: full travel is the base's largest deflection.
+    """Assign servo outputs to controls by SERVOn_*; full travel is the base aircraft's largest deflection.
 
-    More microseconds are roll to the right, nose up and yaw to the right in ArduPlane; the model's elevator and rudder
-    count the other way.  Elevons are there as `LEFT` and `RIGHT`, trailing edge down, in place of elevator and aileron.
-    Raises LogError for mixes that no model of is estimated, and for elevons where the base has a tail.
+    In ArduPlane a longer pulse means roll to the right, nose up and yaw to the right; the model's elevator and rudder
+    have the opposite sign.  Elevons are returned as `LEFT` and `RIGHT`, positive trailing edge down, in place of
+    elevator and aileron.  Raises LogError for mixes that are not modelled, and for elevons if the base has a tail.
     """
     functions = _functions(log)
     for number, kind in functions.items():
@@ -264,7 +276,7 @@ def _refuse_base_of_elevons(log: MotionLog, aircraft: Aircraft) -> None:
 
 
 def _travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
-    """Return least, middle and largest pulse of an output, us, and its sign."""
+    """Return lowest, trim and highest pulse of an output, us, and its sign."""
     value = log.parameters.get
     lowest, highest = value(f"SERVO{number}_MIN", 1100.0), value(f"SERVO{number}_MAX", 1900.0)
     middle = min(max(value(f"SERVO{number}_TRIM", 1500.0), lowest + 1.0), highest - 1.0)
@@ -272,7 +284,7 @@ def _travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
 
 
 def _grid(log: MotionLog) -> Floats:
-    """Return times that all series cover."""
+    """Return the time grid over the span that all series cover."""
     series = (log.inertial, log.moved, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
     first, last = max(one.time[0] for one in series), min(one.time[-1] for one in series)
     return np.arange(first, last, 1.0 / GRID_HZ)
@@ -283,13 +295,13 @@ def _at(samples: Samples, grid: Floats) -> Floats:
 
 
 def _held(samples: Samples, grid: Floats) -> Floats:
-    """ServoOutput keep their value until the next."""
+    """Resample on the grid, each sample holding its value until the next."""
     rows = np.clip(np.searchsorted(samples.time, grid, side="right") - 1, 0, len(samples.time) - 1)
     return np.asarray(samples.values[rows])
 
 
 def _ratio_of_height(height: Floats) -> Floats:
-    """Return True by equivalent airspeed in the standard atmosphere."""
+    """Return the ratio of true to equivalent airspeed at an altitude (m) of the standard atmosphere."""
     return np.asarray((1.0 - 2.25577e-5 * np.clip(height, -500.0, 9000.0)) ** -2.12794)
 
 
@@ -298,7 +310,7 @@ def _has_current(log: MotionLog) -> bool:
 
 
 def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
-    """Return the rows at which lifting motors ran or one of their modes was set."""
+    """Return the rows at which lifting motors ran or a VTOL mode was set."""
     rows = np.zeros(len(grid), np.bool_)
     for (start, number), (end, _) in zip(log.modes, (*log.modes[1:], (np.inf, 0)), strict=False):
         if number in _VTOL_MODES:
@@ -312,18 +324,18 @@ def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
 
 
 def _usable(log: MotionLog, grid: Floats, equivalent: Floats, pulses: Floats) -> Flags:
-    """Return rows in free flight on the wing, without a pause of the sensors, of airspeed or of wind."""
+    """Return the rows in free flight on the wing, without gaps in sensors, airspeed or wind."""
     least = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))
     flying = (equivalent > _FLYING * least) & ~_vtol_rows(log, grid, pulses)
     sensors = [(samples, _GAP) for samples in (log.inertial, log.moved, log.attitude, log.velocity)]
-    wind_gap = _SLOW_WIND_GAP if log.program_kind == "px4" else _AIR_GAP
-    for samples, longest in (*sensors, (log.airspeed, _AIR_GAP), (log.wind, wind_gap)):
+    wind_gap = _MAX_PX4_WIND_GAP_S if log.program_kind == "px4" else _MAX_AIR_GAP_S
+    for samples, longest in (*sensors, (log.airspeed, _MAX_AIR_GAP_S), (log.wind, wind_gap)):
         steps = np.diff(samples.time)
         for k in np.flatnonzero(steps > longest):
             flying &= ~((grid > samples.time[k]) & (grid < samples.time[k + 1]))
     made = flying.copy()
     for first, last in _stretches(flying, 0.0):
-        made[first : min(last, first + round(_SETTLING * GRID_HZ))] = False
+        made[first : min(last, first + round(_SETTLING_TIME_S * GRID_HZ))] = False
     return made
 
 

@@ -1,7 +1,7 @@
-"""The check: a log that was not used, flown again in JSBSim, five seconds at a time, from its own controls and air.
+"""Check a model by flying an unused log again in JSBSim, five seconds at a time.
 
-Each window begins in the logged state.  The controls are the logged ones, and the air is what airspeed, accelerometers
-and velocity say it was.  What the models then do is compared with what the log says.
+Each window begins in the logged state and uses the logged controls; the motion of the air follows from logged airspeed,
+accelerometers and velocity.  The simulated motion is compared with the logged one.
 """
 
 import math
@@ -22,13 +22,17 @@ from planfly.identification.folder import Identified
 from world.arrays import Floats
 from world.files import temporary_folder
 
-# Seconds of a window, how many of a log, and steps a second of JSBSim.
+# Duration of a window, s.
 WINDOW = 5.0
+# Largest number of windows of a log.
 COUNT = 40
-_HZ = 100.0
-# Gusts are taken below this, Hz.
-_GUST_BAND = 2.0
+# Rate of JSBSim steps, Hz.
+_JSBSIM_RATE_HZ = 100.0
+# Highest frequency of gusts that is replayed, Hz.
+_GUST_BANDWIDTH_HZ = 2.0
+# Compared quantities.
 QUANTITIES = ("roll rate", "pitch rate", "yaw rate", "roll", "pitch", "airspeed")
+# Units of the compared quantities.
 UNITS = ("deg/s", "deg/s", "deg/s", "deg", "deg", "m/s")
 
 
@@ -36,9 +40,9 @@ UNITS = ("deg/s", "deg/s", "deg/s", "deg", "deg", "m/s")
 class Replay:
     """A log replayed by one model.
 
-    model: which, for people: the base's name, or "identified".
-    rms: by quantity of `QUANTITIES`, in `UNITS`: root mean square of replayed less logged, over all windows.
-    windows: how many.  shown: (2, k, 6) logged and replayed values over the time of some windows, behind each other.
+    model: name of the model for display: the name of the base, or "identified".
+    rms: root mean square of replayed less logged value over all windows, by quantity of `QUANTITIES`, in `UNITS`.
+    windows: number of windows.  shown: (2, k, 6) logged and replayed values of some windows, one after the other.
     """
 
     model: str
@@ -50,7 +54,10 @@ class Replay:
 def replay_log(
     found: Identified, files: Mapping[str, str], name: str, records: Sequence[FlightRecord]
 ) -> tuple[Replay, ...]:
-    """Replays by the base, scaled to the aircraft, and by the identified model; files: of the aircraft's folder."""
+    """Replay with the base, scaled to the aircraft, and with the identified model.
+
+    files: texts of the aircraft's folder by file name.
+    """
     clock = found.estimate.clocks[-1]
     signals = levelled(align(records, [Clocks(clock.lag, clock.delay, 0.0)] * len(records), 0.0))
     signals = replace(signals, airspeed=signals.airspeed * found.estimate.airspeed[0])
@@ -67,7 +74,7 @@ def replay_log(
 
 
 def _replayed(model: str, aircraft: Aircraft, values: Floats, signals: Signals, flow: Flow, folder: Path) -> Replay:
-    fdm = Fdm(aircraft, rate_hz=_HZ)
+    fdm = Fdm(aircraft, rate_hz=_JSBSIM_RATE_HZ)
     for parameter, value in zip(PARAMETERS, values.tolist(), strict=True):
         fdm.properties.set(parameter.property_name, value)
     del folder
@@ -94,18 +101,18 @@ def _logged(signals: Signals, start: int, rows: int) -> Floats:
 
 
 def _air(signals: Signals, flow: Flow) -> Floats:
-    """(n, 3) how the air moved, north, east, down, m/s: velocity over the ground less that through the air."""
+    """Return the velocity of the air (n, 3), north, east, down, m/s: ground velocity less air velocity."""
     roll, pitch, yaw = signals.attitude.T
     alpha, beta, speed = flow.alpha, flow.beta, signals.airspeed
     u, v, w = speed * np.cos(alpha) * np.cos(beta), speed * np.sin(beta), speed * np.sin(alpha) * np.cos(beta)
     right, below = v * np.cos(roll) - w * np.sin(roll), v * np.sin(roll) + w * np.cos(roll)
     ahead, down = u * np.cos(pitch) + below * np.sin(pitch), below * np.cos(pitch) - u * np.sin(pitch)
     north, east = ahead * np.cos(yaw) - right * np.sin(yaw), ahead * np.sin(yaw) + right * np.cos(yaw)
-    return signals.smooth(signals.velocity - np.column_stack([north, east, down]), _GUST_BAND)
+    return signals.smooth(signals.velocity - np.column_stack([north, east, down]), _GUST_BANDWIDTH_HZ)
 
 
 def _window(fdm: Fdm, signals: Signals, air: Floats, start: int, rows: int) -> Floats:
-    """(rows, 6) of `QUANTITIES` as the model flies the window."""
+    """Fly a window with the model and return its `QUANTITIES`, (rows, 6)."""
     begin = slice(start, start + 1)
     fdm.begin_at(
         attitude=signals.attitude[begin][0],
@@ -116,7 +123,7 @@ def _window(fdm: Fdm, signals: Signals, air: Floats, start: int, rows: int) -> F
         commands=[*signals.surfaces[start], float(signals.throttle[start])],
     )
     made = np.full((rows, len(QUANTITIES)), np.nan)
-    steps = round(_HZ / GRID_HZ)
+    steps = round(_JSBSIM_RATE_HZ / GRID_HZ)
     for k in range(rows):
         state = fdm.read()
         made[k] = (
@@ -131,10 +138,10 @@ def _window(fdm: Fdm, signals: Signals, air: Floats, start: int, rows: int) -> F
 
 
 def _near(angle: float, other: float) -> float:
-    """Return the angle, whole turns nearer to another."""
+    """Return an angle, shifted by whole turns to be nearest to another."""
     return angle + 2.0 * math.pi * round((other - angle) / (2.0 * math.pi))
 
 
 def _height_of(density: float) -> float:
-    """Return height of the standard atmosphere with a density (kg/m^3), m."""
+    """Return the altitude at which the standard atmosphere has a density (kg/m^3), m."""
     return float((1.0 - (density / 1.225) ** (1.0 / 4.25588)) / 2.25577e-5)

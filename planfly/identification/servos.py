@@ -1,4 +1,4 @@
-"""Servo outputs and the controls that they move, from an aircraft's ``ardupilot.toml``."""
+"""Read servo outputs and the controls that they move from an aircraft's ``ardupilot.toml``."""
 
 import math
 from collections.abc import Mapping
@@ -14,14 +14,14 @@ from world.files import read_toml
 
 @dataclass(frozen=True, slots=True)
 class ServoOutput:
-    """An output (from 1), and the control at its pulses (us, rising): rad, or of full throttle."""
+    """A servo output (from 1), and the control (rad, or fraction of full throttle) at its pulses (us, increasing)."""
 
     output: int
     pulse: tuple[float, ...]
     value: tuple[float, ...]
 
     def control(self, pulses: Floats) -> Floats:
-        """Return the control (n,) at pulses (n,), held at its ends.
+        """Return the control (n,) at pulses (n,), constant beyond the end pulses.
 
         >>> ServoOutput(3, (1000.0, 2000.0), (0.0, 1.0)).control(np.array([900.0, 1250.0]))
         array([0.  , 0.25])
@@ -30,12 +30,14 @@ class ServoOutput:
 
     @property
     def reversed(self) -> "ServoOutput":
-        """The same output the other way round."""
+        """Return the same output reversed."""
         return ServoOutput(self.output, self.pulse, tuple(-value for value in self.value))
 
 
 def read_servos(file: Path) -> Mapping[str, ServoOutput]:
-    """Return the outputs of a file by control: elevator, aileron, rudder, throttle.  Raises FlightError for a bad file.
+    """Read the outputs of a file by control: elevator, aileron, rudder, throttle.
+
+    Raises FlightError for a bad file.
 
     >>> from aircraft.catalog import load_aircraft
     >>> outputs = read_servos(load_aircraft("aerosonde").folder / "ardupilot.toml")

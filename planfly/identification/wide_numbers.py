@@ -1,20 +1,22 @@
-"""Quantities of an identified aircraft that its logs leave uncertain, and flights that would narrow them."""
+"""Uncertain quantities of an identified aircraft, and flights that would narrow them down."""
 
 from dataclasses import dataclass
 
-# Either side of the estimate, as a share of it, from which on an interval (95 %) is wide.
+# The sink is uncertain if its 95 % interval reaches further than this fraction of the estimate to either side.
 WIDE_SINK = 0.10
+# The same limit for the power in level flight.
 WIDE_POWER = 0.20
-# `benchmarks.identification_information`: a glide of so many seconds tells what half an hour of powered flight cannot.
+# Duration of a glide that shows what half an hour of powered flight cannot, s; from
+# `benchmarks.identification_information`.
 GLIDE_SECONDS = 20
 
 
 @dataclass(frozen=True, slots=True)
 class WideNumber:
-    """One of them.
+    """A quantity with a wide interval.
 
-    title: "sink at idle" or "power in level flight".  half: of its 95 % interval, as a share of the estimate.
-    show: what would narrow it.
+    title: "sink at idle" or "power in level flight".  half: half the 95 % interval, as a fraction of the estimate.
+    show: flights or logging that would narrow the interval.
     """
 
     title: str
@@ -23,7 +25,7 @@ class WideNumber:
 
     @property
     def text(self) -> str:
-        """In words.
+        """Description in words.
 
         >>> WideNumber("sink at idle", 0.23, "glides").text
         'sink at idle: known to ±23 % only; fly glides'
@@ -35,9 +37,9 @@ Interval = tuple[float, float, float]
 
 
 def wide_numbers(sink: Interval, power: Interval, *, with_current: bool) -> tuple[WideNumber, ...]:
-    """Return those of sink and power whose intervals (lower end, estimate, upper end) are wide.
+    """Return sink and power, as far as their intervals (lower end, estimate, upper end) are wide.
 
-    with_current: whether the battery's current was logged, without which nothing tells what the propeller takes.
+    with_current: True if the battery's current was logged; without it the propeller power is unknown.
 
     >>> [one.title for one in wide_numbers((6.0, 7.0, 8.0), (400.0, 500.0, 590.0), with_current=False)]
     ['sink at idle']

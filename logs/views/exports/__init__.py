@@ -1,1 +1,1 @@
-"""A flight log in the forms of other programs: tables, telemetry of a ground station, a log of PX4."""
+"""Export a flight log to formats of other programs: tables, telemetry of a ground station, a PX4 log."""

@@ -1,4 +1,4 @@
-"""A flight in other programs' forms: a table (`.csv`, `.parquet`), a log of PX4 (`.ulg`)."""
+"""Export a flight to formats of other programs: a table (`.csv`, `.parquet`) and a PX4 log (`.ulg`)."""
 
 import csv
 import io
@@ -20,13 +20,13 @@ Columns = NDArray[Any]
 
 
 # ----------------------------------------------------------------------
-# The flown rows as a table for spreadsheets and data frames: `.csv`, and `.parquet` where pyarrow is installed.
+# The flown rows as a table for spreadsheets and data frames: `.csv`, and `.parquet` if pyarrow is installed.
 
 
 def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
-    """Columns (t,) by name: those of a log's `/state` messages, and after the time where on Earth the aircraft was.
+    """Return columns (t,) by name: fields of `/state` messages, with latitude and longitude after time.
 
-    Each name ends with its unit; courses and the axes east and north are the map's about the scenario's origin.
+    Each name ends with its unit; courses and the axes east and north belong to the map about the scenario's origin.
 
     >>> from logs.recording.example_log import example_log
     >>> columns = flight_columns(example_log())
@@ -44,7 +44,9 @@ def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
 
 
 def csv_text(log: FlightLog) -> str:
-    """Return the table as CSV: a line of names, then a line a row; each number as short as reads back to the same one.
+    """Return the table as CSV: a line of names, then one line a row.
+
+    Numbers have the fewest digits that read back.
 
     >>> from logs.recording.example_log import example_log
     >>> csv_text(example_log()).splitlines()[1].split(",")[:6]
@@ -54,13 +56,13 @@ def csv_text(log: FlightLog) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(columns)
-    # A float32's own shortest digits: as a double it would have sixteen.
+    # Write the shortest digits of a float32: as a double it would have sixteen.
     writer.writerows(zip(*(column.astype(np.str_).tolist() for column in columns.values()), strict=True))
     return out.getvalue()
 
 
 def parquet_bytes(log: FlightLog) -> bytes:
-    """Return the table as a Parquet file, in the types of the log, with the scenario's name and origin as metadata.
+    """Return the table as a Parquet file with the types of the log, and scenario name and origin as metadata.
 
     Raises MissingExtraError without the extra ``tables``.
 
@@ -86,33 +88,41 @@ def parquet_bytes(log: FlightLog) -> bytes:
 
 
 # ----------------------------------------------------------------------
-# A flight as a log of PX4 (`.ulg`): its topics and fields, by PX4's "ULog File Format", which pyulog cannot make anew.
+# A flight as a PX4 log (`.ulg`): topics and fields as in PX4's "ULog File Format", which pyulog cannot write from
+# scratch.
 #
-# World axes of a local position are north, east and down about the scenario's origin, as PX4 has them about its own;
-# the
-# attitude turns from there to forward, right and down.  Timestamps are microseconds since the flight's start.
+# Local positions are north, east and down from the scenario's origin (in PX4 from its own origin); the attitude rotates
+# from these axes to forward, right and down.  Timestamps are microseconds since the start of the flight.
 
 
+# Magic and version at the start of a ULog file.
 _MAGIC = b"ULog\x01\x12\x35\x01"
-_FLAG_BITS = 40  # bytes of the flags' message
+# Size of the message with the flags, bytes.
+_FLAG_BITS_SIZE_BYTES = 40
+# ULog type by numpy type.
 _TYPES = {"<u8": "uint64_t", "<f8": "double", "<f4": "float", "u1": "uint8_t", "<u2": "uint16_t", "?": "bool"}
-# Letters of log levels, of syslog: error, warning, info, debug.
+# Letters of log levels, as in syslog.
 _LEVELS = {"debug": b"7", "info": b"6", "warning": b"4", "error": b"3", "fatal": b"2"}
-# vehicle_status: armed, in a mission, a fixed wing.
+# vehicle_status: armed.
 _ARMED = 2
+# vehicle_status: flying a mission.
 _MISSION = 3
+# vehicle_status: fixed wing.
 _FIXED_WING = 2
-# Seconds between messages of a topic; the fast ones have every row.
-_FAST = 0.0
+# Interval of topics with a message for every row, s.
+_EVERY_ROW_S = 0.0
+# Interval of slower topics, s.
 _SLOW = 0.1
+# Interval of topics with one message a second, s.
 _SECOND = 1.0
-# The standard atmosphere: air density over that at sea level is (1 - _LAPSE h) to this power.
-_LAPSE = 2.25577e-5
-_POWER = 4.2559
+# Standard atmosphere: the ratio of air density to density at sea level is (1 - lapse h) ** power; 1/m.
+_DENSITY_LAPSE_PER_M = 2.25577e-5
+# Exponent of that formula.
+_DENSITY_EXPONENT = 4.2559
 
 
 class _Topic(NamedTuple):
-    """A topic: its fields after the timestamp, numpy type and shape, and a value for each of the log's good rows."""
+    """A topic: fields after the timestamp (numpy type, shape), and values for the valid rows of the log."""
 
     name: str
     period: float
@@ -121,7 +131,7 @@ class _Topic(NamedTuple):
 
 
 def px4_log_bytes(log: FlightLog) -> bytes:
-    r"""Return bytes of the `.ulg`; rows without a position are left out.
+    r"""Return the bytes of the `.ulg`; rows without a position are left out.
 
     >>> from logs.recording.example_log import example_log
     >>> px4_log_bytes(example_log())[:7]
@@ -129,7 +139,7 @@ def px4_log_bytes(log: FlightLog) -> bytes:
     """
     good = np.isfinite(log.track.position).all(axis=1) & np.isfinite(log.track.attitude).all(axis=1)
     topics = [topic for topic in _topics(log, np.flatnonzero(good)) if len(topic.values["timestamp"])]
-    head = bytearray(_MAGIC + struct.pack("<Q", 0) + _message(b"B", bytes(_FLAG_BITS)))
+    head = bytearray(_MAGIC + struct.pack("<Q", 0) + _message(b"B", bytes(_FLAG_BITS_SIZE_BYTES)))
     for topic in topics:
         head += _message(b"F", f"{topic.name}:{_format(topic)}".encode())
     for key, value in (("sys_name", "planfly"), ("ver_hw", "SITL"), ("sys_uuid", "planfly")):
@@ -160,7 +170,7 @@ def _message(letter: bytes, body: bytes) -> bytes:
 
 
 def _format(topic: _Topic) -> str:
-    """Return the fields as ULog describes them."""
+    """Return the format of the fields in ULog syntax."""
     return "".join(
         f"{_TYPES[kind]}{f'[{shape[0]}]' if shape else ''} {name};"
         for name, kind, *shape in [("timestamp", "<u8"), *topic.fields]
@@ -168,7 +178,7 @@ def _format(topic: _Topic) -> str:
 
 
 def _records(number: int, topic: _Topic) -> tuple[list[int], list[bytes]]:
-    """Timestamps and data messages of a topic at its rate."""
+    """Return timestamps and data messages of a topic at its rate."""
     stamps = topic.values["timestamp"]
     if topic.period:
         slots = np.floor(stamps * 1e-6 / topic.period + 1e-9)
@@ -193,15 +203,15 @@ def _topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
     v_east, v_north, v_up = track.velocity[rows].T
     one, ground = np.ones(len(rows), dtype=bool), up[0] if len(rows) else 0.0
     true, height = track.airspeed[rows].astype(np.float64), track.clearance[rows]
-    calibrated = true * np.sqrt(np.maximum(1.0 - _LAPSE * up, 0.0) ** _POWER)
+    calibrated = true * np.sqrt(np.maximum(1.0 - _DENSITY_LAPSE_PER_M * up, 0.0) ** _DENSITY_EXPONENT)
     wind, battery = track.wind[rows], _battery(log, rows)
 
     def topic(name: str, period: float, fields: list[tuple[Any, ...]], **values: Any) -> _Topic:
         return _Topic(name, period, fields, {"timestamp": stamp, **values})
 
     found = [
-        topic("vehicle_attitude", _FAST, [("q", "<f4", 4)], q=attitude_quaternion(track.attitude[rows])),
-        topic("vehicle_angular_velocity", _FAST, [("xyz", "<f4", 3)], xyz=track.rates[rows]),
+        topic("vehicle_attitude", _EVERY_ROW_S, [("q", "<f4", 4)], q=attitude_quaternion(track.attitude[rows])),
+        topic("vehicle_angular_velocity", _EVERY_ROW_S, [("xyz", "<f4", 3)], xyz=track.rates[rows]),
         topic(
             "vehicle_local_position",
             _SLOW,
@@ -288,7 +298,10 @@ def _topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
 
 
 def _battery(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
-    """Values of battery_status by field; its voltage is the flight's mean, which the log's energy and current give."""
+    """Return the values of battery_status by field.
+
+    The voltage is the mean from logged energy and current.
+    """
     time, current = log.track.time[rows], log.track.current[rows].astype(np.float64)
     energy = log.track.energy[rows].astype(np.float64)
     charge = np.concatenate([[0.0], np.cumsum(np.diff(time) * current[1:])])[: len(rows)]  # As
@@ -303,9 +316,10 @@ def _battery(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
 
 
 def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
-    """navigator_mission_item: each item when it becomes the one that is flown to, and first the one at the start.
+    """Return the topic navigator_mission_item: each item when it becomes active, from the start on.
 
-    Items that are no place stand with the next that is one, at 0, 0: a gap in the numbers would be items that are lost.
+    Items without a position get the time of the next item with one, and the position 0, 0: a gap in the numbers would
+    read as lost items.
     """
     track, items = log.track, {item.seq: item for item in log.setup.mission.items}
     legs, firsts = np.unique(track.leg[rows], return_index=True)
@@ -333,7 +347,7 @@ def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
     }
     values = {
         "timestamp": np.array([round(time * 1e6) for time, _ in flown], dtype=np.uint64),
-        # PX4 counts from 0.
+        # PX4 numbers mission items from 0.
         "sequence_current": np.array([item.seq - 1 for _, item in flown]),
         "nav_cmd": np.array([item.command for _, item in flown]),
         "acceptance_radius": np.nan_to_num(np.array(radii)),
@@ -342,11 +356,11 @@ def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
         "altitude": np.nan_to_num(np.array([item.alt for _, item in flown])),
         "altitude_is_relative": np.array([item.frame in OVER_HOME for _, item in flown]),
     }
-    return _Topic("navigator_mission_item", _FAST, list(kinds.items()), values)
+    return _Topic("navigator_mission_item", _EVERY_ROW_S, list(kinds.items()), values)
 
 
 def attitude_quaternion(attitude: Any) -> Floats:
-    """(n, 4) w, x, y, z of the rotation from forward, right, down to north, east, down.
+    """Return the rotation from forward, right, down to north, east, down as quaternion (n, 4) w, x, y, z.
 
     attitude: (n, 3) roll, pitch, yaw in rad.
 

@@ -1,8 +1,8 @@
-"""Plan and track for maps: KML (OGC 12-007) and GPX 1.1.
+"""Export plan and track for maps: KML (OGC 12-007) and GPX 1.1.
 
-GPX is written by gpxpy.  KML is written with the standard library, in 58 lines: simplekml 1.3.6 would save 30, but its
-element numbers go on from one document to the next, its points have coordinates before altitudeMode (against OGC
-12-007), a control character in a name is an ExpatError, and 2,000 waypoints take 4.5 times as long.
+GPX is written by gpxpy.  KML is written with the standard library, in 58 lines: simplekml 1.3.6 would save 30, but it
+continues element numbers from one document to the next, writes coordinates of points before altitudeMode (against OGC
+12-007), raises ExpatError for a control character in a name, and takes 4.5 times as long for 2,000 waypoints.
 """
 
 import itertools
@@ -28,7 +28,7 @@ from world.arrays import Floats
 from world.frames import to_geo
 
 KML = "http://www.opengis.net/kml/2.2"
-# Seconds between points of a track in a map file.
+# Interval between points of a track in a map file, s.
 EVERY = 0.5
 
 
@@ -36,12 +36,12 @@ EVERY = 0.5
 class MapLine:
     """A line on the map.
 
-    name: of the line.
-    lat_deg, lon_deg: (n,).
+    name: name of the line.
+    lat_deg, lon_deg: (n,) degrees.
     amsl: (n,) m above mean sea level.
-    marks: a name for each point, or none.
-    folder: of KML, that it shares with others; "" for one of its own.
-    role: that it is drawn in, of `logs.theme`; "" for the viewer's own look.
+    marks: a name for each point, or empty.
+    folder: KML folder shared with other lines; "" for its own folder.
+    role: role in `logs.theme` that gives its look; "" for the viewer's default look.
     """
 
     name: str
@@ -54,7 +54,7 @@ class MapLine:
 
 
 def plan_line(setup: FlightSetup) -> MapLine:
-    """Route of a setup, its waypoints named by number and mission item as in a verdict.
+    """Return the route of a setup, with waypoints named by number and mission item as in a verdict.
 
     >>> from logs.recording.example_log import example_log
     >>> line = plan_line(example_log().setup)
@@ -68,7 +68,7 @@ def plan_line(setup: FlightSetup) -> MapLine:
 
 
 def track_line(setup: FlightSetup, track: Track) -> MapLine:
-    """Flown track, thinned to a point each `EVERY` seconds and the last, rows without a position left out.
+    """Return the flown track, thinned to a known position each `EVERY` seconds and the last.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -89,11 +89,11 @@ def track_line(setup: FlightSetup, track: Track) -> MapLine:
 class MapZone:
     """A zone on the map.
 
-    name: of the zone, with what it is.
-    parts: (k, 2) latitude and longitude in degrees of the outline of each part, and then of its holes, closed.
-    height: m of its ceiling, None where it has none.
-    above_ground: whether that is above the ground, not above mean sea level.
-    folder, role: as of `MapLine`.
+    name: name and kind of the zone.
+    parts: closed outline of each part, then its holes: (k, 2) latitude and longitude, degrees.
+    height: height of its ceiling, m; None without a ceiling.
+    above_ground: True if that height is above ground, not above mean sea level.
+    folder, role: as in `MapLine`.
     """
 
     name: str
@@ -105,7 +105,7 @@ class MapZone:
 
 
 def map_zones(setup: FlightSetup) -> list[MapZone]:
-    """Return zones of a setup's scenario, and its mission's own fence.
+    """Return the zones of a setup's scenario, and the fence of its mission.
 
     >>> from logs.recording.example_log import example_log
     >>> map_zones(example_log().setup)
@@ -121,11 +121,11 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
     return made
 
 
-# Returns and glides, which have colours.
+# Returns and glides, in colours.
 
 
 def return_lines(setup: FlightSetup, drawn: DrawnReturns) -> list[MapLine]:
-    """The way by what comes of a return from there, the ways of the worst returns, and the way by what is in reach."""
+    """Return the path by outcome of returns, the worst returns, and the path by glide destination."""
     limit, lines = drawn.returns.limit, []
     for kind, ones in drawn.by_kind:
         name = f"{ones[0].time:.0f} to {ones[-1].time:.0f} s: {way_text(kind)}"
@@ -147,7 +147,7 @@ def _line(setup: FlightSetup, name: str, places: ArrayLike, folder: str, role: s
 
 
 def glide_shapes(setup: FlightSetup, drawn: DrawnReturns) -> list[MapZone]:
-    """Return the glide's footprint: from how low above ground a chosen place is in reach, and flat ground."""
+    """Return the glide footprint: least heights above ground to reach a chosen place, and flat ground."""
     footprint = drawn.glides.footprint
     if footprint is None:
         return []
@@ -170,7 +170,7 @@ def _geographic(setup: FlightSetup, ring: Floats) -> Floats:
 
 
 def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) -> str:
-    """KML document: a folder for each line, heights absolute, and a placemark for each named point and each zone.
+    """Return a KML document with a folder for each line, and a placemark for each named point and zone.
 
     A zone is an outline on the ground, or a body up to its ceiling.
 
@@ -204,31 +204,31 @@ def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) ->
 
 
 class _Folders:
-    """The folders of a document."""
+    """Folders of a KML document."""
 
     def __init__(self, document: ElementTree.Element) -> None:
         self._document = document
         self._named: dict[str, ElementTree.Element] = {}
 
     def new(self, name: str) -> ElementTree.Element:
-        """Another one."""
+        """Add a folder to the document."""
         folder = _add(self._document, "Folder")
         _add(folder, "name", name)
         return folder
 
     def named(self, name: str) -> ElementTree.Element:
-        """Return the one of a name that several share."""
+        """Return the shared folder of a name."""
         if name not in self._named:
             self._named[name] = self.new(name)
         return self._named[name]
 
 
 def _add_style(mark: ElementTree.Element, role: str) -> None:
-    """The colour and width of a role, on the dark ground of pictures from above."""
+    """Set colour and width of a role, for the dark background of aerial pictures."""
     if not role:
         return
     look, style = LOOKS[role], _add(mark, "Style")
-    # KML has opacity first, then blue, green and red.
+    # KML colours are opacity, blue, green, red.
     colour = "".join(look.dark[k : k + 2] for k in (5, 3, 1))
     line = _add(style, "LineStyle")
     _add(line, "color", f"ff{colour}")
@@ -269,7 +269,9 @@ def _coordinates(line: MapLine, k: int) -> str:
 
 
 def gpx_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) -> str:
-    """GPX document: a line with named points is a route, any other a track, and so are a zone's outlines and holes.
+    """Return a GPX document: lines with named points as routes.
+
+    Other lines and outlines of zones are written as tracks.
 
     >>> line = MapLine("leg", np.array([46.0, 46.01]), np.array([8.0, 8.0]), np.array([500.0, 520.0]))
     >>> '<trkpt lat="46.01" lon="8.0">' in gpx_text("one leg", [line])

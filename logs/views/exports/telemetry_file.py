@@ -1,8 +1,8 @@
-"""A flight as the telemetry log (`.tlog`) that a ground station would have kept of it.
+"""Write a flight as the telemetry log (`.tlog`) that a ground station would have recorded.
 
-The form is Mission Planner's, MAVProxy's and pymavlink's: before each MAVLink frame the time that it came at, eight
-bytes, microseconds since 1970, the highest first.  Frames are those of the live vehicle, at its rates; the clock is the
-log's own, which begins with the year 2000.
+The format is the one of Mission Planner, MAVProxy and pymavlink: before each MAVLink frame stands its time of arrival,
+microseconds since 1970 in eight bytes, big-endian.  The live vehicle sends the same frames at the same rates.  The
+clock of the log begins with the year 2000.
 """
 
 import struct
@@ -32,15 +32,20 @@ from flight.simulation.track import track_rows
 from logs.recording.reader import FlightLog
 from logs.recording.state_channel import EPOCH_NS
 
+# Time before each frame.
 _STAMP = struct.Struct(">Q")
-_HEARTBEATS = 1.0  # s
+# Interval of heartbeats, s.
+_HEARTBEAT_INTERVAL_S = 1.0
+# MAVLink severity by log level.
 _SEVERITY = {"debug": INFO, "info": INFO, "warning": WARNING, "error": CRITICAL, "fatal": CRITICAL}
+# System and component of the vehicle.
 _VEHICLE = (1, mavlink.MAV_COMP_ID_AUTOPILOT1)
+# System and component of the ground station.
 _STATION = (255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
 
 
 def telemetry_bytes(log: FlightLog) -> bytes:
-    """Bytes of the `.tlog`: the mission as it was uploaded, then telemetry, waypoints reached, and events as texts.
+    """Return the bytes of the `.tlog`: mission upload, telemetry, waypoints reached, and events as texts.
 
     >>> from logs.recording.example_log import example_log
     >>> data = telemetry_bytes(example_log())
@@ -57,7 +62,7 @@ def telemetry_bytes(log: FlightLog) -> bytes:
 
 
 def _frames(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], Any]]:
-    """Yield messages in order: when (s of the flight), from whom, and what."""
+    """Yield time in flight (s), sender and message, in order of time."""
     for message in _upload(log):
         yield 0.0, _STATION, message
     for time, message in _messages_of(log):
@@ -105,7 +110,7 @@ def _messages_of(log: FlightLog) -> Iterator[tuple[float, Any]]:
             status.current = numbers[int(ahead[ahead >= 0][0])] if np.any(ahead >= 0) else status.current
             yield time, telemetry_message("MISSION_CURRENT", status)
         for name in now:
-            due[name] += max(PERIODS.get(name, _HEARTBEATS), 1e-3)
+            due[name] += max(PERIODS.get(name, _HEARTBEAT_INTERVAL_S), 1e-3)
             yield time, telemetry_message(name, status)
     end = float(track.time[-1]) if len(track) else 0.0
     for event in events:

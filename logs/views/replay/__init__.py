@@ -1,1 +1,1 @@
-"""A recorded flight again: its timeline, instruments, frames of a movie, KML and GPX."""
+"""Replay of a recorded flight: its timeline, instruments, frames of a movie, KML and GPX."""

@@ -1,6 +1,6 @@
-"""The instruments of a recorded flight at one time, as lines of text for a terminal.
+"""Show the instruments of a recorded flight at one time, as lines of text for a terminal.
 
-A frame is a function of the log and the time alone: the same log and time give the same lines, whatever the clock.
+A frame depends on log and time alone: the same log and time give the same lines, whatever the clock.
 """
 
 import bisect
@@ -16,30 +16,33 @@ from logs.views.charts import shorten
 from logs.views.replay.timeline import TimelineEntry, log_with_legs, timeline_of_legs, waypoint_name
 from world.arrays import Floats
 
+# Least width of a frame, columns.
 MIN_WIDTH = 60
-# All of a frame, and the line below it, fit a terminal of 24 lines.
+# Rows of the horizon; a frame and the line below it fit a terminal of 24 lines.
 _HORIZON_ROWS = 7
 
+# Pitch shown by a row of the horizon, degrees.
 _DEGREES_A_ROW = 5.0
-_LATEST = 3  # entries of the timeline at the foot
+# Number of timeline entries at the bottom.
+_LATEST_ENTRIES = 3
 
 
 class _Size(NamedTuple):
-    """Columns of a frame from which on it is drawn so, of its horizon, and of the bar of a control."""
+    """Least columns of a frame for this size, columns of its horizon, and columns of the bar of a control."""
 
     columns: int
     horizon: int
     bar: int
 
 
-# In the narrow one, too, the numbers beside the horizon are whole.
+# Even the narrow size shows the numbers next to the horizon in full.
 _WIDE = _Size(80, 25, 31)
 _NARROW = _Size(MIN_WIDTH, 11, 21)
 
 
 @dataclass(frozen=True, slots=True)
 class Instruments:
-    """A log made ready for frames: its timeline and the ground under each row, (t,) m, NaN where unknown."""
+    """A log prepared for frames, with its timeline and the ground under each row, (t,) m, NaN if unknown."""
 
     log: FlightLog
     entries: tuple[TimelineEntry, ...]
@@ -47,9 +50,9 @@ class Instruments:
     limits: tuple[tuple[str, float], ...]
 
     def frame(self, time: float, *, width: int = 80) -> list[str]:
-        """Lines of at most ``width`` columns (at least `MIN_WIDTH`) for the newest row at or before ``time`` (s).
+        """Return lines of at most ``width`` columns (at least `MIN_WIDTH`) for the last row at or before ``time`` (s).
 
-        Before the first row, that row is shown.
+        For a time before the first row, the first row is shown.
         """
         columns = max(MIN_WIDTH, width)
         log = self.log
@@ -83,7 +86,7 @@ class Instruments:
         return [_printable(title)[: free - 1].ljust(free) + clock, bar, ahead]
 
     def _horizon(self, k: int, columns: int) -> list[str]:
-        """Draw the artificial horizon: sky above, ground (:) below, the aircraft's wings in the middle."""
+        """Draw the artificial horizon: sky above, ground (:) below, the aircraft's wings in the center."""
         roll, pitch, _ = (float(angle) for angle in self.log.track.attitude[k])
         rows = []
         for row in range(_HORIZON_ROWS):
@@ -91,7 +94,7 @@ class Instruments:
             for column in range(columns):
                 across = (column - columns // 2) / 2.0  # a letter is twice as high as wide
                 up = _HORIZON_ROWS // 2 - row
-                # Height of this cell over the horizon, in rows, turned by the roll.
+                # Height of this cell above the rolled horizon, rows.
                 over = up * math.cos(roll) + across * math.sin(-roll) + math.degrees(pitch) / _DEGREES_A_ROW
                 cells.append("-" if abs(over) <= 0.5 else " " if over > 0.0 else ":")
             rows.append(cells)
@@ -127,7 +130,7 @@ class Instruments:
         ]
 
     def _controls(self, k: int, bar: int) -> list[str]:
-        """Draw one bar a control: where it stands (O) between its limits, and its command (|)."""
+        """Draw one bar a control: its position (O) between its limits, and its command (|)."""
         lines = []
         controls, commands = self.log.track.controls[k].tolist(), self.log.track.commands[k].tolist()
         for (name, limit), stands, asked in zip(self.limits, controls, commands, strict=True):
@@ -157,11 +160,13 @@ class Instruments:
 
     def _latest_entries(self, now: float) -> list[str]:
         newest = bisect.bisect_right([entry.time for entry in self.entries], now + 1e-9)
-        return [f"{entry.time:8.1f} s  {entry.text}" for entry in self.entries[max(0, newest - _LATEST) : newest]]
+        return [
+            f"{entry.time:8.1f} s  {entry.text}" for entry in self.entries[max(0, newest - _LATEST_ENTRIES) : newest]
+        ]
 
 
 def make_instruments(log: FlightLog) -> Instruments:
-    """Make a log ready for frames; its legs are found from the track, whatever was recorded.
+    """Prepare a log for frames; its legs are computed from the track, not read from the log.
 
     >>> from logs.recording.example_log import example_log
     >>> frame = make_instruments(example_log()).frame(10.0)
@@ -184,7 +189,7 @@ def _printable(text: str) -> str:
 
 
 def _number(value: float, digits: int, sign: str = "") -> str:
-    # Nought has no sign that is not asked for: "+0.0" or "0", never "-0".
+    # Zero has no unwanted sign: "+0.0" or "0", never "-0".
     return f"{round(value, digits) + 0.0:{sign}.{digits}f}" if math.isfinite(value) else "?"
 
 

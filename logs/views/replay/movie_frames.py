@@ -1,6 +1,6 @@
-"""The frames of a movie of a flight: the map, the aircraft on it with its trail, and its numbers.
+"""Render the frames of a movie of a flight: the map, the aircraft with its trail, and its numbers.
 
-The same log and rate give the same frames, whatever the clock.  The map is drawn once; a frame adds what moves.
+The same log and rate give the same frames, whatever the clock.  The map is drawn once; a frame adds the moving parts.
 """
 
 import math
@@ -28,15 +28,17 @@ from world.arrays import Floats
 
 Pixels = NDArray[np.uint8]
 
-RATE = 12  # frames a second
+# Frames a second.
+RATE = 12
+# Resolution of the frames, pixels an inch.
 _DPI = 100.0
-# The trail of an hour has more points than a screen.
-_TRAIL = 4000
+# Largest number of points of the trail; an hour of flight has more points than a screen.
+_MAX_TRAIL_POINTS = 4000
 
 
 @dataclass(frozen=True, slots=True)
 class MovieFrames:
-    """Frames of a flight from ``start`` to ``end`` (s), ``speed`` times as fast as it was flown.
+    """Frames of a flight from ``start`` to ``end`` (s), at ``speed`` times the speed of the flight.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -58,7 +60,7 @@ class MovieFrames:
         return max(1, math.ceil((self.end - self.start) * RATE / self.speed - 1e-9)) + 1
 
     def times(self) -> Floats:
-        """Flight time of each frame, s."""
+        """Return the flight time of each frame, s."""
         return np.minimum(self.end, self.start + np.arange(len(self)) * self.speed / RATE)
 
     def frames(self) -> Iterator[Pixels]:
@@ -113,10 +115,10 @@ class _MovingParts:
         if terrain is not None:
             ground = np.asarray(terrain.height(position[:, 0], position[:, 1]))
         self._above = position[:, 2] - ground
-        self._step = max(1, len(position) // _TRAIL)
+        self._step = max(1, len(position) // _MAX_TRAIL_POINTS)
 
     def show(self, time: float) -> None:
-        """Draw the newest row at or before ``time`` (s), and what was flown up to it."""
+        """Draw the newest row at or before ``time`` (s), and the trail up to it."""
         track = self._track
         k = max(0, int(np.searchsorted(track.time, time, side="right")) - 1)
         rows = np.append(np.arange(0, k, self._step), k)
@@ -146,7 +148,7 @@ class _MovingParts:
 
 
 def signed_number(value: float, digits: int) -> str:
-    """Write a number with so many digits, nought without a sign, "?" for what is no number.
+    """Write a number with ``digits`` decimals, zero without a sign, and "?" for a non-finite value.
 
     >>> signed_number(-0.3, 0), signed_number(-12.34, 1)
     ('0', '−12.3')
@@ -154,5 +156,5 @@ def signed_number(value: float, digits: int) -> str:
     return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", "\N{MINUS SIGN}") if math.isfinite(value) else "?"
 
 
-# Nose, right wing, tail, left wing: an arrowhead that points north.
+# Arrowhead that points north: nose, right wing, tail, left wing.
 _PLANE = [(0.0, 1.0), (0.7, -0.8), (0.0, -0.35), (-0.7, -0.8), (0.0, 1.0)]

@@ -1,4 +1,4 @@
-"""The timeline of a recorded flight, from its log alone: legs, turns, clearances, threats and events in order of time.
+"""Timeline of a recorded flight: legs, turns, clearances, threats and events in order of time.
 
 Everything is recomputed from the track, the route, the terrain and the threats in the log; a recorded leg, clearance or
 verdict is not read.  Nothing is printed here.
@@ -19,17 +19,19 @@ from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
 from world.frames import to_geo
 from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
 
+# Width of a line, columns.
 WIDTH = 100
-# The throttle counts as at a limit within this of 0 or 1, and gets an entry after this many seconds.
-_THROTTLE_EDGE = 1e-3
-_THROTTLE_TIME = 2.0
-# Kinds of entries; those at one time stand in this order.
+# The throttle is at a limit if it is within this tolerance of 0 or 1.
+_THROTTLE_LIMIT_TOLERANCE = 1e-3
+# Least duration of a throttle at its limit that gets an entry, s.
+_MIN_SATURATION_TIME_S = 2.0
+# Kinds of entries, in the order of entries at the same time.
 _ORDER = ("start", "turn", "leg", "ground", "threat", "throttle", "event", "end", "log")
 
 
 @dataclass(frozen=True, slots=True)
 class TimelineEntry:
-    """One thing that happened: time in s since the start, a kind ("leg", "turn", "threat", ...), and printable text."""
+    """One entry: time since the start (s), a kind ("leg", "turn", "threat", ...), and printable text."""
 
     time: float
     kind: str
@@ -46,7 +48,7 @@ class _LegRows:
 
 
 def timeline(log: FlightLog) -> list[TimelineEntry]:
-    """List what happened in a flight, in order of time; the same log always gives the same entries.
+    """List the entries of a flight in order of time; the same log always gives the same entries.
 
     >>> from logs.recording.example_log import example_log
     >>> for entry in timeline(example_log())[3:6]:
@@ -59,12 +61,12 @@ def timeline(log: FlightLog) -> list[TimelineEntry]:
 
 
 def log_with_legs(log: FlightLog) -> FlightLog:
-    """Return the log with its track's legs found from the track, whatever was recorded."""
+    """Return the log with legs computed from its track; recorded legs are not used."""
     return replace(log, track=with_legs(log.track, find_leg_ends(log.setup, log.track)))
 
 
 def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
-    """As `timeline`, of a log from `log_with_legs`."""
+    """List the entries as `timeline` does, for a log from `log_with_legs`."""
     parts = _leg_rows(log.track, log.setup.route)
     entries = [_start(log)]
     entries += _legs(log, parts)
@@ -82,7 +84,7 @@ def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
 
 
 def entry_lines(entry: TimelineEntry) -> list[str]:
-    """Set an entry in lines of at most `WIDTH` columns: time in seconds, kind, text.
+    """Wrap an entry to lines of at most `WIDTH` columns: time in seconds, kind, text.
 
     >>> entry_lines(TimelineEntry(20.0, "turn", "turn left 14.0° at waypoint 1"))
     ['    20.00 s  turn     turn left 14.0° at waypoint 1']
@@ -94,12 +96,12 @@ def entry_lines(entry: TimelineEntry) -> list[str]:
 
 
 def _printable(text: str) -> str:
-    """Return text from a file must not steer the terminal that it is shown on."""
+    """Replace control characters of a file's text, so that they cannot control the terminal."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def _leg_rows(track: Track, route: Route) -> list[_LegRows]:
-    """Split the track where the leg changes, and leave out rows on no leg of the route."""
+    """Split the track where the leg changes, and leave out rows outside the legs of the route."""
     edges = np.flatnonzero(np.diff(track.leg)) + 1
     starts = [0, *edges.tolist()]
     stops = [*edges.tolist(), len(track)]
@@ -107,18 +109,18 @@ def _leg_rows(track: Track, route: Route) -> list[_LegRows]:
     return [part for part in parts if 0 <= part.leg < route.legs]
 
 
-def _by_circle(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:
-    """Return parts in order, those around one circle together."""
+def _group_by_loiter(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:
+    """Group the parts in order; parts around the same loiter form one group."""
     first: list[int] = []
     for leg in range(route.legs):
         around = min(route.arcs[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]
-        goes_on = around and leg and route.arcs[leg - 1] > 0.0 and route.items[leg - 1] == route.items[leg]
-        first.append(first[-1] if goes_on else leg)
+        continues = around and leg and route.arcs[leg - 1] > 0.0 and route.items[leg - 1] == route.items[leg]
+        first.append(first[-1] if continues else leg)
     return [list(group) for _, group in itertools.groupby(parts, key=lambda part: first[part.leg])]
 
 
 def waypoint_name(route: Route, index: int) -> str:
-    """Name a waypoint by its number and, where it has one, its mission item."""
+    """Name a waypoint by its number and its mission item, if it has one."""
     item = int(route.items[index])
     number = int(route.stops[index])
     return f"waypoint {number}" if item < 0 else f"waypoint {number} (item {item})"
@@ -133,7 +135,7 @@ def _start(log: FlightLog) -> TimelineEntry:
     if setup.source is None:
         text = f"{setup.aircraft}, {scenario}, seed {setup.seed}; {place}. {setup.started}"
     else:
-        # A real flight was drawn from no seed, and nobody trimmed it.
+        # A real flight has neither a seed nor a trim.
         text = f"{setup.aircraft}, {scenario}; imported log {setup.source.file}, {place}"
     return TimelineEntry(float(track.time[0]), "start", text.strip())
 
@@ -143,7 +145,7 @@ def _legs(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     points = log.setup.shown_waypoints
     courses, runs, slopes = leg_courses(points), leg_runs(points), leg_slopes(points)
     entries = []
-    for group in _by_circle(parts, route):
+    for group in _group_by_loiter(parts, route):
         part = group[0]
         leg = part.leg
         if len(group) > 1:
@@ -166,14 +168,14 @@ def _legs(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
 
 
 def _turns(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
-    """At each change to the next leg: the route's turn, and the peak bank from mid-leg to mid-leg."""
+    """List each change to the next leg: the turn of the route, and the peak bank from mid-leg to mid-leg."""
     route, track = log.setup.route, log.track
     turns = signed_turns(route.waypoints)
     roll, _, _ = track.attitude.T
     bank = np.abs(roll.astype(np.float64))
     entries = []
     for before, after in itertools.pairwise(parts):
-        # The corners of a circle have one entry, their loiter's; a loiter that is left at once has a turn.
+        # The corners of a loiter share the entry of the loiter; a loiter that is left at once has a turn.
         same = route.items[max(0, after.leg - 1) : after.leg + 2] == route.items[after.leg]
         if after.leg != before.leg + 1 or (route.arcs[after.leg] > 0.0 and same.sum() > 1):
             continue
@@ -193,10 +195,10 @@ def _clearances(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     low, at = segment_clearances(terrain, track.position)
     required = log.setup.scenario.limits.min_clearance_m
     entries = []
-    for group in _by_circle(parts, log.setup.route):
+    for group in _group_by_loiter(parts, log.setup.route):
         part = replace(group[0], last=group[-1].last)
         name = f"leg {log.setup.route.leg_numbers[part.leg]}" + (", around its circle" if len(group) > 1 else "")
-        # Segment k goes from row k to row k + 1; the one that leads into the next leg belongs to this one.
+        # Segment k leads from row k to row k + 1; the segment into the next leg belongs to this leg.
         here = low[part.first : part.last + 1]
         if not np.isfinite(here).any():
             time = float(track.time[part.first])
@@ -232,14 +234,17 @@ def _stay(name: str, unit: str, radius: float, stay: Passage) -> list[TimelineEn
 def _throttle(track: Track) -> list[TimelineEntry]:
     _, _, _, throttle = track.commands.T
     entries = []
-    for name, held in (("full", throttle >= 1.0 - _THROTTLE_EDGE), ("closed", throttle <= _THROTTLE_EDGE)):
+    for name, held in (
+        ("full", throttle >= 1.0 - _THROTTLE_LIMIT_TOLERANCE),
+        ("closed", throttle <= _THROTTLE_LIMIT_TOLERANCE),
+    ):
         padded = np.concatenate([[False], held, [False]])
         edges = np.flatnonzero(padded[1:] != padded[:-1])
         for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
             start = float(track.time[first])
             # A command holds until the next row.
             lasted = float(track.time[min(stop, len(track) - 1)]) - start
-            if lasted >= _THROTTLE_TIME:
+            if lasted >= _MIN_SATURATION_TIME_S:
                 entries.append(TimelineEntry(start, "throttle", f"{name} for {lasted:.1f} s"))
     return entries
 

@@ -1,1 +1,1 @@
-"""The report and the comparison as pages of their own."""
+"""HTML pages: the report of a flight and the comparison of two flights."""

@@ -1,4 +1,4 @@
-"""Two flights measured alike, and their differences, from their logs alone."""
+"""Measure two flights alike from their logs alone, and compare them."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -44,7 +44,7 @@ from world.html_table import html_table
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One quantity of both flights; NaN where a flight has none.  unit: "" for a count."""
+    """One quantity of both flights; NaN if a flight lacks it.  unit: "" for a number of items."""
 
     name: str
     unit: str
@@ -54,11 +54,11 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Comparison:
-    """Two flights and what differs.
+    """Two flights and their differences.
 
     logs, names, verdicts: of the first and the second flight.
-    differences: each quantity that was measured, differing or not.
-    notes: what the flights do not share, and how far apart their tracks are, in sentences.
+    differences: each measured quantity, whether it differs or not.
+    notes: differences of the setups, and the distance between the tracks, in sentences.
     """
 
     logs: tuple[FlightLog, FlightLog]
@@ -78,7 +78,7 @@ class Comparison:
 def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str]) -> Comparison:
     """Judge and measure both flights alike.
 
-    names: of the two in tables and legends; "(first)" and "(second)" are added to names that are the same.
+    names: names in tables and legends; "(first)" and "(second)" are added to equal names.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -106,7 +106,7 @@ def _judge(log: FlightLog) -> Verdict:
 
 
 def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
-    """Measure a flight: (name, unit) and value."""
+    """Measure a flight: values by (name, unit)."""
     good = np.isfinite(track.position).all(axis=1)
     position, time = np.ascontiguousarray(track.position[good]), np.ascontiguousarray(track.time[good])
     roll, _, _ = track.attitude.T
@@ -144,13 +144,13 @@ def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
 
 
 def _reduced(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]]) -> float:
-    """Apply a reduction to the values that are numbers; NaN where there are none."""
+    """Apply a reduction to the finite values; NaN if there are none."""
     finite = values[np.isfinite(values)].astype(np.float64)
     return float(reduce(finite)) if finite.size else math.nan
 
 
 def _margins(verdict: Verdict) -> dict[tuple[str, str], float]:
-    """Return the number of failed findings, and the closest margin of each rule; NaN if not a number."""
+    """Return the number of failed findings, and the smallest margin of each rule; NaN if unknown."""
     found = {("findings that fail", ""): float(sum(item.ok is False for item in verdict.findings))}
     for name, rule in RULE_WORDS.items():
         closest = closest_to_limit(one for one in verdict.findings if one.rule == name)
@@ -161,7 +161,7 @@ def _margins(verdict: Verdict) -> dict[tuple[str, str], float]:
 
 
 def _notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[str]:
-    """Note what the two flights do not share, and how far apart their tracks are."""
+    """List the differences of the setups, and the distance between the tracks."""
     a, b = first.setup, second.setup
     notes = []
     for name, left, right in (
@@ -193,24 +193,24 @@ def _notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[
     return notes
 
 
-# Points of a track that are looked at together.
-_TOGETHER = 32
+# Number of successive points of a track that share a bounding box.
+_BLOCK_POINTS = 32
 
 
 def nearest_distances(points: Floats, track: Floats) -> Floats:
-    """Return distance (n,) from each of some points (n, 3) to the nearest of a track (m, 3), both along a way.
+    """Return the distance (n,) from each point of one track (n, 3) to the nearest point of another (m, 3).
 
-    Neighbours along a way lie near each other: boxes about some of them say which of the others may be nearest.
+    Successive points lie near each other: their bounding boxes show which points of the other track can be nearest.
 
     >>> nearest_distances(np.array([[0.0, 3.0, 4.0], [9.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]]))
     array([5., 1.])
     """
-    begins = np.arange(0, len(track), _TOGETHER)
+    begins = np.arange(0, len(track), _BLOCK_POINTS)
     low, high = np.minimum.reduceat(track, begins), np.maximum.reduceat(track, begins)
     parts = np.array_split(track, begins[1:])
     out = []
-    for first in range(0, len(points), _TOGETHER):
-        some = points[first : first + _TOGETHER]
+    for first in range(0, len(points), _BLOCK_POINTS):
+        some = points[first : first + _BLOCK_POINTS]
         least, most = some.min(axis=0), some.max(axis=0)
         nearest = np.linalg.norm(np.maximum(0.0, np.maximum(low - most, least - high)), axis=1)
         farthest = np.linalg.norm(np.maximum(high - least, most - low), axis=1)
@@ -226,7 +226,7 @@ def _wind(setup: FlightSetup) -> str:
 
 
 def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    """List quantity, unit, first, second, second less first, as text."""
+    """List quantity, unit, first value, second value, and second less first, as text."""
     first, second = (verdict.answer for verdict in comparison.verdicts)
     rows: list[tuple[str, ...]] = [("verdict", "", first, second, "")]
     for item in comparison.differences:
@@ -238,7 +238,7 @@ def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
 
 
 def difference_lines(comparison: Comparison) -> list[str]:
-    """Set the table of differences and the notes in lines for a terminal.
+    """Format the table of differences and the notes as lines for a terminal.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -265,7 +265,7 @@ def difference_lines(comparison: Comparison) -> list[str]:
 # ----------------------------------------------------------------------
 # The comparison of two flights as files: pictures, and a page that holds them.
 
-# Name of the chart that stands for each picture, and what it shows.
+# Name of the chart of each picture, and its description.
 _PICTURES = {
     "compare-map": ("map", "Both flights from above, over the first one's map"),
     "compare-profile": (
@@ -276,9 +276,9 @@ _PICTURES = {
 
 
 def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False) -> list[Path]:
-    """Write ``compare-map.png``, ``compare-profile.png`` and ``compare.html`` into a folder, made if it is missing.
+    """Write ``compare-map.png``, ``compare-profile.png`` and ``compare.html`` into a folder, created if missing.
 
-    svg: the pictures as SVG, too.  The map is left out where the flights' map origins differ.
+    svg: True to write the pictures as SVG, too.  The map is left out if the map origins of the flights differ.
     Returns the paths written.  Raises OSError.
 
     >>> import tempfile
@@ -309,7 +309,7 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
 
 
 def comparison_views(flights: tuple[NamedFlight, NamedFlight]) -> dict[str, View]:
-    """Descriptions of the pictures by file name; no map where the flights' origins differ.
+    """Build the descriptions of the pictures by file name; no map if the origins of the flights differ.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -323,7 +323,7 @@ def comparison_views(flights: tuple[NamedFlight, NamedFlight]) -> dict[str, View
 
 
 def comparison_data(flights: tuple[NamedFlight, NamedFlight], views: Mapping[str, View]) -> dict[str, Any]:
-    """Scene, flights and charts of the page as what JSON can hold; the scene has the map's ground."""
+    """Return scene, flights and charts of the page as JSON data; the scene holds the ground of the map."""
     first, _ = flights
     scene = None
     if "compare-map" in views:
@@ -339,7 +339,7 @@ def comparison_data(flights: tuple[NamedFlight, NamedFlight], views: Mapping[str
 def _page(
     comparison: Comparison, flights: tuple[NamedFlight, NamedFlight], views: Mapping[str, View], files: dict[str, bytes]
 ) -> str:
-    """Return the page, its pictures, charts and scripts inside."""
+    """Return the page with its pictures, charts and scripts."""
     pictures = [(*_PICTURES[name.removesuffix(".png")], picture_address(data)) for name, data in files.items()]
     data, script = comparison_data(flights, views), script_text(CHART_SCRIPTS)
     verdicts = [

@@ -1,4 +1,4 @@
-"""The page of an identification: how well equations are explained, what each number is, what was not seen."""
+"""Write the page of an identification: fits of equations, parameters, and uncertain quantities."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,16 +24,17 @@ from logs.views.report.page import (
 from logs.views.scene import script_json
 from world.arrays import Floats
 
-_TWO_SIDED = 1.96
+# Standard deviations from the estimate to either end of a 95 % interval.
+_INTERVAL_SIGMAS = 1.96
 
 
 @dataclass(frozen=True, slots=True)
 class ReplayedLog:
     """A check log, replayed by both models.
 
-    file: its name.  windows: how many of 5 s.
-    rows: quantity, unit, and root mean squares of both models' errors.
-    logged, replayed: (t, k) of some windows, as the identified model flew them.  hertz: rows a second.
+    file: its name.  windows: number of windows of 5 s.
+    rows: quantity, unit, and root mean square errors of both models.
+    logged, replayed: (t, k) of some windows, replayed by the identified model.  hertz: rows a second.
     """
 
     file: str
@@ -48,10 +49,10 @@ class ReplayedLog:
 class IdentificationFacts:
     """Data of the page.
 
-    title: the aircraft's.  logs: name and SHA-256 of each.
-    numbers: what it can do: name, unit, lower end, estimate and upper end (95 %).
-    replay: of a check log; None without one.
-    wide: which of the numbers the logs leave wide, and what would narrow each, a line each.
+    title: title of the aircraft.  logs: name and SHA-256 of each log.
+    numbers: performance of the aircraft: name, unit, lower end, estimate and upper end (95 %).
+    replay: replay of a check log; None without one.
+    wide: numbers that the logs leave uncertain, with the flights that would narrow each, a line each.
     """
 
     title: str
@@ -63,7 +64,7 @@ class IdentificationFacts:
 
 
 class ParameterRow(NamedTuple):
-    """A row of the table, as text; share: of the interval that is the logs', in percent."""
+    """A row of the table, as text; share: contribution of the logs to the interval, percent."""
 
     title: str
     name: str
@@ -87,8 +88,8 @@ def parameter_rows(estimate: Estimate) -> list[ParameterRow]:
                 name=parameter.property_name,
                 prior=f"{parameter.prior:g} ± {parameter.sd:g}",
                 estimate=f"{value:.3f}",
-                low=f"{value - _TWO_SIDED * sd:.2f}",
-                high=f"{value + _TWO_SIDED * sd:.2f}",
+                low=f"{value - _INTERVAL_SIGMAS * sd:.2f}",
+                high=f"{value + _INTERVAL_SIGMAS * sd:.2f}",
                 share=share,
             )
         )
@@ -96,7 +97,7 @@ def parameter_rows(estimate: Estimate) -> list[ParameterRow]:
 
 
 def shift_rows(estimate: Estimate, count: int = 3) -> list[tuple[str, str]]:
-    """Return what is held fixed, and which parameters move most with one standard deviation of it."""
+    """Return the fixed quantities, and parameters that change most with one standard deviation of each."""
     rows = []
     sds = np.array([parameter.sd for parameter in PARAMETERS])
     for name, shift in estimate.shifts.items():
@@ -107,7 +108,7 @@ def shift_rows(estimate: Estimate, count: int = 3) -> list[tuple[str, str]]:
 
 
 def identification_page(facts: IdentificationFacts) -> str:
-    """Return the page, whole: its pictures, charts and scripts inside."""
+    """Return the whole page with its pictures, charts and scripts."""
     charts = {f"fit-{k}": equation_chart(one) for k, one in enumerate(facts.estimate.equations)}
     if facts.replay is not None:
         names, units = [row[0] for row in facts.replay.rows], [row[1] for row in facts.replay.rows]
@@ -135,7 +136,7 @@ def identification_page(facts: IdentificationFacts) -> str:
 def _fits(
     estimate: Estimate, charts: Mapping[str, Chart], pictures: Mapping[str, bytes]
 ) -> Sequence[tuple[str, str, str, str]]:
-    """Return name of the chart, its words, its picture, and how good the fit is."""
+    """Return name, description and picture of each chart, and the quality of its fit."""
     made = []
     for k, equation in enumerate(estimate.equations):
         name = f"fit-{k}"

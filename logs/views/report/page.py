@@ -1,8 +1,7 @@
-"""The report of a flight: one HTML page that needs no other file, and its pictures as files.
+"""Write the report of a flight: one self-contained HTML page, and its pictures as files.
 
-The page holds its pictures, its style, its data and two scripts, its own and plotly.js, which its policy names by
-hash; it asks no network for anything.  Without the scripts and on paper, still pictures stand in place of 3-D view and
-charts.
+The page contains its pictures, style, data and two scripts (its own and plotly.js), which its policy lists by hash; it
+makes no network requests.  Without scripts and on paper, still pictures replace the 3-D view and the charts.
 """
 
 import base64
@@ -41,19 +40,19 @@ if TYPE_CHECKING:
 
 # Pictures.
 
-# Bytes from which on a picture is kept with few colours.
-_LARGE = 200_000
+# A larger picture is stored with few colours, bytes.
+_LARGE_PICTURE_BYTES = 200_000
 
 
 @dataclass(frozen=True, slots=True)
 class ReportPicture:
     """One picture of the page.
 
-    identifier: of its section.
+    identifier: identifier of its section.
     title: its heading.
-    alternative: its text for those who cannot see it.
-    caption: how to read it.
-    data: its address in the page.
+    alternative: text for readers who cannot see it.
+    caption: explanation of the picture.
+    data: its data URL in the page.
     """
 
     identifier: str
@@ -64,7 +63,7 @@ class ReportPicture:
 
 
 def report_pictures(subject: Subject, pictures: Mapping[str, bytes]) -> list[ReportPicture]:
-    """List the page's pictures in its order; what was not drawn is left out.
+    """List the pictures in the order of the page; pictures that were not drawn are left out.
 
     pictures: PNG bytes by file name.
     """
@@ -82,21 +81,21 @@ def report_pictures(subject: Subject, pictures: Mapping[str, bytes]) -> list[Rep
 
 
 def picture_address(png: bytes) -> str:
-    """Return a picture as an address that holds it; one that is large with few colours, as it is seen on paper alone.
+    """Return a picture as a data URL; a large picture, which is seen only on paper, with few colours.
 
     >>> picture_address(b"PNG")
     'data:image/png;base64,UE5H'
     """
-    # Imported here, as in `page`: matplotlib is not loaded before a drawing.
+    # Imported here, so that matplotlib is not loaded before a drawing.
     from logs.views.drawing import few_colours
 
-    small = png if len(png) <= _LARGE else few_colours(png)
+    small = png if len(png) <= _LARGE_PICTURE_BYTES else few_colours(png)
     return "data:image/png;base64," + base64.b64encode(small).decode("ascii")
 
 
-# What the pages carry beside their words: style, scripts and plotly.js, and the policy that lets in no others.
+# Style, scripts and plotly.js of the pages, and the policy that admits no others.
 
-# The scripts in the order in which they stand; the comparison has charts and no view.
+# Scripts in the order of the page; the comparison has charts but no 3-D view.
 CHART_SCRIPTS = (
     "page_data",
     "theme",
@@ -124,11 +123,11 @@ VIEW_SCRIPTS = (
 
 @dataclass(frozen=True, slots=True)
 class PageLibrary:
-    """plotly.js as a page carries it.
+    """plotly.js as embedded in a page.
 
-    packed: compressed (gzip) and in base64.
-    digest: of the script, as a policy names it.
-    version: its own.
+    packed: the script, compressed with gzip and encoded in base64.
+    digest: hash of the script in the form of a policy.
+    version: version of plotly.js.
     """
 
     packed: str
@@ -150,15 +149,15 @@ def _templates(package: str) -> Environment:
 def page_template(name: str, package: str = "logs.views.report") -> Template:
     """Return a template of a package's folder ``templates``, compiled once in a process.
 
-    What it is rendered with is escaped, and a name in it that is not given is an error.
+    Rendered values are escaped, and a missing name is an error.
     """
     return _templates(package).get_template(name)
 
 
 def script_text(names: tuple[str, ...]) -> str:
-    """Scripts as one, each from its own file of ``templates/scripts``; ``start`` comes last, whatever is asked for.
+    """Join the scripts of ``templates/scripts``, each from its own file, and always add ``start`` at the end.
 
-    Before them stand the theme's widths and dashes.
+    The widths and dashes of the theme stand before the scripts.
     """
     files = resources.files("logs.views.report").joinpath("templates", "scripts")
     parts = [files.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in (*names, "start")]
@@ -167,14 +166,14 @@ def script_text(names: tuple[str, ...]) -> str:
 
 
 def style_text(*names: str) -> str:
-    """Return the theme's colours and style sheets of ``templates`` as one: "style" is what both pages share."""
+    """Join the colours of the theme and style sheets of ``templates``; both pages share the sheet "style"."""
     files = resources.files("logs.views.report").joinpath("templates")
     sheets = [files.joinpath(f"{name}.css").read_text(encoding="utf-8") for name in names]
     return "\n".join([theme.css_variables(), *sheets])
 
 
 def script_digest(text: str) -> str:
-    """Return a script as a policy names it (Content Security Policy Level 3, "hash-source").
+    """Return the hash of a script in the form of a policy (Content Security Policy Level 3, "hash-source").
 
     >>> script_digest("")
     'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='
@@ -184,10 +183,13 @@ def script_digest(text: str) -> str:
 
 @cache
 def page_library() -> PageLibrary:
-    """plotly.js, as the build has packed it, a third of its size.  Raises OSError where nothing was built."""
+    """Return plotly.js as packed by the build, a third of its size.
+
+    Raises OSError if the build is missing.
+    """
     packed = resources.files("logs.views.report").joinpath("plotly.min.js.gz").read_bytes()
     text = gzip.decompress(packed).decode("utf-8")
-    # It begins with a comment that names it: "plotly.js v3.1.0".
+    # The script begins with a comment that states its version: "plotly.js v3.1.0".
     version = text[:200].partition("plotly.js v")[2].splitlines()[0]
     return PageLibrary(base64.b64encode(packed).decode("ascii"), script_digest(text), version)
 
@@ -205,15 +207,15 @@ def write_report(
     svg: bool = False,
     returns: DrawnReturns | None = None,
 ) -> list[Path]:
-    """Write those of `logs.views.figures.FIGURES` that are files, and ``report.html``, into a folder, made if missing.
+    """Write the files of `logs.views.figures.FIGURES` and ``report.html`` into a folder, created if missing.
 
     track: None for a plan that was not flown.
-    ended: how the flight ended, as in its log; None where unknown.
-    versions: of planfly and the packages it depends on.
-    command: the command line that makes the same flight again.
-    events: the log's lines, shown with their times.
-    svg: the figures as SVG, too.
-    returns: of the flight or the plan; None draws none.
+    ended: how the flight ended, as in its log; None if unknown.
+    versions: versions of planfly and the packages it depends on.
+    command: the command line that repeats the flight.
+    events: lines of the log, shown with their times.
+    svg: True to write the figures as SVG, too.
+    returns: returns of the flight or the plan; None to draw none.
 
     Everything is drawn before the first file is written; each file is written whole or not at all.
     Returns the paths written.  Raises OSError.
@@ -289,7 +291,7 @@ def _page(
 
 
 def _page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View]) -> dict[str, Any]:
-    """Return what the page's scripts read, made safe for where it stands, and the scripts themselves."""
+    """Return the data for the scripts of the page, escaped for HTML, and the scripts."""
     script, flight = script_text((*CHART_SCRIPTS, *VIEW_SCRIPTS)), report_flight(setup, track)
     charts = page_charts(views)
     scene = charts.pop("scene")
@@ -310,13 +312,19 @@ def _page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View
 
 
 def page_charts(views: Mapping[str, View]) -> dict[str, Any]:
-    """Return what the page's scripts draw by the figure's name; a chart without panels is left to its picture."""
+    """Return the charts that the scripts draw, by name of the figure.
+
+    A chart without panels stays a picture.
+    """
     return {name: view_json(view) for name, view in views.items() if not isinstance(view, Chart) or view.panels}
 
 
 def report_flight(setup: FlightSetup, track: Track | None) -> dict[str, Any]:
-    """Return the flight for slider and map, and the model of the aircraft; no flight of a bare plan."""
+    """Return the flight for slider and map, and the aircraft model.
+
+    A plan that was not flown has no flight.
+    """
     flights = [] if track is None else [flight_moments(setup, track)]
-    # A flight of which no place is known cannot be shown at any moment.
+    # A flight without a known position cannot be shown.
     known = [flight for flight in flights if flight["time"]]
     return {"flights": known, "model": aircraft_model()}

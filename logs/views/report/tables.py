@@ -1,4 +1,4 @@
-"""The contents of the report's tables: legs, threats, controls, energy, and facts of scenario and flight."""
+"""Build the tables of the report: legs, threats, controls, energy, and facts on scenario and flight."""
 
 import hashlib
 import math
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 Facts = list[tuple[str, str]]
 
-# A page with more events than this would be read by nobody.
+# Largest number of events in a page that a reader can be expected to read.
 MAX_EVENTS = 200
 
 
 @dataclass(frozen=True, slots=True)
 class LegRow:
-    """One leg as text, in the columns of `LEG_COLUMNS`; failing: a finding about it failed."""
+    """One leg as text, in the columns of `LEG_COLUMNS`; failing: True if a finding on the leg failed."""
 
     cells: tuple[str, ...]
     failing: bool
@@ -55,7 +55,7 @@ LEG_COLUMNS = (
 
 
 def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -> list[LegRow]:
-    """List the legs of the route: planned shape, and what was flown on each."""
+    """List the legs of the route: planned shape and flown values."""
     waypoints = setup.shown_waypoints
     runs, courses, slopes = leg_runs(waypoints), np.degrees(leg_courses(waypoints)), np.degrees(leg_slopes(waypoints))
     turns = np.degrees(signed_turns(waypoints))
@@ -80,7 +80,7 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
 
 
 def ground_clearance(setup: FlightSetup, track: Track) -> Floats | None:
-    """Return height above ground of each row, (t,) m, from track and terrain; None without terrain."""
+    """Return the height above ground of each row, (t,) m, from track and terrain; None without terrain."""
     terrain = setup.scenario.terrain
     if terrain is None:
         return None
@@ -92,7 +92,7 @@ def _flown_cells(track: Track | None, above: Floats | None, leg: int) -> tuple[s
     if track is None or rows.size == 0:
         return (NOTHING,) * 7
     roll, _, _ = track.attitude[rows].T
-    # A leg ends where the next one begins.
+    # A leg ends at the first row of the next leg.
     last = min(int(rows[-1]) + 1, len(track) - 1)
     return (
         number(float(track.time[last] - track.time[rows[0]]), digits=1),
@@ -106,7 +106,7 @@ def _flown_cells(track: Track | None, above: Floats | None, leg: int) -> tuple[s
 
 
 def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
-    """Return the flight in one line; "" where there was none."""
+    """Describe the flight in one line; "" for a plan that was not flown."""
     if track is None:
         return ""
     seconds, distance = float(track.time[-1] - track.time[0]), float(path_length(track.position)) / 1000.0
@@ -132,7 +132,7 @@ def _least(values: Floats) -> float:
 
 
 def scenario_facts(setup: FlightSetup) -> Facts:
-    """Facts of the scenario: area, terrain, threats, limits, wind."""
+    """Return facts on the scenario: area, terrain, threats, limits, wind."""
     scenario = setup.scenario
     terrain = scenario.terrain
     facts: Facts = [("Scenario", scenario.name)]
@@ -189,7 +189,7 @@ def _limit_facts(setup: FlightSetup) -> Facts:
 
 
 def flight_facts(setup: FlightSetup, track: Track | None, ended: str) -> Facts:
-    """Aircraft, mission and flight in numbers."""
+    """Return numbers of aircraft, mission and flight."""
     bank = min(setup.max_bank, setup.envelope.max_bank)
     braking = "may drive the motor" if setup.envelope.motor_braking else "does not drive the motor"
     route = setup.route
@@ -224,12 +224,12 @@ def event_rows(events: Sequence["LogEvent"]) -> list[tuple[str, str, str]]:
 
 
 def notes_of(setup: FlightSetup) -> list[str]:
-    """List the mission file's warnings, the scenario's notes, and what of it cannot be flown as written."""
+    """List warnings on the mission file, notes on the scenario, and items that cannot be flown as written."""
     return [*setup.mission.warnings, *setup.scenario.notes, *setup.notes]
 
 
 def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
-    """Sum up what the flight took from the battery."""
+    """Summarize the energy that the flight drew from the battery."""
     if track is None or len(track) == 0:
         return []
     used = float(track.energy[-1])
@@ -251,7 +251,7 @@ def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
 
 
 def origin_facts(setup: FlightSetup, versions: Mapping[str, str]) -> Facts:
-    """Seed, versions and hashes: what it takes to have the same flight again."""
+    """Return seed, versions and hashes, which are needed to repeat the flight."""
     wind_seed = setup.scenario.wind.seed
     facts: Facts = [("Seed", f"{setup.seed}" + (f"; turbulence {wind_seed}" if wind_seed is not None else ""))]
     facts += [(name, versions[name]) for name in sorted(versions)]
@@ -294,7 +294,7 @@ def passage_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...
 
 
 def saturation_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...]]:
-    """List each control: its limit, its largest command, and for how long that stood at the limit (s, %)."""
+    """List each control with its limit, its largest command, and its time at the limit (s, %)."""
     if track is None or len(track) < 2:
         return []
     lasts = np.append(np.diff(track.time), 0.0)

@@ -1,4 +1,4 @@
-"""Numbers and findings as a reader meets them: sensible digits, units, real minus signs, failing rows on top."""
+"""Format numbers and findings: sensible digits, units, real minus signs, failing rows first."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -16,9 +16,10 @@ from logs.verdict.verdict import Verdict
 from logs.verdict.wording import suggestions_text
 
 # ----------------------------------------------------------------------
-# What would have passed where a finding fails: the number, the changes of the plan, the autopilot's parameter.
+# Remedies for a failed finding: the value that passes, changes of the plan, and the autopilot's parameter.
 
-# How far a margin may be from the difference that it is, in the finding's unit: both are rounded to 1e-6.
+# Tolerance between a margin and the difference of flown value and limit, in the finding's unit: both are rounded to
+# 1e-6.
 _SAME = 1e-5
 
 
@@ -26,11 +27,11 @@ _SAME = 1e-5
 class WouldPass:
     """Remedies for one failed finding.
 
-    bound: how the number that passes bounds what was flown; None where the finding fails by other evidence.
-    value: that number, in the finding's unit.
-    misses: how far beyond it the flight, or the plan, was; tolerance not counted.
-    suggestions: the smallest changes of the plan, any of which would pass.
-    parameter: that of the autopilot which decides, where it fails this finding first.
+    bound: side of the passing values; None if the finding fails by other evidence.
+    value: the limiting value that passes, in the finding's unit.
+    misses: distance of flight or plan beyond that value, without tolerance.
+    suggestions: the smallest changes of the plan; any one of them would pass.
+    parameter: the autopilot's deciding parameter, if it fails this finding first.
     """
 
     bound: Literal["at most", "at least"] | None
@@ -40,14 +41,14 @@ class WouldPass:
     parameter: DecidingParameter | None
 
     def __bool__(self) -> bool:
-        """Something is known that would pass."""
+        """Return True if any remedy is known."""
         return bool(self.bound or self.suggestions or self.parameter)
 
 
 def would_pass(finding: Finding, deciding: DecidingParameter | None) -> WouldPass:
     """Return the remedies for a failed finding.
 
-    deciding: the verdict's.
+    deciding: deciding parameter of the verdict.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import Place
@@ -69,7 +70,7 @@ def would_pass(finding: Finding, deciding: DecidingParameter | None) -> WouldPas
 
 
 def _bound(finding: Finding) -> Literal["at most", "at least"] | None:
-    """Return the side of the limit that passes: the side of positive margins; a descent is bounded in steepness."""
+    """Return the side of the limit with positive margins, which passes; a descent is bounded in steepness."""
     if finding.limit is None or finding.margin is None:
         return None
     values = [value for value in (finding.flown, finding.planned) if value is not None]
@@ -88,8 +89,8 @@ _UNITS = {"deg": "°", "none": "", "1": ""}
 class FindingRow:
     """One finding as text.
 
-    state: "fail", "pass" or "unjudged"; sign: the same for people who see no colour.
-    would_pass: of a failed one, the number and the changes that would have passed; "" where nothing is known.
+    state: "fail", "pass" or "unjudged"; sign: the state as a symbol, for readers who see no colour.
+    would_pass: value and changes that would have made a failed finding pass; "" if unknown.
     """
 
     state: str
@@ -110,7 +111,7 @@ class FindingRow:
 
 @dataclass(frozen=True, slots=True)
 class RuleRow:
-    """One rule over the whole flight: how many findings stand how, and the one closest to its limit of those judged."""
+    """One rule over the whole flight: numbers of findings by state, and the one closest to its limit."""
 
     state: str
     sign: str
@@ -126,7 +127,7 @@ class RuleRow:
 
 @dataclass(frozen=True, slots=True)
 class LevelRow:
-    """One level's answer as text.  state: "pass" or "fail"; sign: the same for people who see no colour."""
+    """Answer of one level as text.  state: "pass" or "fail"; sign: the state as a symbol, without colour."""
 
     state: str
     sign: str
@@ -138,14 +139,14 @@ class LevelRow:
 
 @dataclass(frozen=True, slots=True)
 class Badge:
-    """The verdict in a word.  state: "pass", "fail" or "unjudged"."""
+    """The verdict in one word.  state: "pass", "fail" or "unjudged"."""
 
     state: str
     sign: str
     word: str
 
 
-# What each level asks, and who flies for it; "" for the flight's own autopilot.
+# Question of each level, and who flies for it; "" for the flight's own autopilot.
 _LEVELS = {
     "geometry": ("Does the path ask for more than the envelope gives?", "nobody"),
     "airframe": ("Can this aircraft follow it at all?", "planfly's guidance"),
@@ -156,9 +157,9 @@ _WORDS = {"pass": "ok", "fail": "fails", "unjudged": "not judged"}
 
 
 def number(value: float | None, *, signed: bool = False, digits: int | None = None) -> str:
-    """Write a number with three or four telling digits; an en dash for none, and for what is no finite number.
+    """Write a number with three or four significant digits, or an en dash for None and non-finite values.
 
-    digits: decimals, where a column wants all of its numbers alike.
+    digits: number of decimals, if all numbers of a column need the same.
     """
     if value is None or not math.isfinite(value):
         return NOTHING
@@ -170,7 +171,7 @@ def number(value: float | None, *, signed: bool = False, digits: int | None = No
     text = f"{value:{'+' if signed else ''},.{digits}f}"
     if not any(mark in "123456789" for mark in text):
         text = text.lstrip("+-")
-    # A thousands comma could pass for a decimal one: a thin space cannot.
+    # A thousands comma could be read as a decimal comma; a thin space cannot.
     return text.replace(",", "\u2009").replace("-", "−")
 
 
@@ -184,19 +185,19 @@ def quantity(value: float | None, unit: str) -> str:
 
 
 def in_unit(value: float | None, unit: str) -> tuple[float | None, str]:
-    """Give the value and the name of its unit as shown."""
+    """Return the value and the name of its unit, as shown."""
     if unit == "rad":
         return (None if value is None else math.degrees(value)), "°"
     return value, _UNITS.get(unit, unit)
 
 
 def state_of(ok: bool | None) -> str:
-    """Name a finding's state, from its answer."""
+    """Name the state of a finding by its answer."""
     return "unjudged" if ok is None else "pass" if ok else "fail"
 
 
 def badge_of(verdict: Verdict) -> Badge:
-    """Put the verdict in a word: incomplete where nothing failed but the completion itself."""
+    """Summarize the verdict in one word: incomplete if nothing but the completion failed."""
     if verdict.flyable:
         word = verdict.answer.capitalize() + ("" if verdict.level == "flown" else " on paper, not flown")
         return Badge("pass", _SIGNS["pass"], word)
@@ -212,9 +213,9 @@ def badge_of(verdict: Verdict) -> Badge:
 
 
 def level_rows(verdict: Verdict, autopilot: Autopilot) -> list[LevelRow]:
-    """Return each level that was asked, geometry first; the verdict's own is the last.
+    """Return each judged level, geometry first and the verdict's own level last.
 
-    autopilot: of the flight.
+    autopilot: autopilot of the flight.
     """
     own = autopilot.title if autopilot.parameters is None else f"{autopilot.title}, by its parameters"
     rows = []
@@ -227,9 +228,11 @@ def level_rows(verdict: Verdict, autopilot: Autopilot) -> list[LevelRow]:
 
 
 def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None = None) -> list[FindingRow]:
-    """Return all findings as text: failing first, then passed, then not judged; otherwise in the verdict's order.
+    """Return all findings as text: failing first, then passed, then not judged.
 
-    deciding: the verdict's parameter, for what would pass.
+    Within each state, the order of the verdict is kept.
+
+    deciding: deciding parameter of the verdict, for the remedies.
     """
     order = {"fail": 0, "pass": 1, "unjudged": 2}
     return sorted((_row(finding, deciding) for finding in findings), key=lambda row: order[row.state])
@@ -237,9 +240,9 @@ def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None
 
 @dataclass(frozen=True, slots=True)
 class FailedGroup:
-    """The findings that fail by one rule.
+    """The failed findings of one rule.
 
-    judged: how many findings of the rule are.  others: where else it fails and by what value, the worst first.
+    judged: number of judged findings of the rule.  others: places and values of further failures, worst first.
     """
 
     rule: str
@@ -267,7 +270,7 @@ def _in_short(row: FindingRow) -> str:
 def would_pass_text(found: WouldPass, unit: str) -> str:
     """Describe the remedies in words; "" if none is known.
 
-    unit: of the finding.
+    unit: unit of the finding.
 
     >>> would_pass_text(WouldPass("at most", 7.8, 3.45, (), None), "deg")
     'at most 7.80° (misses by 3.45°)'
@@ -286,7 +289,7 @@ def would_pass_text(found: WouldPass, unit: str) -> str:
 
 
 def count_sentence(rows: list[FindingRow]) -> str:
-    """Say how many findings hold, fail, and were not judged."""
+    """State the numbers of findings that hold, fail, and were not judged."""
     counts = {state: sum(row.state == state for row in rows) for state in _SIGNS}
     held = f"{counts['pass']} of {counts['pass'] + counts['fail']} judged findings hold"
     failed = f", {counts['fail']} {'fails' if counts['fail'] == 1 else 'fail'}" if counts["fail"] else ""
@@ -321,7 +324,7 @@ def _row(finding: Finding, deciding: DecidingParameter | None = None) -> Finding
 
 
 def _sentence(finding: Finding) -> str:
-    """Say in words how a finding stands: what was flown or planned, against what, and why."""
+    """Describe a finding in words: the flown or planned value, its limit, and the reason."""
     parts: list[str] = []
     for word, value in (("flown", finding.flown), ("planned", finding.planned)):
         if value is not None and not parts:
@@ -355,7 +358,7 @@ def _rule_row(rule: RuleFindings) -> RuleRow:
 
 
 # ----------------------------------------------------------------------
-# An imported flight against the model's, in words: legs, turns, and how far the model can be trusted.
+# An imported flight compared with its simulation, in words: legs, turns, and how far the model can be trusted.
 
 _CALLED = {"cross_track": "cross-track", "height_error": "height", "ground_speed": "ground speed", "bank": "bank"}
 _HEAD = ("", "cross-track (m)", "height (m)", "ground speed (m/s)", "bank (deg)", "energy (Wh)")
@@ -408,9 +411,9 @@ def trust_line(again: Reflight) -> str:
 
 
 def left_lines(agains: Sequence[Reflight], stretches: Sequence[MissionStretch], flown_again: int) -> list[str]:
-    """Return which stretches were not flown again, and why.
+    """List the stretches that were not flown again, with the reasons.
 
-    stretches: of the imported flight.  flown_again: the most that are.
+    stretches: stretches of the imported flight.  flown_again: largest number of stretches to fly again.
 
     >>> left_lines((), (MissionStretch(50.0, 60.0, "AUTO", "log"),), 9)
     ['Not flown again: AUTO from 50.0 s to 60.0 s: it passed no two waypoints in order']
