@@ -2,6 +2,7 @@
 
 import errno
 import os
+import sys
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -43,6 +44,11 @@ def _fly(request: FlightRequest) -> FlightRow:
     return _copies[0].fly(request, f"process {os.getpid()}")
 
 
+# Warning option that the resource tracker of multiprocessing inherits: it frees the semaphores of an interrupted
+# campaign, and would report that on the user's terminal.
+_TRACKER_OPTION = "ignore:resource_tracker:UserWarning"
+
+
 class _Worker:
     """Process that flies one flight at a time; a dead process is replaced when the next flight is sent."""
 
@@ -64,6 +70,8 @@ class _Worker:
 
     def _submit(self, request: FlightRequest) -> Future[FlightRow]:
         if self._pool is None:
+            if _TRACKER_OPTION not in sys.warnoptions:
+                sys.warnoptions.append(_TRACKER_OPTION)
             # A pool of one process: if it dies, its flight is known.
             self._pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=end_with_parent)
             # Not an argument of the process: the start would wait until the process has imported everything it needs.

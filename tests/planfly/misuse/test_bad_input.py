@@ -238,13 +238,14 @@ def test_a_malformed_log(name: str, command: str, tmp_path: Path, capsys: pytest
         ["fly", "missing.waypoints"],
         ["check", "missing.mcap"],
         ["studio", "missing.waypoints", "--no-browser"],
-        ["check", "nowhere.waypoints", "--fence", "missing.fence"],
-        ["check", "nowhere.waypoints", "--fence", "missing.kml"],
+        ["check", "well.waypoints", "--fence", "missing.fence"],
+        ["check", "well.waypoints", "--fence", "missing.kml"],
         ["replay", "missing.mcap"],
         ["report", "missing.mcap"],
     ],
 )
 def test_a_missing_file(argv: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "well.waypoints").write_text(WAY, encoding="utf-8")
     assert "missing" in refused(argv, tmp_path, capsys)
 
 
