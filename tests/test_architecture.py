@@ -24,7 +24,23 @@ CODE = sorted(
     file for folder in (*PACKAGES, "benchmarks", "tests", "examples") for file in (ROOT / folder).rglob("*.py")
 )
 OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
-MOST_STATEMENTS = 60
+LONGEST = 60
+# Functions that became longer when signatures and tables lost their `# fmt: skip`: to be split, and not to grow.
+LONGER = {
+    "flight/autopilots/arduplane/go_around_point_mass.py:fly_go_arounds": 76,
+    "flight/autopilots/arduplane/rtl_point_mass.py:fly_returns": 77,
+    "flight/autopilots/arduplane/rtl_point_mass.py:fly_stages": 78,
+    "flight/guidance/path.py:fly_by_path": 62,
+    "flight/simulation/simulate.py:make_loop": 98,
+    "logs/verdict/returns/glide_reach.py:_look_ahead": 66,
+    "logs/verdict/rules/completion_rule.py:imported_completion": 61,
+    "logs/verdict/rules/loiter_rule.py:_loiter_finding": 68,
+    "logs/views/exports/log_files.py:_topics": 100,
+    "planfly/api/identifying.py:identify_aircraft": 61,
+    "planfly/campaigns/pictures.py:draw_go_no_go": 67,
+    "planner/search/replan.py:replan": 61,
+    "tests/instrumented_flights.py:px4_topics": 70,
+}
 KERNELS = set(DECORATORS)
 INNER = {"inner", "inlined"}
 # Phrases that lean on a text the reader does not have; taken apart, so that this file may hold them.
@@ -202,14 +218,15 @@ def test_package_inits_hold_a_docstring_only() -> None:
         assert "import" not in text.split('"""')[2]
 
 
-def test_no_function_has_more_than_60_statements() -> None:
-    """Statements, not lines: a signature or a table may have a line for each of its entries."""
-    statements = {
-        f"{name_of(file)}:{function.name}": sum(isinstance(node, ast.stmt) for node in ast.walk(function)) - 1
+def test_no_function_is_longer_than_60_lines() -> None:
+    lengths = {
+        f"{name_of(file)}:{function.name}": (function.end_lineno or 0) - function.lineno + 1
         for file in CODE
         for function in functions(file)
     }
-    assert {function: count for function, count in statements.items() if count > MOST_STATEMENTS} == {}
+    assert {function: length for function, length in lengths.items() if length > LONGER.get(function, LONGEST)} == {}
+    # A function that was shortened leaves the list.
+    assert [function for function in LONGER if lengths.get(function, 0) <= LONGEST] == []
 
 
 def kernels_by_place() -> dict[tuple[str, str], str]:

@@ -41,7 +41,7 @@ class Conditions(DocumentConfig):
     """Its name or folder; empty for an imported flight whose aircraft nobody named."""
     mass_kg: float | None
     aircraft_named: bool
-    """Whether anybody named it; if not, it is the default."""
+    """True if the aircraft was named; if not, it is the default."""
     airspeed_mps: float
     """Until the mission sets another."""
     airspeed_kind: Literal["true", "equivalent"]

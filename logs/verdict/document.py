@@ -109,7 +109,7 @@ class VerdictDocument(DocumentConfig):
     summary: str
     """Lines for a person, of which the first answers the question."""
     conditions: Conditions | None
-    """What the verdict holds for; null if that is not known."""
+    """Conditions that the verdict holds for; null if they are not known."""
     flown_by: AutopilotProgram | None
     parameters: ParametersDocument | None
     levels: tuple[LevelDocument, ...]

@@ -18,7 +18,8 @@ from world.errors import TerrainError
 from world.gdal_raster import block_spans, geotiff_bytes, open_geotiff
 from world.raster import open_raster
 
-ROWS, COLS = 150, 203
+ROWS = 150
+COLS = 203
 PLACE = from_origin(500_000.0, 5_100_000.0, 10.0, 10.0)
 
 

@@ -1,4 +1,4 @@
-"""Where flights may be sent, when a cluster forgets a campaign, and how fast flights come in."""
+"""Processes that flights may be sent to, a cluster that forgets a campaign, and the rate of flights."""
 
 import sys
 import time

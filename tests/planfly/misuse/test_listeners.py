@@ -22,9 +22,7 @@ from tests.soak.test_hostile_files import WPL
 ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs" / "network-security.md"
 # What opens a socket, in a source; and the files that may, with the commands of the table whose listeners they hold.
-OPENS = re.compile(
-    r"socket\.socket\(|create_server\(|start_server\(|\.LocalCluster\(|HTTPServer\(|\bListener\((?!event)"
-)
+OPENS = re.compile(r"socket\.socket\(|create_server\(|start_server\(|\.LocalCluster\(|HTTPServer\(|\bListener\(")
 HOLD = {
     "flight/autopilots/arduplane_sitl/physics.py": "`fly`, `run` with `--autopilot`",
     "flight/autopilots/px4_sitl/physics.py": "`fly`, `run` with `--autopilot ./px4`",
