@@ -7,6 +7,7 @@ import contextlib
 import os
 import shutil
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
 # Time between SIGTERM and SIGKILL for a child process, s.
 CHILD_PATIENCE = 0.5
+# Warning option that the resource tracker of multiprocessing inherits: it frees the semaphores of a process that was
+# ended by force, and would report that on the user's terminal.
+_TRACKER_OPTION = "ignore:resource_tracker:UserWarning"
 
 
 class Interrupted(KeyboardInterrupt):
@@ -144,6 +148,8 @@ def children_ignore_sigint() -> Iterator[None]:
         # On Windows the children of a console always receive Ctrl-C.
         yield
         return
+    if _TRACKER_OPTION not in sys.warnoptions:
+        sys.warnoptions.append(_TRACKER_OPTION)
     # Started now, because the resource tracker unblocks the signal when it starts.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

@@ -2,12 +2,11 @@
 
 import errno
 import os
-import sys
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from typing import TYPE_CHECKING
 
 from planfly.campaigns.campaign_base import CampaignBase
@@ -44,17 +43,14 @@ def _fly(request: FlightRequest) -> FlightRow:
     return _copies[0].fly(request, f"process {os.getpid()}")
 
 
-# Warning option that the resource tracker of multiprocessing inherits: it frees the semaphores of an interrupted
-# campaign, and would report that on the user's terminal.
-_TRACKER_OPTION = "ignore:resource_tracker:UserWarning"
-
-
 class _Worker:
     """Process that flies one flight at a time; a dead process is replaced when the next flight is sent."""
 
     def __init__(self, copy: CampaignCopy) -> None:
         self._copy = copy
         self._pool: ProcessPoolExecutor | None = None
+        # The process of this worker, if it has one.
+        self.processes: list[BaseProcess] = []
         self._started: Future[None] = Future()
 
     def send(self, request: FlightRequest) -> Future[FlightRow]:
@@ -70,12 +66,12 @@ class _Worker:
 
     def _submit(self, request: FlightRequest) -> Future[FlightRow]:
         if self._pool is None:
-            if _TRACKER_OPTION not in sys.warnoptions:
-                sys.warnoptions.append(_TRACKER_OPTION)
+            others = set(active_children())
             # A pool of one process: if it dies, its flight is known.
             self._pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=end_with_parent)
             # Not an argument of the process: the start would wait until the process has imported everything it needs.
             self._started = self._pool.submit(_begin, self._copy)
+            self.processes = [child for child in active_children() if child not in others]
         return self._pool.submit(_fly, request)
 
     @property
@@ -83,20 +79,21 @@ class _Worker:
         """True if the last process has started its first flight."""
         return self._started.done() and self._started.exception() is None
 
-    def leave(self) -> "list[BaseProcess]":
-        """Send no more flights to the process, and return it, if any: the caller ends it."""
-        if self._pool is None:
-            return []
-        # Python 3.14 has a method for this.
-        processes: list[BaseProcess] = list((self._pool._processes or {}).values())
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        self._pool = None
-        return processes
+    def close(self) -> None:
+        """Free the semaphores of a worker whose process has ended."""
+        if self._pool is not None:
+            # The thread that manages the pool holds its semaphores until it ends.
+            self._pool.shutdown(cancel_futures=True)
+            self._pool = None
+        self.processes = []
 
 
 def _end(workers: Iterable[_Worker]) -> None:
     """Kill the processes of workers."""
-    end_children([process for worker in workers for process in worker.leave()])
+    ended = list(workers)
+    end_children([process for worker in ended for process in worker.processes])
+    for worker in ended:
+        worker.close()
 
 
 class LocalPool:

@@ -139,3 +139,21 @@ def test_children_are_started_where_signals_cannot_be_blocked(monkeypatch: pytes
     monkeypatch.delattr(signal, "pthread_sigmask")
     with children_ignore_sigint():
         pass
+
+
+FORCED_END = """
+import multiprocessing, os
+from world.interruption import children_ignore_sigint
+
+with children_ignore_sigint():
+    semaphore = multiprocessing.get_context("spawn").Semaphore()
+os._exit(3)
+"""
+
+
+def test_semaphores_of_a_forced_end_are_freed_without_a_word() -> None:
+    # The resource tracker holds the pipe open until it has freed them.
+    process = subprocess.run(
+        [sys.executable, "-c", FORCED_END], cwd=Path(__file__).parents[2], capture_output=True, text=True, timeout=120.0
+    )
+    assert (process.returncode, process.stdout, process.stderr) == (3, "", "")
