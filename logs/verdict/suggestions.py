@@ -40,6 +40,7 @@ from logs.verdict.tolerances import (
     SUGGESTION_TRIAL_COUNT,
     ZONE_SUGGESTION_TRIAL_COUNT,
 )
+from logs.verdict.trials import first_that_passes
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.kernels import Records
 from world.terrain import Terrain
@@ -285,11 +286,13 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
     course, side = float(requirements.courses[leg]), 0 if requirements.slopes[leg] >= 0.0 else 1
     heights = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     factor = _true_airspeed_ratio(requirements, leg)
-    for speed in _level_speeds(requirements, max(heights), float(requirements.setup.route.airspeed[leg]), factor):
+
+    def passes(speed: float) -> bool:
         table = requirements.limits.performance(speed * factor)
-        if min(aircraft_slopes(table, course, up)[side] for up in heights) >= slope:
-            return speed
-    return None
+        return min(aircraft_slopes(table, course, up)[side] for up in heights) >= slope
+
+    commanded = float(requirements.setup.route.airspeed[leg])
+    return first_that_passes(_level_speeds(requirements, max(heights), commanded, factor), passes)
 
 
 def _turn_speed(requirements: RouteRequirements, i: int) -> float | None:
@@ -299,16 +302,16 @@ def _turn_speed(requirements: RouteRequirements, i: int) -> float | None:
         available_lengths(requirements.runs, requirements.before, requirements.after, requirements.reversal, i)
     )
     factor = _true_airspeed_ratio(requirements, i)
-    speeds = _level_speeds(requirements, float(requirements.points[i, 2]), now, factor)
-    for speed in sorted((v for v in speeds if v < now), reverse=True):
+    up = float(requirements.points[i, 2])
+
+    def fits(speed: float) -> bool:
         table = requirements.limits.performance(speed * factor)
-        radius = turn_radius_between(
-            table, requirements.courses[i - 1], requirements.courses[i], float(requirements.points[i, 2])
-        )
+        radius = turn_radius_between(table, requirements.courses[i - 1], requirements.courses[i], up)
         used = turn_lengths(abs(float(requirements.turns[i])), radius, bool(requirements.setup.route.fly_over[i]))
-        if max(used) + SUGGESTION_LENGTH_MARGIN_M <= available:
-            return speed
-    return None
+        return max(used) + SUGGESTION_LENGTH_MARGIN_M <= available
+
+    slower = [speed for speed in _level_speeds(requirements, up, now, factor) if speed < now]
+    return first_that_passes(sorted(slower, reverse=True), fits)
 
 
 def _whole_metres(metres: float) -> float:

@@ -13,6 +13,7 @@ from aircraft.path_limits import Limits
 from aircraft.tracking import corridor_half_width
 from flight.autopilots.autopilot import Autopilot
 from flight.mission.from_plan import corner_speeds
+from logs.verdict.trials import first_that_passes
 from planfly.workflow.airframe import Airframe
 from planner.plan import Plan
 from planner.search.fewer_waypoints import drop_waypoints
@@ -145,11 +146,13 @@ def _orbit_problem(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
     """Explain in a line why a plan is not safe in its turbulence, and what would help."""
     count, name = len(plan.waypoints) - 2, autopilot.height_parameter
     circles = expected_circles(plan, autopilot, limits)
-    helps = "Less turbulence"
-    for value in _TRIED_ALTITUDE_RADII_M:
-        if expected_circles(plan, autopilot.with_parameters(**{name: float(value)}), limits) <= MAX_EXPECTED_ORBITS:
-            helps = f"{name} of {value} m"
-            break
+    radius = first_that_passes(
+        _TRIED_ALTITUDE_RADII_M,
+        lambda value: (
+            expected_circles(plan, autopilot.with_parameters(**{name: float(value)}), limits) <= MAX_EXPECTED_ORBITS
+        ),
+    )
+    helps = "Less turbulence" if radius is None else f"{name} of {radius} m"
     return (
         f"in {plan.scenario.wind.turbulence} turbulence {autopilot.title} circles where gusts have it off a waypoint's"
         f" height, at one of {count} in {min(circles, 1.0):.0%} of flights; up to {MAX_EXPECTED_ORBITS:.0%} are taken"

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeGuard
 
 from flight.autopilots.autopilot import Autopilot
 from flight.mission.items import Command, Mission, MissionItem
@@ -14,11 +14,12 @@ from flight.mission.survey_layout import SurveyLayout, kept_layout, turn_around_
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.route_requirements import surveys_of
 from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
-from planfly.workflow.pipeline import fly_and_judge
 from planfly.workflow.reference_flights import deciding_parameter
+from planfly.workflow.trial_flight import Trial
 from world.errors import PlanflyError
 from world.scenario import with_flight
 
@@ -140,7 +141,8 @@ def _all_lines_usable(verdict: Verdict) -> bool:
     return 0 < lines == usable and not any(item.rule == "survey" and item.ok is False for item in verdict.findings)
 
 
-_LayoutFlight = tuple[Verdict, Mission, float]
+# Verdict on a flight, the mission that was flown, and the length of its path, m.
+_FlownMission = tuple[Verdict, Mission, float]
 
 
 class _Trials:
@@ -163,36 +165,31 @@ class _Trials:
         self.kept = next((why for why in kept if why), "")
         self.nearest: NearMiss | None = None
 
+    # ------------------------------------------------------------------
+    # One flight.
+
     def _changed_setup(self, mission: Mission, airframe: Airframe) -> FlightSetup:
         """Make the setup of a changed mission; as in the original mission, vertical legs are accepted."""
         scenario = self._setup.scenario
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
         return make_setup(scenario, airframe, mission, self._setup.seed, placed=placed)
 
-    def _fly(self, mission: Mission, airframe: Airframe, what: str) -> tuple[Verdict, float] | None:
-        """Fly a mission; return the verdict and the path length, or None if the mission cannot be laid out."""
+    def _fly(self, mission: Mission, airframe: Airframe, what: str) -> _FlownMission | None:
+        """Fly a mission; return None if it cannot be laid out."""
         what = self._changed + what
         self._on_trial(what)
         try:
-            setup = self._changed_setup(mission, airframe)
+            trial = Trial(self._changed_setup(mission, airframe), airframe.aircraft)
         except PlanflyError:
             return None
-        verdict = fly_and_judge(setup, airframe, None, reference="never").verdict
-        usable, lines = _count_usable(verdict)
-        best, failed = self.nearest, len(verdict.failed)
+        usable, lines = _count_usable(trial.flown)
+        best, failed = self.nearest, len(trial.flown.failed)
         before = _count_usable(self._verdict)[0] if best is None else best.usable
         if usable > before or (best is not None and usable == before and failed < len(best.verdict.failed)):
-            self.nearest = NearMiss(what, usable, lines, verdict)
-        return verdict, setup.path.length
+            self.nearest = NearMiss(what, usable, lines, trial.flown)
+        return trial.flown, mission, trial.setup.path.length
 
-    def _passes(self, verdict: Verdict) -> bool:
-        """Return True if all lines can be used, and no rule fails that passed before or gets noticeably worse."""
-        return _all_lines_usable(verdict) and all(
-            rule in self._worst and worst >= self._worst[rule] - (RULE_WORDS[rule].scale or math.inf)
-            for rule, worst in _worst_margins(verdict).items()
-        )
-
-    def _fly_layout(self, layout: SurveyLayout, what: str) -> _LayoutFlight | None:
+    def _fly_layout(self, layout: SurveyLayout, what: str) -> _FlownMission | None:
         """Fly the surveys in another layout; None if that layout cannot be made."""
         mission, setup = self._setup.mission, self._setup
         # Start with the last survey: a changed survey may be detected as two, which shifts the numbers of later ones.
@@ -206,25 +203,32 @@ class _Trials:
                 setup = self._changed_setup(mission, self._airframe)
             except PlanflyError:
                 return None
-        flown = self._fly(mission, self._airframe, what)
-        return None if flown is None else (flown[0], mission, flown[1])
+        return self._fly(mission, self._airframe, what)
 
-    def _passing_layout(self, layout: SurveyLayout, what: str) -> _LayoutFlight | None:
-        """Fly the surveys in another layout; None unless the flight passes."""
-        laid = self._fly_layout(layout, what)
-        return None if laid is None or not self._passes(laid[0]) else laid
+    def _passes(self, flown: _FlownMission | None) -> TypeGuard[_FlownMission]:
+        """Return True if all lines can be used, and no rule fails that passed before or gets noticeably worse."""
+        return (
+            flown is not None
+            and _all_lines_usable(flown[0])
+            and all(
+                rule in self._worst and worst >= self._worst[rule] - (RULE_WORDS[rule].scale or math.inf)
+                for rule, worst in _worst_margins(flown[0]).items()
+            )
+        )
+
+    # ------------------------------------------------------------------
+    # The remedies, one change each.
 
     def turn_around(self) -> SurveyRemedy | None:
         """Find the shortest turn-around that passes, among those longer than the present one."""
-        found = self._shortest_turn_around(1, [one for one in TURN_AROUNDS if one > self._now + 1.0], 0.0)
-        return None if found is None else SurveyRemedy("turn-around", "", self._now, found[0], "m", *found[1], found[0])
+        return self._shortest_turn_around(1, [one for one in TURN_AROUNDS if one > self._now + 1.0], 0.0)
 
     def side(self) -> SurveyRemedy | None:
         """Try the lines from the other side, which turns into the wind instead of with it."""
         if self._setup.scenario.wind.speed <= 0.0:
             return None
-        passed = self._passing_layout(SurveyLayout(self._now, backwards=True), "the lines from the other side")
-        return None if passed is None else SurveyRemedy("side", "", 0.0, 1.0, "", *passed, self._now)
+        flown = self._fly_layout(SurveyLayout(self._now, backwards=True), "the lines from the other side")
+        return SurveyRemedy("side", "", 0.0, 1.0, "", *flown, self._now) if self._passes(flown) else None
 
     def every(self, at_most: float) -> SurveyRemedy | None:
         """Find the least interleave stride that passes, with turn-arounds shorter than `at_most` (m).
@@ -233,37 +237,33 @@ class _Trials:
         """
         lead_in = at_most if math.isfinite(at_most) else 0.0
         tried = [self._now, *(one for one in TURN_AROUNDS if self._now + 1.0 < one < at_most)]
-        for every in INTERLEAVE_STRIDES:
-            if 2 * every > max(len(survey.lines) for survey in self._surveys):
-                break
-            found = self._shortest_turn_around(every, tried, lead_in)
-            if found is not None:
-                return SurveyRemedy("every", "", 1.0, float(every), "lines", *found[1], found[0], lead_in)
-        return None
+        most = max(len(survey.lines) for survey in self._surveys)
+        found = (self._shortest_turn_around(every, tried, lead_in) for every in INTERLEAVE_STRIDES if 2 * every <= most)
+        return next((one for one in found if one is not None), None)
 
-    def _shortest_turn_around(
-        self, every: int, tried: Sequence[float], lead_in: float
-    ) -> tuple[float, _LayoutFlight] | None:
+    def _shortest_turn_around(self, every: int, tried: Sequence[float], lead_in: float) -> SurveyRemedy | None:
         """Bisect rising turn-arounds (m) for the shortest that makes all lines usable, if it passes.
 
         A turn-around with which the flight runs out of energy before its end is too long.
         """
         order = "" if every == 1 else f"every {nth(every)} line, "
-        low, high, best = -1, len(tried), None
-        while high - low > 1:
-            middle = (low + high) // 2
-            metres = tried[middle]
+        flights: dict[float, _FlownMission | None] = {}
+
+        def long_enough(metres: float) -> bool:
             layout = SurveyLayout(metres, every, lead_in=lead_in)
-            laid = self._fly_layout(layout, f"{order}turn-arounds of {metres:.0f} m")
-            if laid is None:
-                return None
-            if _all_lines_usable(laid[0]):
-                high, best = middle, laid
-            elif {"completion", "energy"} <= _worst_margins(laid[0]).keys() - self._worst.keys():
-                high, best = middle, None
-            else:
-                low = middle
-        return None if best is None or not self._passes(best[0]) else (tried[high], best)
+            flown = flights[metres] = self._fly_layout(layout, f"{order}turn-arounds of {metres:.0f} m")
+            if flown is None:
+                return False
+            too_long = {"completion", "energy"} <= _worst_margins(flown[0]).keys() - self._worst.keys()
+            return too_long or _all_lines_usable(flown[0])
+
+        least = least_change(tried, long_enough)
+        flown = None if least is None else flights[least]
+        if least is None or not self._passes(flown):
+            return None
+        if every == 1:
+            return SurveyRemedy("turn-around", "", self._now, least, "m", *flown, least)
+        return SurveyRemedy("every", "", 1.0, float(every), "lines", *flown, least, lead_in)
 
     def course(self) -> SurveyRemedy | None:
         """Try lines along and across the wind; return the shortest route that passes."""
@@ -272,31 +272,38 @@ class _Trials:
             return None
         now, found = self._surveys[0].course, []
         for course in _other_courses(now, wind.from_course):
-            degrees = math.degrees(course) % 180.0
-            layout = SurveyLayout(self._now, 1, course)
-            passed = self._passing_layout(layout, f"lines on course {degrees:.0f}°")
-            if passed is not None:
-                was = math.degrees(now) % 180.0
-                found.append(SurveyRemedy("course", "", was, degrees, "deg", *passed, self._now))
+            was, degrees = (math.degrees(one) % 180.0 for one in (now, course))
+            flown = self._fly_layout(SurveyLayout(self._now, 1, course), f"lines on course {degrees:.0f}°")
+            if self._passes(flown):
+                found.append(SurveyRemedy("course", "", was, degrees, "deg", *flown, self._now))
         return min(found, key=lambda one: one.length, default=None)
 
     def parameter(self) -> SurveyRemedy | None:
         """Find the parameter of the autopilot of which another value passes."""
-        mission, flown = self._setup.mission, {}
+        passed: list[_FlownMission] = []
 
         def passes(law: Autopilot) -> bool:
             airframe = replace(self._airframe, autopilot=law)
-            one = self._fly(mission, airframe, "another parameter of the autopilot")
-            if one is None or not self._passes(one[0]):
-                return False
-            flown["last"] = one
-            return True
+            flown = self._fly(self._setup.mission, airframe, "another parameter of the autopilot")
+            if self._passes(flown):
+                passed.append(flown)
+            return self._passes(flown)
 
         found = deciding_parameter(self._airframe.autopilot, self._verdict.findings, passes)
         if found is None:
             return None
-        verdict, length = flown["last"]
-        return SurveyRemedy("parameter", found.name, found.current, found.passing, found.unit, verdict, mission, length)
+        return SurveyRemedy("parameter", found.name, found.current, found.passing, found.unit, *passed[-1])
+
+    def airspeed(self) -> SurveyRemedy | None:
+        """Find the fastest slower airspeed that passes, for a mission that sets none itself."""
+        for speed, airframe in self._slower_airspeeds():
+            flown = self._fly(self._setup.mission, airframe, f"{speed:g} m/s")
+            if self._passes(flown):
+                return SurveyRemedy("airspeed", "", self._airframe.airspeed, speed, "m/s", *flown)
+        return None
+
+    # ------------------------------------------------------------------
+    # Two changes together.
 
     def _turn_around_with(
         self, changed: str, airframe: Airframe, mission: Mission | None = None
@@ -358,15 +365,6 @@ class _Trials:
                 break
             with suppress(PlanflyError):
                 yield speed, load_airframe(with_flight(self._setup.scenario, airspeed_mps=speed))
-
-    def airspeed(self) -> SurveyRemedy | None:
-        """Find the fastest slower airspeed that passes, for a mission that sets none itself."""
-        mission, now = self._setup.mission, self._airframe.airspeed
-        for speed, airframe in self._slower_airspeeds():
-            flown = self._fly(mission, airframe, f"{speed:g} m/s")
-            if flown is not None and self._passes(flown[0]):
-                return SurveyRemedy("airspeed", "", now, speed, "m/s", flown[0], mission, flown[1])
-        return None
 
 
 def nth(count: int) -> str:

@@ -3,8 +3,6 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from flight.autopilots.catalog import program_autopilot
 from flight.autopilots.program import ProgramAutopilot
 from flight.dynamics.fdm import Variation
@@ -16,7 +14,6 @@ from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import thin_track
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
-from logs.verdict.measures.energy import predicted_energy
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.verdict import Verdict
@@ -26,14 +23,13 @@ from planfly.workflow.crash_safe_log import CrashSafeLog, FlightLimits
 from planfly.workflow.make_plan import Advance, make_plan, planned_for
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planfly.workflow.reference_flights import FlyReference, judge_with_reference_flights
+from planfly.workflow.trial_flight import reason_not_to_start
 from planner.plan import Plan
 from world.errors import FlightError, StartError
 from world.scenario import Scenario
 
 # Flight time written at once, s; a simulated flight takes some 30 ms for it.
 BATCH = 60
-# A mission predicted to need more than this many times the energy carried is not flown: it would show nothing more.
-MAX_ENERGY_RATIO = 2.0
 # Limits of a flight unless others are given.
 _DEFAULT_LIMITS = FlightLimits()
 
@@ -142,15 +138,15 @@ def fly_and_judge(
     returns: True judges returns from a few places, and draws them in the log, if one is named.
     limits: limits of the flight time and of the size of the log.
 
-    A flight that cannot begin, or that needs more than `MAX_ENERGY_RATIO` times the energy carried, has no row and no
-    log; its verdict covers the route and says that the flight did not begin.  Raises FlightError for a program that
-    does not fly it to its end; then no log is left.
+    A flight that cannot begin, or that `planfly.workflow.trial_flight.reason_not_to_start` gives a reason against, has
+    no row and no log; its verdict covers the route and says that the flight did not begin.  Raises FlightError for a
+    program that does not fly it to its end; then no log is left.
     """
     task = _Task(airframe, log, advance, every, limits, reference, returns=returns)
     requirements = route_requirements(setup)
-    stores = _predicted_energy_ratio(requirements)
-    if stores > MAX_ENERGY_RATIO:
-        return _unflown(requirements, log, f"not started: it takes {stores:.0f} times the energy carried")
+    reason = reason_not_to_start(requirements)
+    if reason:
+        return _unflown(requirements, log, reason)
     try:
         if autopilot is not None:
             return _fly_program(task, setup, program_autopilot(autopilot).flying(setup.autopilot, autopilot))
@@ -172,19 +168,6 @@ class _Task:
     limits: FlightLimits
     reference: FlyReference
     returns: bool
-
-
-def _predicted_energy_ratio(requirements: RouteRequirements) -> float:
-    """Return the predicted ratio of energy needed to energy carried.
-
-    0 if full power throughout needs less than `MAX_ENERGY_RATIO` times the energy carried.
-    """
-    setup = requirements.setup
-    seconds, full = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full
-    full_energy = float(np.nanmax(full, initial=0.0)) * seconds / 3600.0
-    if full_energy <= MAX_ENERGY_RATIO * setup.battery:
-        return 0.0
-    return predicted_energy(requirements)[0] / setup.battery
 
 
 def _fly_program(task: _Task, setup: FlightSetup, program: ProgramAutopilot) -> JudgedFlight:

@@ -10,15 +10,15 @@ from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import Flight, simulate, track_of
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.route_requirements import RouteRequirements, true_route
 from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, ReferenceFlights
 from logs.verdict.summary import first_failed
+from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
-from world.errors import StartError
+from planfly.workflow.trial_flight import Hurry, Trial, TrialAborted, no_hurry
 
 # ----------------------------------------------------------------------
 # Find the autopilot parameter that decides a failed flight, by flying with one parameter changed at a time.
@@ -72,19 +72,13 @@ def deciding_parameter(autopilot: Autopilot, findings: tuple[Finding, ...], pass
 
 def _nearest(current: float, step: float, far: float, passes: Callable[[float], bool]) -> float | None:
     """Return the passing value nearest to the current one, in steps towards `far`; None if `far` fails."""
-    steps = int(abs(far - current) / step + 1e-6)
+    count = int(abs(far - current) / step + 1e-6)
     sign = 1.0 if far > current else -1.0
-
-    def value(count: int) -> float:
-        return round(current + sign * count * step, 6)
-
-    if not steps or not passes(value(steps)):
+    values = [round(current + sign * k * step, 6) for k in range(1, count + 1)]
+    if not values or not passes(values[-1]):
         return None
-    fails, works = 0, steps
-    while works - fails > 1:
-        middle = (fails + works) // 2
-        fails, works = (fails, middle) if passes(value(middle)) else (middle, works)
-    return value(works)
+    nearer = least_change(values[:-1], passes)
+    return values[-1] if nearer is None else nearer
 
 
 def _deviation_at_failure(failed: Finding, findings: tuple[Finding, ...]) -> float | None:
@@ -98,19 +92,7 @@ def _deviation_at_failure(failed: Finding, findings: tuple[Finding, ...]) -> flo
     return errors[0] if errors else None
 
 
-class _ReferenceFlightsAborted(Exception):
-    """Reference flights are aborted in a hurry."""
-
-
-# Function that returns True if reference flights should be aborted.
-Hurry = Callable[[], bool]
-
-
-def _never() -> bool:
-    return False
-
-
-def airframe_answer(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry = _never) -> AirframeAnswer:
+def airframe_answer(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry = no_hurry) -> AirframeAnswer:
     """Fly a setup by planfly's guidance, which knows its exact position, and judge that flight.
 
     It flies the same true airspeeds as ArduPlane, which takes airspeeds as equivalent airspeeds: at a higher altitude
@@ -118,11 +100,11 @@ def airframe_answer(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry = _neve
     hurry: see `judge_with_reference_flights`.
     """
     same = true_route(setup)
-    ideal = replace(setup, autopilot=PlanflyGuidance(), nav="perfect", route=same)
-    try:
-        verdict = _flown_verdict(ideal, aircraft, hurry)
-    except StartError as error:
-        return AirframeAnswer(False, f"not flyable: not started: {error.reason}", (("completion", FLIGHT),))
+    trial = Trial(replace(setup, autopilot=PlanflyGuidance(), nav="perfect", route=same), aircraft, hurry)
+    track, ended = trial.flight
+    if not len(track):
+        return AirframeAnswer(False, f"not flyable: {ended}", (("completion", FLIGHT),))
+    verdict = trial.flown
     failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
     # Undecided findings on the take-off and landing do not concern this flight.
     said = "flyable in the air" if verdict.flies and not verdict.flyable else verdict.headline
@@ -130,7 +112,7 @@ def airframe_answer(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry = _neve
 
 
 def find_deciding_parameter(
-    setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, hurry: Hurry = _never
+    setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, hurry: Hurry = no_hurry
 ) -> DecidingParameter | None:
     """Find a parameter that lets a failed flight pass with another value, or return None.
 
@@ -142,7 +124,7 @@ def find_deciding_parameter(
         return None
     findings = verdict.findings
     if setup.autopilot.program is not None:
-        own = _flown_verdict(replace(setup, autopilot=setup.autopilot.law), aircraft, hurry)
+        own = Trial(replace(setup, autopilot=setup.autopilot.law), aircraft, hurry).flown
         if own.flies:
             return None
         findings = own.findings
@@ -153,7 +135,7 @@ def find_deciding_parameter(
     same = setup.in_scenario(replace(scenario, spec=spec, limits=limits))
 
     def passes(law: Autopilot) -> bool:
-        flown = _flown_verdict(replace(same, autopilot=law), aircraft, hurry)
+        flown = Trial(replace(same, autopilot=law), aircraft, hurry).flown
         return flown.flies and has_room(flown.findings, findings)
 
     return deciding_parameter(setup.autopilot, findings, passes)
@@ -193,7 +175,7 @@ def judge_with_reference_flights(
     ended: str,
     *,
     fly: FlyReference = "failed",
-    hurry: Hurry = _never,
+    hurry: Hurry = no_hurry,
 ) -> tuple[Verdict, ReferenceFlights | None]:
     """Judge a flight, with reference flights that explain the verdict but do not decide it.
 
@@ -209,20 +191,10 @@ def judge_with_reference_flights(
         return verdict, None
     try:
         airframe = airframe_answer(setup, aircraft, hurry)
-    except _ReferenceFlightsAborted:
+    except TrialAborted:
         return verdict, None
     reference = ReferenceFlights(airframe)
     if airframe.flyable:
-        with contextlib.suppress(_ReferenceFlightsAborted):
+        with contextlib.suppress(TrialAborted):
             reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, hurry))
     return judge_flight(setup, track, ended, reference=reference, requirements=requirements), reference
-
-
-def _flown_verdict(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry) -> Verdict:
-    """Fly a setup and judge the flight.  Raises _ReferenceFlightsAborted in a hurry."""
-    blocks = []
-    for block in simulate(Flight(setup, aircraft)):
-        blocks.append(block)
-        if hurry():
-            raise _ReferenceFlightsAborted
-    return judge_flight(setup, track_of(blocks), blocks[-1].ended)

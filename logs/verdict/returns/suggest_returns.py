@@ -27,6 +27,7 @@ from logs.verdict.returns.judge_returns import (
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
+from logs.verdict.trials import first_that_passes
 from world.arrays import Flags, Floats
 from world.kernels import Records
 
@@ -136,7 +137,7 @@ def _targets_meeting(
     return good
 
 
-class _Trial:
+class _ReturnTrial:
     """Trial of a world from all starts, first those that failed before."""
 
     def __init__(self, starts: ReturnStarts, needs: _Needs) -> None:
@@ -159,7 +160,7 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
     Altitudes are tried one by one: a higher one is not certain to be safer, because it may lead through a sphere.
     """
     needs = _requirements(world, starts)
-    trial = _Trial(starts, needs)
+    trial = _ReturnTrial(starts, needs)
     if trial.passes(world, _keeps_all):
         return []
     found = []
@@ -170,11 +171,18 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
         _ALTITUDE_STEP_M * math.ceil(lowest / _ALTITUDE_STEP_M), min(9000.0, top) + _ALTITUDE_STEP_M, _ALTITUDE_STEP_M
     )
     higher = [float(one) for one in altitudes]
-    above = next((a for a in higher if trial.passes(world.with_parameters(RTL_ALTITUDE=a), _keeps_ground)), None)
+
+    def least_altitude(least: float, keeps: Keeps) -> float | None:
+        """Return the least altitude from ``least`` on with which all returns meet the requirements, or None."""
+        return first_that_passes(
+            (one for one in higher if one >= least),
+            lambda altitude: trial.passes(world.with_parameters(RTL_ALTITUDE=altitude), keeps),
+        )
+
+    above = least_altitude(0.0, _keeps_ground)
     if above is not None and above > lowest:
         found.append(Remedy({"RTL_ALTITUDE": above}))
-    higher = [a for a in higher if a >= (above or 0.0)]
-    clear = next((a for a in higher if trial.passes(world.with_parameters(RTL_ALTITUDE=a), _keeps_all)), None)
+    clear = least_altitude(above or 0.0, _keeps_all)
     if clear is not None and clear not in (above, lowest):
         found.append(Remedy({"RTL_ALTITUDE": clear}))
     if clear is None:
@@ -182,14 +190,14 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
     return found
 
 
-def _climbs(world: ReturnWorld, trial: _Trial, altitude: float | None) -> list[Remedy]:
+def _climbs(world: ReturnWorld, trial: _ReturnTrial, altitude: float | None) -> list[Remedy]:
     """Return a climb before the turn, alone or with an altitude, that is good for all returns."""
     options = float(int(world.parameters.flight_options) | CLIMB_BEFORE_TURN)
     tried = [{"RTL_CLIMB_MIN": climb} for climb in _CLIMBS_M] + [{"FLIGHT_OPTIONS": options}]
     if altitude is not None:
         tried += [one | {"RTL_ALTITUDE": altitude} for one in tried]
-    good = (one for one in tried if trial.passes(world.with_parameters(**one), _keeps_all))
-    return [Remedy(one) for one in [next(good, None)] if one is not None]
+    found = first_that_passes(tried, lambda one: trial.passes(world.with_parameters(**one), _keeps_all))
+    return [] if found is None else [Remedy(found)]
 
 
 # ----------------------------------------------------------------------

@@ -48,9 +48,9 @@ class Flights:
     answer: Answer
     flown: list[float] = field(default_factory=list)
 
-    def __call__(self, setup: FlightSetup, *_: Any, **__: Any) -> Any:
+    def __call__(self, setup: FlightSetup, *_: Any) -> Any:
         self.flown.append(round(turn_around_of(setup.route, surveys_of(setup)[0])))
-        return SimpleNamespace(verdict=verdict_of(setup, self.answer))
+        return SimpleNamespace(setup=setup, flown=verdict_of(setup, self.answer))
 
 
 def opened(path: Path) -> FlightSetup:
@@ -59,7 +59,7 @@ def opened(path: Path) -> FlightSetup:
 
 def tried(monkeypatch: pytest.MonkeyPatch, answer: Answer, path: Path = FIELD) -> tuple[TriedRemedies, list[float]]:
     flights, mission = Flights(answer), opened(path)
-    monkeypatch.setattr(remedies, "fly_and_judge", flights)
+    monkeypatch.setattr(remedies, "Trial", flights)
     found = remedies.survey_remedies(mission, airframe_of(mission), verdict_of(mission, answer))
     return found, flights.flown
 
@@ -81,17 +81,17 @@ def test_every_second_line_is_come_to_as_all_are(monkeypatch: pytest.MonkeyPatch
 
     flights, mission = Flights(answer), opened(FIELD)
 
-    def fly(setup: FlightSetup, *rest: Any, **more: Any) -> Any:
+    def fly(setup: FlightSetup, *rest: Any) -> Any:
         [survey] = surveys_of(setup)
         first = survey.lines[0]
         lead_in = math.dist(setup.route.waypoints[first.begins], setup.route.waypoints[first.first])
         if abs(survey.offsets[1]) > 100.0 and lead_in >= 130.0:
             flights.answer = lambda metres: (metres >= 45.0, {})
-        found = flights(setup, *rest, **more)
+        found = flights(setup, *rest)
         flights.answer = answer
         return found
 
-    monkeypatch.setattr(remedies, "fly_and_judge", fly)
+    monkeypatch.setattr(remedies, "Trial", fly)
     found = remedies.survey_remedies(mission, airframe_of(mission), verdict_of(mission, answer))
     longer, second = found.remedies
     assert (longer.kind, longer.value, longer.lead_in) == ("turn-around", 150.0, 0.0)
@@ -128,11 +128,11 @@ def judged_by(
 ) -> TriedRemedies:
     """What helps where a rule looks at all of a flight, and at its turn-arounds, m."""
 
-    def fly(setup: FlightSetup, *_: Any, **__: Any) -> Any:
-        return SimpleNamespace(verdict=verdict_of(setup, lambda metres: (passes(setup, metres), {})))
+    def fly(setup: FlightSetup, *_: Any) -> Any:
+        return SimpleNamespace(setup=setup, flown=verdict_of(setup, lambda metres: (passes(setup, metres), {})))
 
     mission = opened(path)
-    monkeypatch.setattr(remedies, "fly_and_judge", fly)
+    monkeypatch.setattr(remedies, "Trial", fly)
     return remedies.survey_remedies(mission, airframe_of(mission), verdict_of(mission, lambda _: (False, {})))
 
 

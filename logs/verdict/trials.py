@@ -1,0 +1,36 @@
+"""Search candidate changes for one that passes a trial: a flight, a simulated return, or a computation.
+
+Whatever answers "what would help" searches with these two functions.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
+
+Candidate = TypeVar("Candidate")
+
+
+def first_that_passes(candidates: Iterable[Candidate], passes: Callable[[Candidate], bool]) -> Candidate | None:
+    """Return the first candidate that passes, or None if none does; later ones are not tried.
+
+    >>> first_that_passes([3, 8, 9], lambda metres: metres > 5)
+    8
+    """
+    return next(filter(passes, candidates), None)
+
+
+def least_change(changes: Sequence[Candidate], passes: Callable[[Candidate], bool]) -> Candidate | None:
+    """Return the least of rising changes that passes, by bisection, or None if none of those tried passes.
+
+    All changes above one that passes are assumed to pass.
+
+    >>> tried = []
+    >>> least_change(range(0, 120, 10), lambda metres: not tried.append(metres) and metres >= 30)
+    30
+    >>> tried
+    [50, 20, 30]
+    """
+    fails, works = -1, len(changes)
+    while works - fails > 1:
+        middle = (fails + works) // 2
+        fails, works = (fails, middle) if passes(changes[middle]) else (middle, works)
+    return changes[works] if works < len(changes) else None

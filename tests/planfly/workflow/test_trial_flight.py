@@ -1,0 +1,51 @@
+"""One trial: what is flown once, and what is not flown at all."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import load_aircraft
+from logs.recording.example_log import example_log
+from logs.verdict.measures.route_requirements import route_requirements
+from planfly.workflow import trial_flight
+from planfly.workflow.trial_flight import Trial, TrialAborted
+from world.errors import StartError
+
+SETUP, AIRCRAFT = example_log().setup, load_aircraft("aerosonde")
+
+
+def test_a_trial_is_flown_when_it_is_asked_for_and_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    flown = []
+
+    def fly(setup: object, aircraft: object) -> None:
+        flown.append(setup)
+        raise StartError("f", "no trim")
+
+    monkeypatch.setattr(trial_flight, "Flight", fly)
+    trial = Trial(SETUP, AIRCRAFT)
+    assert trial.geometric.level == "geometric"
+    assert flown == []
+    assert trial.flown is trial.flown
+    assert flown == [SETUP]
+    assert trial.flight[1] == "not started: no trim"
+    assert [item.reason for item in trial.flown.failed if item.rule == "completion"] == ["not started: no trim"]
+
+
+@pytest.mark.parametrize(("ratio", "reason"), [(1.99, ""), (2.01, "not started: it takes 2 times the energy carried")])
+def test_a_flight_of_more_than_twice_the_energy_carried_is_not_begun(
+    ratio: float, reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kilowatt all the way takes more than the battery of 0.01 Wh."""
+    envelope = replace(SETUP.limits.envelope, power_full=np.array([1000.0]))
+    setup = replace(SETUP, battery=0.01, limits=replace(SETUP.limits, envelope=envelope))
+    monkeypatch.setattr(trial_flight, "predicted_energy", lambda _: (ratio * 0.01, 0.0))
+    assert trial_flight.reason_not_to_start(route_requirements(setup)) == reason
+
+
+def test_a_trial_in_a_hurry_is_aborted() -> None:
+    asked = itertools.count()
+    with pytest.raises(TrialAborted):
+        _ = Trial(SETUP, AIRCRAFT, lambda: next(asked) == 1).flown
+    assert next(asked) == 2
