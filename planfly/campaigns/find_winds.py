@@ -14,6 +14,7 @@ from planfly.campaigns.dispersions import standard_draws, standard_population
 from planfly.campaigns.flight_requests import FlightRequest, FlyOne, code_hash
 from planfly.campaigns.flight_row import FlightRow, fly_one
 from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, WindBoundary, needs_more, next_flights
+from planfly.campaigns.summary import RuleFailures, count_failures
 from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, FlownFlight, StoreError, WindsStore, kept_settings
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
 
@@ -62,12 +63,31 @@ def asked_flights(asked: int | None, folder: Path, *, resume: bool) -> int:
     return int(kept.get("flights", USUAL_WIND_FLIGHTS)) if asked is None else asked
 
 
+# Boundary below which a mission does not fly with the target probability even in calm air, m/s: one printed as 0.0.
+CALM_MPS = 0.05
+
+
+@dataclass(frozen=True)
+class CalmFailures:
+    """Failures in the weakest wind that was flown, of directions in which the mission fails even in calm air.
+
+    speed: that wind, m/s.  flights: number of flights in it.  failed: number of these that failed.
+    by_rule: rules and places that they failed; empty if none of them failed or none could be flown.
+    """
+
+    speed: float
+    flights: int
+    failed: int
+    by_rule: tuple[RuleFailures, ...]
+
+
 @dataclass(frozen=True, repr=False)
 class WindsFound:
     """Boundary of each direction, and the flights it is estimated from: direction, speed, and True if flyable.
 
     lost: indices, from 0, of the flights that could not be flown; they are treated as not flyable.
     conditions: conditions of the flights without the wind, which depends on the direction.
+    calm: failures in calm air, if the mission does not fly in it with the target probability; None otherwise.
     """
 
     goal: WindsGoal
@@ -75,6 +95,7 @@ class WindsFound:
     flights: tuple[tuple[int, float, bool], ...]
     lost: tuple[int, ...] = ()
     conditions: Conditions | None = None
+    calm: CalmFailures | None = None
 
     def from_deg(self, direction: int) -> float:
         """Directions from which the winds blow, degrees."""
@@ -144,6 +165,8 @@ class _Search:
         self._next_check = [FEWEST] * goal.directions
         self.flown: list[tuple[int, float, bool]] = []
         self.lost: list[int] = []
+        # Failed rules and places of each flight.
+        self._failed: list[tuple[tuple[str, Place], ...]] = []
 
     def next_round(self) -> list[AskedFlight]:
         """Return the flights to fly next; an empty list if all boundaries are known or all flights are used."""
@@ -174,6 +197,7 @@ class _Search:
             margin = None
         self.directions[asked.direction].add(asked.speed, asked.draw, failed, margin)
         self.flown.append((asked.direction, asked.speed, flyable))
+        self._failed.append(flown.failed)
         if flown.outcome == "lost":
             self.lost.append(asked.number)
 
@@ -190,7 +214,19 @@ class _Search:
         """Return the result of the search."""
         boundaries = tuple(one.boundary() for one in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
-        return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions)
+        calm = self._calm_failures(boundaries)
+        return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions, calm)
+
+    def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
+        """Return the failures in the weakest wind flown of directions whose boundary is calm air; None for no such."""
+        calm = {number for number, one in enumerate(boundaries) if one.estimate < CALM_MPS}
+        numbered = [(number, one) for number, one in enumerate(self.flown) if one[0] in calm]
+        if not numbered:
+            return None
+        weakest = min(speed for _, (_, speed, _) in numbered)
+        numbers = [number for number, (_, speed, _) in numbered if speed == weakest]
+        failed = [self._failed[number] for number in numbers if not self.flown[number][2]]
+        return CalmFailures(weakest, len(numbers), len(failed), count_failures(failed))
 
 
 def _way(rule: str, place: Place) -> Hashable:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -21,7 +22,7 @@ from logs.views.drawing import page_svg, png_bytes
 from logs.views.report.page import page_template
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import BY_NAME
-from planfly.campaigns.find_winds import ACCURACY, FEWEST, WindsFound
+from planfly.campaigns.find_winds import ACCURACY, CALM_MPS, FEWEST, CalmFailures, WindsFound
 from planfly.campaigns.flight_row import STATIONS, FlightRow, fly_one
 from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.pictures import (
@@ -38,7 +39,16 @@ from planfly.campaigns.pictures import (
 )
 from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_bound
 from planfly.campaigns.statistics.wind_boundary import needs_more
-from planfly.campaigns.summary import CampaignSummary, campaign_lines, closest_text, log_name, summarise, summary_json
+from planfly.campaigns.summary import (
+    CampaignSummary,
+    campaign_lines,
+    closest_text,
+    failure_lines,
+    failures_document,
+    log_name,
+    summarise,
+    summary_json,
+)
 from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, Store, refuse_held, same_flight
 from planfly.workflow.make_plan import Advance
 from planfly.workflow.open_flight import make_setup
@@ -100,10 +110,12 @@ def _render(template: str, **values: object) -> str:
     return page_template(template, "planfly.campaigns").render(colours=Markup(css_variables()), **values)
 
 
-def winds_page(name: str, figure: Figure, lines: list[str], rows: Sequence[tuple[str, ...]], command: str) -> bytes:
+def winds_page(name: str, figure: Figure, found: WindsFound, rows: Sequence[tuple[str, ...]], command: str) -> bytes:
     """Return the page of a go/no-go chart; the figure is changed to its narrow layout."""
     picture = _both_widths(figure, "Go/no-go chart: wind from each direction")
-    return _render("winds.html", name=name, picture=picture, lines=lines, rows=rows, command=command).encode("utf-8")
+    answer, lines = "" if found.calm is None else "missed", wind_lines(found)
+    page = _render("winds.html", name=name, picture=picture, answer=answer, lines=lines, rows=rows, command=command)
+    return page.encode("utf-8")
 
 
 def _both_widths(figure: Figure, words: str) -> Markup:
@@ -349,14 +361,24 @@ def write_winds(folder: Path, base: CampaignBase, found: WindsFound, command: st
             }
             for one in chart
         ],
+        "calm": None if found.calm is None else _calm_document(found.calm),
         "spread": base.dispersions.to_json(),
         "conditions": None if found.conditions is None else asdict(found.conditions),
     }
     picture = png_bytes(figure)
-    page = winds_page(base.name, figure, wind_lines(found), rows, command)
+    page = winds_page(base.name, figure, found, rows, command)
     write_whole(folder / "winds.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
     write_whole(folder / "winds.png", picture)
     write_whole(folder / "winds.html", page)
+
+
+def _calm_document(calm: CalmFailures) -> dict[str, Any]:
+    return {
+        "speed_mps": round(calm.speed, 3),
+        "flights": calm.flights,
+        "not_flyable": calm.failed,
+        "failed_by_rule": failures_document(calm.by_rule),
+    }
 
 
 def _speed_text(speed: float, most: float) -> str:
@@ -408,15 +430,41 @@ def _none_failed_lines(found: WindsFound) -> list[str]:
     ]
 
 
-def wind_lines(found: WindsFound) -> list[str]:
-    """Summarise the result of a search in a few lines."""
-    chart = spokes(found)
+def _calm_lines(found: WindsFound) -> list[str]:
+    """Return lines about the rules that fail in calm air, if the mission does not fly in it; else no line."""
+    calm = found.calm
+    if calm is None:
+        return []
+    wind = "calm air" if calm.speed < CALM_MPS else f"{calm.speed:.1f} m/s, the weakest wind flown"
+    return [f"in {wind}, {calm.failed} of {calm.flights} flights fail", *failure_lines(calm.by_rule)]
+
+
+def _winds_answer(found: WindsFound) -> str:
+    """Return the answer of a search in a line: the lowest and the highest boundary."""
+    chart, target = spokes(found), found.goal.target
     least, largest = (pick(chart, key=lambda one: one.boundary) for pick in (min, max))
     most, percent = found.goal.most, f"{100 * found.goal.confidence:g} %"
+    best = f"{_speed_text(largest.boundary, most)} from {largest.from_deg:g}°"
+    if found.calm is None:
+        return (
+            f"flies with P >= {target:g}, by best estimate, in wind up to {_speed_text(least.boundary, most)}"
+            f" from {least.from_deg:g}° (the lowest; {_interval_text(least.low, least.high, most)} m/s at {percent}),"
+            f" {best}"
+        )
+    if largest.boundary < CALM_MPS:
+        return f"does not fly with P >= {target:g}, by best estimate, even in calm air"
+    return (
+        f"does not fly with P >= {target:g}, by best estimate, in wind from {least.from_deg:g}° even in calm air;"
+        f" it flies in wind up to {best}"
+    )
+
+
+def wind_lines(found: WindsFound) -> list[str]:
+    """Summarise the result of a search in a few lines."""
+    percent = f"{100 * found.goal.confidence:g} %"
     return [
-        f"flies with P >= {found.goal.target:g}, by best estimate, in wind up to {_speed_text(least.boundary, most)}"
-        f" from {least.from_deg:g}° (the lowest; {_interval_text(least.low, least.high, most)} m/s at {percent}),"
-        f" {_speed_text(largest.boundary, most)} from {largest.from_deg:g}°",
+        _winds_answer(found),
+        *_calm_lines(found),
         *(() if found.conditions is None else flown_lines(found.conditions)),
         *_none_failed_lines(found),
         *_open_lines(found),

@@ -3,6 +3,7 @@
 import json
 import math
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -98,16 +99,47 @@ def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) 
 
 
 def _failures(store: Store) -> tuple[RuleFailures, ...]:
-    flights: Counter[str] = Counter()
+    listed = map(json.loads, store.texts("failed"))
+    return count_failures([(entry.pop("rule"), Place(**entry)) for entry in failed] for failed in listed)
+
+
+def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[RuleFailures, ...]:
+    """Count flights by failed rule and place, from the failed rules and places of each flight.
+
+    >>> [one.flights for one in count_failures([[("slope", Place("leg", 1)), ("slope", Place("leg", 2))], []])]
+    [1]
+    """
+    counts: Counter[str] = Counter()
     places: dict[str, Counter[Place]] = {}
-    for text in store.texts("failed"):
-        failed = [(entry.pop("rule"), Place(**entry)) for entry in json.loads(text)]
-        flights.update({rule for rule, _ in failed})
+    for flight in flights:
+        failed = list(flight)
+        counts.update({rule for rule, _ in failed})
         for rule, place in failed:
             places.setdefault(rule, Counter())[place] += 1
     return tuple(
-        RuleFailures(rule, flights[rule], tuple(places[rule].most_common())) for rule in RULE_WORDS if flights[rule]
+        RuleFailures(rule, counts[rule], tuple(places[rule].most_common())) for rule in RULE_WORDS if counts[rule]
     )
+
+
+def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:
+    """Return failures by rule and place for a JSON document."""
+    return [
+        {
+            "rule": one.rule,
+            "flights": one.flights,
+            "places": [{"where": place_text(place), "flights": n, **asdict(place)} for place, n in one.places],
+        }
+        for one in by_rule
+    ]
+
+
+def failure_lines(by_rule: Iterable[RuleFailures]) -> list[str]:
+    """Return a line for each failed rule: the number of flights, and the places where most of them failed."""
+    lines = []
+    for one in by_rule:
+        where = ", ".join(f"{place_text(place)} in {n}" for place, n in one.places[:3])
+        lines.append(f"  failed  {RULE_WORDS[one.rule].title} in {one.flights}: {where}")
+    return lines
 
 
 def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str, float | None]:
@@ -161,14 +193,7 @@ def summary_json(summary: CampaignSummary) -> str:
         "upper_bound": _plain(found.upper),
         "interval": [_plain(found.interval.low), _plain(found.interval.high)],
         "method": summary.goal.method,
-        "failed_by_rule": [
-            {
-                "rule": one.rule,
-                "flights": one.flights,
-                "places": [{"where": place_text(place), "flights": n, **asdict(place)} for place, n in one.places],
-            }
-            for one in summary.by_rule
-        ],
+        "failed_by_rule": failures_document(summary.by_rule),
         "deciding_rule": summary.deciding,
         "margin_of_one_in_twenty": _plain(summary.low_margin),
         "margin_unit": summary.unit,
@@ -221,9 +246,7 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
         f"  two-sided at {sure}: {found.interval.low:.4f} to {found.interval.high:.4f}",
         *(f"  {line}" for line in flown_lines(summary.conditions)),
     ]
-    for one in summary.by_rule:
-        where = ", ".join(f"{place_text(place)} in {n}" for place, n in one.places[:3])
-        lines.append(f"  failed  {RULE_WORDS[one.rule].title} in {one.flights}: {where}")
+    lines += failure_lines(summary.by_rule)
     if summary.lost:
         named = ", ".join(map(str, summary.lost[:10]))
         lines.append(f"  lost    {len(summary.lost)} could not be flown, their workers died: {named}")
@@ -238,7 +261,7 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
 def _answer_text(summary: CampaignSummary) -> str:
     target = summary.goal.target
     words = {"reached": f"P >= {target}", "missed": f"P < {target}", "undecided": f"P >= {target} is undecided"}
-    return words.get(summary.estimate.answer, "campaign")
+    return words.get(summary.estimate.answer, "no target is set (--prove P or --at-least P)")
 
 
 def _drivers_text(summary: CampaignSummary) -> str:

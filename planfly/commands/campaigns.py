@@ -146,7 +146,7 @@ def winds(args: argparse.Namespace) -> int:
     print("\n".join(wind_lines(found)))
     print(f"results   {folder}/ (winds.html, winds.png, winds.json, winds.sqlite)")
     give_answer(args, lambda: (folder / "winds.json").read_text(encoding="utf-8"))
-    return FLYABLE
+    return FLYABLE if found.calm is None else NOT_FLYABLE
 
 
 def _folder(args: argparse.Namespace, kind: str) -> Path:

@@ -224,6 +224,16 @@ class WindDirection:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class CalmFlights:
+    """Flights in the weakest wind that was flown, of the directions in which the mission fails even in calm air."""
+
+    speed_mps: float
+    flights: int
+    not_flyable: int
+    failed_by_rule: list[FailedRule]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class WindsDocument:
     """planfly winds: the largest wind from each direction."""
 
@@ -238,6 +248,8 @@ class WindsDocument:
     lost: list[int]
     """Flights without an outcome, from 0 in the order in which they were asked for; they count as not flyable."""
     directions: list[WindDirection]
+    calm: CalmFlights | None
+    """Failures in calm air, if the mission does not fly in it with the target probability."""
     spread: dict[str, Any]
     conditions: Conditions
     """Without the wind, which is what is asked for."""

@@ -17,6 +17,7 @@ from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.find_winds import (
     SEARCHED_QUANTITIES,
+    CalmFailures,
     WindsFound,
     WindsGoal,
     _Search,
@@ -27,6 +28,7 @@ from planfly.campaigns.find_winds import (
 from planfly.campaigns.flight_requests import FlyOne
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.report import wind_lines
+from planfly.campaigns.summary import RuleFailures
 from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, FlownFlight, StoreError
 from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, workers_killed
@@ -96,6 +98,23 @@ def flight_that_states_its_margin(base: CampaignBase, index: int, wind: GivenWin
     row = made_flight(base, index, wind)
     margin = (12.0 if wind.from_deg == 270.0 else 8.0) + row.draw.seed % 1000 / 1000.0 - 0.5 - wind.speed
     return replace(row, narrow=(("clearance", Place("leg", 1), margin),)) if 0.0 < margin < 1.0 else row
+
+
+def test_failures_in_calm_air_are_known_by_rule_and_place(wind_base: CampaignBase) -> None:
+    """From N and E every flight fails, in calm air at leg 3; from S and W every flight in 20 m/s flies."""
+    search = _Search(GOAL, wind_base)
+    failed = FlownFlight("not flyable", (("clearance", LEG),))
+    flies = FlownFlight("flyable", ())
+    flown = [(direction, 0.0, failed) for direction in (0, 0, 1)] + [(0, 5.0, failed)] * 20 + [(1, 5.0, failed)] * 20
+    flown += [(direction, 20.0, flies) for direction in (2, 3) for _ in range(60)]
+    for number, (direction, speed, outcome) in enumerate(flown):
+        search.take(AskedFlight(number, direction, speed, number), outcome)
+    calm = search.found().calm
+    assert calm == CalmFailures(0.0, 3, 3, (RuleFailures("clearance", 3, ((LEG, 3),)),))
+    windy = _Search(GOAL, wind_base)
+    for number in range(80):
+        windy.take(AskedFlight(number, number % 4, 20.0, number), flies)
+    assert windy.found().calm is None
 
 
 @pytest.mark.usefixtures("here")

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase
-from planfly.campaigns.find_winds import FEWEST, WindsFound, WindsGoal
+from planfly.campaigns.find_winds import FEWEST, CalmFailures, WindsFound, WindsGoal
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.report import (
@@ -24,7 +25,7 @@ from planfly.campaigns.report import (
 )
 from planfly.campaigns.statistics.decision import Estimator, Goal
 from planfly.campaigns.statistics.wind_boundary import WindBoundary
-from planfly.campaigns.summary import campaign_lines
+from planfly.campaigns.summary import RuleFailures, campaign_lines
 from planfly.campaigns.tables import DATABASE, StoreError
 from tests.planfly.campaigns.made_campaigns import all_fly, made_flight
 from tests.planfly.campaigns.made_report import made_report
@@ -124,6 +125,28 @@ def test_flights_are_counted_by_wind() -> None:
         "flies with P >= 0.9, by best estimate, in wind up to 7.0 m/s from 0° (the lowest; 6.5 to 7.5 m/s at 95 %),"
         " over 20 m/s from 270°"
     )
+
+
+def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
+    """Three of four flights in calm air fail clearance at leg 4, one of them slope, too; from W it flies in 2 m/s."""
+    by_rule = (
+        RuleFailures("slope", 1, ((Place("leg", 2), 1),)),
+        RuleFailures("clearance", 3, ((Place("leg", 4), 3),)),
+    )
+    boundaries = (*(WindBoundary(0.0, 0.0, 0.3, False) for _ in range(3)), WindBoundary(2.0, 1.8, 2.2, False))
+    found = replace(FOUND, boundaries=boundaries, calm=CalmFailures(0.0, 4, 3, by_rule))
+    assert wind_lines(found)[:4] == [
+        "does not fly with P >= 0.9, by best estimate, in wind from 0° even in calm air;"
+        " it flies in wind up to 2.0 m/s from 270°",
+        "in calm air, 3 of 4 flights fail",
+        "  failed  slopes in 1: leg 2 in 1",
+        "  failed  clearance in 3: leg 4 in 3",
+    ]
+    nowhere = replace(found, boundaries=boundaries[:1] * 4, calm=CalmFailures(0.3, 4, 3, by_rule[1:]))
+    assert wind_lines(nowhere)[:2] == [
+        "does not fly with P >= 0.9, by best estimate, even in calm air",
+        "in 0.3 m/s, the weakest wind flown, 3 of 4 flights fail",
+    ]
 
 
 def test_what_flights_show_by_themselves_where_none_failed() -> None:

@@ -1,6 +1,7 @@
 """The summary: counts by rule and place, and the same text for any number of workers."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from logs.verdict.places import Place
@@ -32,6 +33,16 @@ def test_it_counts_what_failed_and_names_what_was_lost(base: CampaignBase, tmp_p
         text = "\n".join(campaign_lines(summary))
         assert f"{59 - failed} of 60 flights are flyable" in text
         assert "lost    1" in text
+
+
+def test_a_campaign_without_a_target_says_so_in_its_answer(base: CampaignBase, tmp_path: Path) -> None:
+    with made_report(base, tmp_path) as (_, summary):
+        untargeted = replace(
+            summary,
+            goal=replace(summary.goal, target=None),
+            estimate=replace(summary.estimate, answer="none asked"),
+        )
+        assert campaign_lines(untargeted)[0].startswith("no target is set (--prove P or --at-least P): ")
 
 
 def test_whose_flights_they_are_stands_behind_the_answer(base: CampaignBase, tmp_path: Path) -> None:
