@@ -154,6 +154,8 @@ PAGE = {
     "good-back": ("#eef8f4", "#12291f"),
     "bad": ("#a3260b", "#ff9a84"),
     "bad-back": ("#fdf2ef", "#331a14"),
+    "open": ("#7a5200", "#ffc861"),
+    "open-back": ("#fff5dc", "#33270c"),
     "unjudged-back": ("#f6f6f7", "#22252b"),
     "on-badge": ("#ffffff", "#16181c"),
 }

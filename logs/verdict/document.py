@@ -29,6 +29,10 @@ class FindingDocument(DocumentConfig):
     limit: float | None
     limit_source: str
     """Whose the limit is: scenario, aircraft, mission, autopilot, default, ..."""
+    at_least: bool
+    """True: values of at least the limit pass; false: values of at most the limit."""
+    passes: str
+    """The values that pass in words, with the tolerance: "≤ 8.29 m"; "" without a limit."""
     tolerance: float | None
     margin: float | None
     """Distance inside the limit; negative: beyond the limit."""
@@ -120,7 +124,7 @@ class VerdictDocument(DocumentConfig):
 def finding_document(finding: Finding) -> FindingDocument:
     """Add the words for the place and the suggestions to a finding."""
     data = {field.name: getattr(finding, field.name) for field in fields(finding)}
-    return FindingDocument(**data, where=finding.where, suggestion=finding.suggestion)
+    return FindingDocument(**data, where=finding.where, passes=finding.limit_text, suggestion=finding.suggestion)
 
 
 def level_document(level: LevelAnswer) -> LevelDocument:

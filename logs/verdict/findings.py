@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from logs.verdict.places import Place, Suggestion
-from logs.verdict.wording import place_text, suggestions_text
+from logs.verdict.wording import compared_texts, place_text, quantity_text, suggestions_text
 from world.json_schema import DocumentConfig
 
 # Checks of findings that are not judged, so that the verdict is left open.
@@ -52,6 +52,7 @@ class Finding:
     check: the check of a rule with several checks; `UNKNOWN_AIRCRAFT`, `UNKNOWN_WAY`, `NOT_FLOWN`, `GROUND_WAY` or
         `UNKNOWN_RETURN` for what those leave undecided; "" otherwise.
     facts: further measured numbers that are no faults.
+    at_least: True if values of at least the limit pass, False if values of at most the limit pass.
     """
 
     rule: str
@@ -71,6 +72,52 @@ class Finding:
     placed: bool = False
     check: str = ""
     facts: tuple[Fact, ...] = ()
+    at_least: bool = False
+
+    @property
+    def effective_limit(self) -> float | None:
+        """Value up to which the rule passes: the limit with its tolerance; None without a limit.
+
+        A finding that fails by other evidence than the number with this tolerance is compared with the limit alone.
+
+        >>> make_finding("waypoint", Place("waypoint", 1), ok=True, reason="", limit=3.0, tolerance=5.3).effective_limit
+        8.3
+        """
+        if self.limit is None:
+            return None
+        tolerance = 0.0 if self.ok is False and self.margin is None else self.tolerance or 0.0
+        return self.limit - tolerance if self.at_least else self.limit + tolerance
+
+    @property
+    def limit_sign(self) -> str:
+        """Sign between a value that passes and the limit."""
+        return "≥" if self.at_least else "≤"
+
+    @property
+    def value(self) -> float | None:
+        """The number that is compared with the limit: the flown one, or the planned one if the margin is its margin."""
+        if self.flown is None or self.planned is None or self.limit is None or self.margin is None:
+            return self.planned if self.flown is None else self.flown
+        off = {value: abs(abs(value - self.limit) - abs(self.margin)) for value in (self.flown, self.planned)}
+        return min(off, key=lambda value: off[value])
+
+    @property
+    def limit_text(self) -> str:
+        """The values that pass, in words; "" without a limit.
+
+        >>> make_finding("stall", Place("flight"), ok=True, reason="", limit=9.5, unit="m/s", at_least=True).limit_text
+        '≥ 9.5 m/s'
+        """
+        return self.compared_texts()[1]
+
+    def compared_texts(self) -> tuple[str, str]:
+        """Return the value and the values that pass in words, with enough digits that a failing value differs."""
+        value, limit = self.value, self.effective_limit
+        if value is None or limit is None:
+            texts = ["" if one is None else quantity_text(one, self.unit) for one in (value, limit)]
+        else:
+            texts = list(compared_texts(value, limit, self.unit))
+        return texts[0], f"{self.limit_sign} {texts[1]}" if texts[1] else ""
 
     @property
     def where(self) -> str:
@@ -146,11 +193,13 @@ def make_finding(
     method: str = "",
     check: str = "",
     facts: Sequence[Fact] = (),
+    at_least: bool = False,
 ) -> Finding:
     """Make a finding with numbers rounded to 1e-6, and None for non-finite numbers.
 
     faults: the beginning of the reason, if it begins with faults.
     facts: further measured numbers; non-finite ones are left out.
+    at_least: True if values of at least the limit pass.
     A finding that fails by other evidence while its number is within the limit and its tolerance has no margin: the
     reason says what failed.
 
@@ -176,6 +225,7 @@ def make_finding(
         placed=bool(faults) and faults[0].placed,
         check=check,
         facts=tuple(replace(fact, value=round(fact.value, 6) + 0.0) for fact in facts if math.isfinite(fact.value)),
+        at_least=at_least,
     )
 
 

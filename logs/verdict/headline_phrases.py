@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from logs.verdict.findings import Finding
-from logs.verdict.wording import UNITS, place_text, shortened
+from logs.verdict.wording import compared_texts, place_text, shortened
 
 # Makes the phrase of a failed finding; its first argument is what a person calls the rule.
 HeadlinePhrase = Callable[[str, Finding], str]
@@ -28,28 +28,29 @@ def name_event(noun: str, item: Finding) -> str:
 
 def name_shortfall(noun: str, item: Finding) -> str:
     """Compare the flown value, or else the planned value, with a limit that is a least value."""
-    low = item.planned if item.flown is None else item.flown
-    if low is None or item.limit is None:
+    low, limit = item.value, item.effective_limit
+    if low is None or limit is None or low >= limit:
         return name_reason(noun, item)
-    unit = UNITS.get(item.unit, "")
-    return _with_place(noun, item, f"{low:.1f}{unit} < {item.limit:.1f}{unit}")
+    return _with_place(noun, item, " < ".join(compared_texts(low, limit, item.unit)))
 
 
 def name_excess(noun: str, item: Finding) -> str:
     """Compare the worse of planned and flown value with the limit, or name the reason if both are within."""
     values = [value for value in (item.flown, item.planned) if value is not None]
     worst = max(values, key=abs, default=None)
-    if item.limit is None or worst is None or abs(worst) <= abs(item.limit):
+    limit = item.effective_limit
+    if limit is None or worst is None or abs(worst) <= abs(limit):
         return name_reason(noun, item)
-    unit = UNITS.get(item.unit, "")
-    return _with_place(noun, item, f"{worst:.1f}{unit} {'>' if worst > 0.0 else '<'} {item.limit:.1f}{unit}")
+    sign = " > " if worst > 0.0 else " < "
+    return _with_place(noun, item, sign.join(compared_texts(worst, limit, item.unit)))
 
 
 def name_circle(noun: str, item: Finding) -> str:
     """Compare the radius of a circle that is too small with the least radius."""
-    if item.planned is None or item.limit is None or item.planned >= item.limit:
+    limit = item.effective_limit
+    if item.planned is None or limit is None or item.planned >= limit:
         return name_excess(noun, item)
-    return _with_place(noun, item, f"radius {item.planned:.0f} m < {item.limit:.0f} m")
+    return _with_place(noun, item, f"radius {' < '.join(compared_texts(item.planned, limit, item.unit))}")
 
 
 def name_zone(noun: str, item: Finding) -> str:
@@ -76,5 +77,7 @@ def name_missed_waypoint(_noun: str, item: Finding) -> str:
     """Name a missed waypoint and the distance at which it was passed."""
     if item.flown is not None and item.brief != item.reason:
         return f"{place_text(item.place)} {item.brief}"
-    over = item.flown is not None and item.limit is not None and item.flown > item.limit
-    return f"{place_text(item.place)} missed" + (f" ({item.flown:.0f} m > {item.limit:.0f} m)" if over else "")
+    limit = item.effective_limit
+    if item.flown is None or limit is None or item.flown <= limit:
+        return f"{place_text(item.place)} missed"
+    return f"{place_text(item.place)} missed ({' > '.join(compared_texts(item.flown, limit, item.unit))})"

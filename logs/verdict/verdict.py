@@ -80,6 +80,11 @@ class Verdict:
         return yes if self.flyable else f"not {yes}" if self.complete else "incomplete"
 
     @property
+    def state(self) -> str:
+        """The answer for colours: "ok", "open" (nothing failed, and a part was not judged) or "fail"."""
+        return "ok" if self.flyable else "open" if self.undecided else "fail"
+
+    @property
     def undecided(self) -> bool:
         """True if nothing failed, and a part of the mission was not judged."""
         return bool(self.unjudged) and not self.failed
@@ -177,7 +182,7 @@ class Verdict:
         return Presentation(
             headline=headline,
             details=tuple(details),
-            state="ok" if self.flyable else "open" if self.undecided else "fail",
+            state=self.state,
             findings=self.findings,
             rules=findings_by_rule(self.findings),
             zones=0 if self.conditions is None else self.conditions.zones,

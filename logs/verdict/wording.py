@@ -208,5 +208,29 @@ def quantity_text(value: float, unit: str) -> str:
     >>> quantity_text(11.87, "deg"), quantity_text(1_140_000.0, "Wh")
     ('11.9°', '1140000 Wh')
     """
-    figures = f"{value:.3g}" if abs(value) < 999.5 else f"{value:.0f}"
-    return figures + UNITS.get(unit, f" {unit}" if unit else "")
+    return _figures(value, 3) + UNITS.get(unit, f" {unit}" if unit else "")
+
+
+# Most significant digits of two numbers that are compared.
+_MOST_DIGITS = 9
+
+
+def compared_texts(value: float, limit: float, unit: str) -> tuple[str, str]:
+    """Return two values with their unit, with as many digits as make different values look different.
+
+    >>> compared_texts(-7.04, -7.02, "deg"), compared_texts(12.0, 15.0, "m")
+    (('-7.04°', '-7.02°'), ('12 m', '15 m'))
+    >>> compared_texts(30.0004, 30.0, "m/s")
+    ('30.0004 m/s', '30 m/s')
+    """
+    digits = 3
+    while digits < _MOST_DIGITS and value != limit and _figures(value, digits) == _figures(limit, digits):
+        digits += 1
+    suffix = UNITS.get(unit, f" {unit}" if unit else "")
+    return _figures(value, digits) + suffix, _figures(limit, digits) + suffix
+
+
+def _figures(value: float, digits: int) -> str:
+    """Write a number to so many significant digits, without a power of ten."""
+    figures = f"{value:.{digits}g}"
+    return figures if "e" not in figures else f"{value:.0f}" if abs(value) >= 1.0 else f"{value:.9f}".rstrip("0")

@@ -79,7 +79,7 @@ def returns(args: argparse.Namespace) -> int:
 
     found = call(planfly.returns, args)
     code = FLYABLE if found.safe else LOSS if found.undecided else NOT_FLYABLE
-    print(f"returns   {coloured(found.headline, 'good' if found.safe else 'bad')}")
+    print(f"returns   {coloured(found.headline, 'good' if found.safe else 'warning' if found.undecided else 'bad')}")
     for text in flown_lines(setup_conditions(found.setup)):
         print(f"  {text}")
     for text in found.lines_of_causes:

@@ -15,7 +15,6 @@ from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.tolerances import ROUNDING_M
-from logs.verdict.wording import UNITS
 from world.arrays import Floats
 from world.threats import Threats
 
@@ -93,7 +92,7 @@ def state_of(item: Finding, *, unjudged: bool = False) -> State | None:
     ...     "slope", Place("leg", 1), ok=True, reason="", planned=13.5, limit=14.2, margin=0.7, unit="deg"
     ... )
     >>> state_of(slope)
-    State(state='near', closeness=0.7, text='slope 13.5° of 14.2°')
+    State(state='near', closeness=0.7, text='slope 13.5° (≤ 14.2°)')
     """
     if item.ok is None:
         return State("open", 0.0, f"{_word(item)}: {item.brief or item.reason}") if unjudged else None
@@ -119,9 +118,8 @@ def _closeness(item: Finding) -> float:
 
 
 def _value_text(item: Finding) -> str:
-    unit = UNITS.get(item.unit, "")
-    text = f"{_word(item)} {item.planned:.1f}{unit}"
-    return text if item.limit is None else f"{text} of {item.limit:.1f}{unit}"
+    value, limit = item.compared_texts()
+    return f"{_word(item)} {value}" + (f" ({limit})" if limit else "")
 
 
 # ----------------------------------------------------------------------

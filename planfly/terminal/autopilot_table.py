@@ -6,7 +6,7 @@ from logs.verdict.conditions import flown_lines
 from logs.verdict.presentation import RuleFindings
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
-from planfly.terminal.command_parser import coloured
+from planfly.terminal.command_parser import STATE_STYLES, coloured
 
 # Space between two columns.
 _GAP = "  "
@@ -41,7 +41,7 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
         first, *rest = verdict.lines or ("",)
         # If another value of a parameter passes, the second line names it.
         more = f"; {rest[0]}" if rest and not verdict.flyable else ""
-        lines.append(f"{name}: " + coloured(first, "good" if verdict.flyable else "bad") + more)
+        lines.append(f"{name}: " + coloured(first, STATE_STYLES[verdict.state]) + more)
         if verdict.conditions is not None:
             said = flown_lines(verdict.conditions)
             lines += [f"  {line}" for line in said]
@@ -50,7 +50,7 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
 
 def _answer(verdict: Verdict) -> str:
     if verdict.undecided:
-        return "undecided"
+        return verdict.answer
     return "flyable" if verdict.flyable else "not flyable"
 
 

@@ -18,6 +18,8 @@ from world.files import did_you_mean
 Style = Literal["good", "bad", "warning", "hint"]
 # Colours of ECMA-48, "select graphic rendition": green, red, yellow and cyan.
 _STYLES: dict[Style, int] = {"good": 32, "bad": 31, "warning": 33, "hint": 36}
+# Style of an answer by its state: what was not judged is amber, not red.
+STATE_STYLES: dict[str, Style] = {"ok": "good", "open": "warning", "fail": "bad"}
 
 
 def wants_colour(stream: TextIO) -> bool:

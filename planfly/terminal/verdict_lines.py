@@ -6,8 +6,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.presentation import RuleFindings
 from logs.verdict.rule_words import RULE_WORDS, rule_word
 from logs.verdict.verdict import Verdict
-from logs.verdict.wording import quantity_text
-from planfly.terminal.command_parser import coloured
+from planfly.terminal.command_parser import STATE_STYLES, coloured
 
 # Number of failed findings of a rule that are named after the worst one.
 _LISTED = 6
@@ -20,7 +19,7 @@ _TITLES = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
     """Return the summary, the failures, the closest finding of each rule, and notes, in colour if wanted."""
     shown = verdict.present()
-    lines = [coloured(shown.headline, "good" if shown.state == "ok" else "bad"), *shown.details]
+    lines = [coloured(shown.headline, STATE_STYLES[shown.state]), *shown.details]
     for rule in shown.failed_rules:
         lines += _failed_lines(rule)
     lines += [f"  open    {rule_word(one.rule)} at {one.where}: {one.reason}" for one in shown.undecided[: 2 * _LISTED]]
@@ -49,8 +48,8 @@ def _failed_lines(rule: RuleFindings) -> list[str]:
 
 
 def _place_and_value(finding: Finding) -> str:
-    value = finding.planned if finding.flown is None else finding.flown
-    return finding.where + ("" if value is None else f" ({quantity_text(value, finding.unit)})")
+    value, _ = finding.compared_texts()
+    return finding.where + (f" ({value})" if value else "")
 
 
 def _state(rule: RuleFindings) -> str:
@@ -60,11 +59,10 @@ def _state(rule: RuleFindings) -> str:
     closest, margin = rule.closest, rule.words.margin
     if closest is None or closest.margin is None or margin is None:
         return rule.count_text
-    value = closest.planned if closest.flown is None else closest.flown
-    if value is None or closest.limit is None:
+    value, limit = closest.compared_texts()
+    if not value or not limit:
         return rule.count_text
     how = "furthest beyond its limit" if closest.ok is False else "closest to its limit"
     where = "" if closest.place.kind == "flight" else f"{how} at {closest.where}: "
-    limit = quantity_text(closest.limit, closest.unit)
     source = f", {closest.limit_source}" if closest.limit_source in _LIMIT_SOURCES else ""
-    return f"{rule.count_text}; {where}{margin.of} {quantity_text(value, closest.unit)} (limit {limit}{source})"
+    return f"{rule.count_text}; {where}{margin.of} {value} (limit {limit}{source})"

@@ -87,7 +87,7 @@ def contrast(one: str, other: str) -> float:
 @pytest.mark.parametrize("dark", [False, True])
 def test_words_can_be_read_and_limits_are_no_threats(dark: bool) -> None:
     ground = {name: theme.colour(name, dark=dark) for name in ("paper", "plot")}
-    for name in ("ink", "quiet", "link", "good", "bad", "fail", "limit"):
+    for name in ("ink", "quiet", "link", "good", "bad", "open", "fail", "limit"):
         for behind in ground.values():
             assert contrast(theme.colour(name, dark=dark), behind) >= 4.5, name
     used = [theme.colour(role, dark=dark) for role in ("limit", "missile", "radar", "fail", "commanded", "planned")]

@@ -43,6 +43,7 @@ def bounds_findings(
             planned=planned,
             flown=flown_margin,
             limit=0.0,
+            at_least=True,
             source="scenario",
             tolerance=ROUNDING_M,
             margin=found if ok is not None else None,

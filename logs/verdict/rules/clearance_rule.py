@@ -34,7 +34,14 @@ def clearance_findings(
     if ground is None:
         reason = "no terrain was given, so heights above ground are not known"
         unknown = make_finding(
-            "clearance", FLIGHT, ok=None, reason=reason, limit=limit, source=requirements.limits_source, unit="m"
+            "clearance",
+            FLIGHT,
+            ok=None,
+            reason=reason,
+            limit=limit,
+            source=requirements.limits_source,
+            unit="m",
+            at_least=True,
         )
         return [unknown, *_below_home(requirements)]
     near = _near_ground(requirements)
@@ -195,6 +202,7 @@ def _planned_clearance(
         reason=reason + _terrain_error_text(planned, limit, error),
         planned=planned,
         limit=limit,
+        at_least=True,
         source=_source(requirements, limit),
         tolerance=CLEARANCE_TOLERANCE_M,
         margin=planned - limit,
@@ -244,6 +252,7 @@ def _flown_clearance(
         planned=planned,
         flown=least,
         limit=limit,
+        at_least=True,
         source=_source(requirements, limit),
         tolerance=CLEARANCE_TOLERANCE_M,
         margin=least - limit,

@@ -238,6 +238,7 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
         faults=[] if ok else [fault],
         planned=worst.room,
         limit=worst.needed,
+        at_least=True,
         source="check",
         tolerance=0.0,
         margin=None if worst.entered or worst.lost else worst.room - worst.needed,

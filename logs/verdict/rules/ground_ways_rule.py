@@ -367,6 +367,7 @@ def _finding(rule: str, place: Place, met: _Obstacles, ok: bool | None, said: Me
         faults=[] if ok else [said],
         planned=met.clearance,
         limit=0.0,
+        at_least=True,
         source="terrain",
         tolerance=0.0,
         margin=None if met.entered else met.clearance,

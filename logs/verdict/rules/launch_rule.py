@@ -81,6 +81,7 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
         faults=faults or open_,
         flown=room,
         limit=LAUNCH_CLEARANCE_M,
+        at_least=True,
         source="check",
         tolerance=0.0,
         margin=room - LAUNCH_CLEARANCE_M,

@@ -202,6 +202,7 @@ def _loiter_finding(
         planned=circle.radius,
         flown=mean,
         limit=tightest,
+        at_least=True,
         source="aircraft" if known else "none",
         tolerance=RADIUS_TOLERANCE_FRACTION,
         margin=circle.radius - tightest,

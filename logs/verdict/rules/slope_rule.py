@@ -92,6 +92,7 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
         planned=math.degrees(planned),
         flown=None if fit is None else math.degrees(fit.value),
         limit=math.degrees(sign * limit),
+        at_least=sign < 0.0,
         source=source,
         tolerance=math.degrees(PLAN_TOLERANCE_RAD if fit is None else fit.tolerance),
         margin=math.degrees(limit - sign * judged),

@@ -58,7 +58,8 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
     notes += _speed_range_notes(requirements, command)
     notes += _short_leg_notes(requirements, leg, commanded)
     margin = min(commanded - slowest, fastest - commanded)
-    limit = slowest if commanded - slowest <= fastest - commanded else fastest
+    at_least = commanded - slowest <= fastest - commanded
+    limit = slowest if at_least else fastest
     mean, tolerance, facts, source = math.nan, 0.0, [], "aircraft"
     unflown = not geometric and (aligned is None or not aligned.flew(leg))
     if unflown:
@@ -82,6 +83,7 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
             if not faults and (unheld := _find_held_speed(requirements, aligned, leg, wanted)):
                 # From here on the flown speed is judged by its command, no longer the command by the envelope.
                 mean, allowed, source = unheld.speed, unheld.allowed, "mission"
+                at_least = mean < wanted
                 limit = wanted + math.copysign(allowed, mean - wanted)
                 margin, tolerance = allowed - abs(mean - wanted), unheld.tolerance
                 faults.append(message(f"{mean:.1f} m/s held of the commanded {wanted:.1f} m/s"))
@@ -100,6 +102,7 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
         planned=commanded,
         flown=mean,
         limit=limit,
+        at_least=at_least,
         source=source,
         tolerance=tolerance,
         margin=margin,

@@ -140,6 +140,7 @@ def _finding(found: _Margin, where: str, tolerance: float, *, geometric: bool) -
         planned=found.speed if geometric else None,
         flown=None if geometric else found.speed,
         limit=found.stall,
+        at_least=True,
         source="aircraft",
         tolerance=tolerance,
         margin=found.left,

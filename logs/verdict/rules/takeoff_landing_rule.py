@@ -76,6 +76,7 @@ def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> 
             faults=[fault],
             planned=found,
             limit=trigger[0],
+            at_least=True,
             source="autopilot",
             margin=found - trigger[0],
             unit="m/s2",

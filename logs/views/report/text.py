@@ -18,18 +18,14 @@ from logs.verdict.wording import suggestions_text
 # ----------------------------------------------------------------------
 # Remedies for a failed finding: the value that passes, changes of the plan, and the autopilot's parameter.
 
-# Tolerance between a margin and the difference of flown value and limit, in the finding's unit: both are rounded to
-# 1e-6.
-_SAME = 1e-5
-
 
 @dataclass(frozen=True, slots=True)
 class WouldPass:
     """Remedies for one failed finding.
 
     bound: side of the passing values; None if the finding fails by other evidence.
-    value: the limiting value that passes, in the finding's unit.
-    misses: distance of flight or plan beyond that value, without tolerance.
+    value: the limiting value that passes, the limit with its tolerance, in the finding's unit.
+    misses: distance of flight or plan beyond that value.
     suggestions: the smallest changes of the plan; any one of them would pass.
     parameter: the autopilot's deciding parameter, if it fails this finding first.
     """
@@ -52,33 +48,22 @@ def would_pass(finding: Finding, deciding: DecidingParameter | None) -> WouldPas
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import Place
-    >>> low = make_finding("clearance", Place("leg", 4), ok=False, reason="", flown=52.0, limit=60.0, margin=-8.0)
+    >>> low = make_finding("clearance", Place("leg", 4), ok=False, reason="", limit=60.0, margin=-8.0, at_least=True)
     >>> found = would_pass(low, None)
     >>> found.bound, found.value, found.misses
     ('at least', 60.0, 8.0)
     """
-    bound = _bound(finding)
-    known = bound is not None and finding.margin is not None
+    limit, margin = finding.effective_limit, finding.margin
+    known = limit is not None and margin is not None
     same = deciding is not None and (deciding.rule, deciding.place) == (finding.rule, finding.place)
     return WouldPass(
-        bound=bound,
-        value=finding.limit if known else None,
-        misses=-finding.margin if known and finding.margin is not None else None,
+        # A descent is bounded in steepness.
+        bound=("at least" if finding.at_least and finding.rule != "slope" else "at most") if known else None,
+        value=limit if known else None,
+        misses=-margin - (finding.tolerance or 0.0) if margin is not None and known else None,
         suggestions=finding.suggestions,
         parameter=deciding if same else None,
     )
-
-
-def _bound(finding: Finding) -> Literal["at most", "at least"] | None:
-    """Return the side of the limit with positive margins, which passes; a descent is bounded in steepness."""
-    if finding.limit is None or finding.margin is None:
-        return None
-    values = [value for value in (finding.flown, finding.planned) if value is not None]
-    if finding.rule == "slope" or not values:
-        return "at most"
-    if any(abs(value - finding.limit - finding.margin) < _SAME for value in values):
-        return "at least"
-    return "at most"
 
 
 NOTHING = "–"
@@ -89,7 +74,8 @@ _UNITS = {"deg": "°", "none": "", "1": ""}
 class FindingRow:
     """One finding as text.
 
-    state: "fail", "pass" or "unjudged"; sign: the state as a symbol, for readers who see no colour.
+    state: "fail", "pass", "open" (not judged, which leaves the verdict open) or "unjudged".
+    sign: the state as a symbol, for readers who see no colour.
     would_pass: value and changes that would have made a failed finding pass; "" if unknown.
     """
 
@@ -139,7 +125,7 @@ class LevelRow:
 
 @dataclass(frozen=True, slots=True)
 class Badge:
-    """The verdict in one word.  state: "pass", "fail" or "unjudged"."""
+    """The verdict in one word.  state: "pass", "fail" or "open" (not judged in full)."""
 
     state: str
     sign: str
@@ -152,8 +138,8 @@ _LEVELS = {
     "airframe": ("Can this aircraft follow it at all?", "planfly's guidance"),
     "autopilot": ("Does it go well with the autopilot that will fly?", ""),
 }
-_SIGNS = {"pass": "✓", "fail": "✗", "unjudged": "?"}
-_WORDS = {"pass": "ok", "fail": "fails", "unjudged": "not judged"}
+_SIGNS = {"pass": "✓", "fail": "✗", "open": "?", "unjudged": "–"}
+_WORDS = {"pass": "ok", "fail": "fails", "open": "not judged", "unjudged": "not judged"}
 
 
 def number(value: float | None, *, signed: bool = False, digits: int | None = None) -> str:
@@ -191,9 +177,9 @@ def in_unit(value: float | None, unit: str) -> tuple[float | None, str]:
     return value, _UNITS.get(unit, unit)
 
 
-def state_of(ok: bool | None) -> str:
-    """Name the state of a finding by its answer."""
-    return "unjudged" if ok is None else "pass" if ok else "fail"
+def state_of(ok: bool | None, *, is_open: bool = False) -> str:
+    """Name the state of a finding by its answer.  is_open: True if an unjudged one leaves the verdict open."""
+    return ("open" if is_open else "unjudged") if ok is None else "pass" if ok else "fail"
 
 
 def badge_of(verdict: Verdict) -> Badge:
@@ -204,7 +190,7 @@ def badge_of(verdict: Verdict) -> Badge:
     if verdict.level == "plan":
         return Badge("fail", _SIGNS["fail"], "Not flyable: no feasible plan")
     if verdict.undecided:
-        return Badge("fail", _SIGNS["unjudged"], "Not judged in full")
+        return Badge("open", _SIGNS["open"], "Not judged in full")
     word = "not flown as planned" if verdict.imported else "not flyable"
     broken = {finding.rule for finding in verdict.findings if finding.ok is False} - {"completion"}
     if not broken and not verdict.complete:
@@ -220,7 +206,7 @@ def level_rows(verdict: Verdict, autopilot: Autopilot) -> list[LevelRow]:
     own = autopilot.title if autopilot.parameters is None else f"{autopilot.title}, by its parameters"
     rows = []
     for level in verdict.levels:
-        state = state_of(None if level.undecided else level.flyable)
+        state = state_of(None if level.undecided else level.flyable, is_open=True)
         asks, flown_by = _LEVELS[level.name]
         sign = f"{_SIGNS[state]} {_WORDS[state]}"
         rows.append(LevelRow(state, sign, level.name, asks, flown_by or own, level.headline))
@@ -228,13 +214,13 @@ def level_rows(verdict: Verdict, autopilot: Autopilot) -> list[LevelRow]:
 
 
 def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None = None) -> list[FindingRow]:
-    """Return all findings as text: failing first, then passed, then not judged.
+    """Return all findings as text: failing first, then those that leave the verdict open, passed, and not judged.
 
     Within each state, the order of the verdict is kept.
 
     deciding: deciding parameter of the verdict, for the remedies.
     """
-    order = {"fail": 0, "pass": 1, "unjudged": 2}
+    order = {"fail": 0, "open": 1, "pass": 2, "unjudged": 3}
     return sorted((_row(finding, deciding) for finding in findings), key=lambda row: order[row.state])
 
 
@@ -293,28 +279,31 @@ def count_sentence(rows: list[FindingRow]) -> str:
     counts = {state: sum(row.state == state for row in rows) for state in _SIGNS}
     held = f"{counts['pass']} of {counts['pass'] + counts['fail']} judged findings hold"
     failed = f", {counts['fail']} {'fails' if counts['fail'] == 1 else 'fail'}" if counts["fail"] else ""
-    left = f"; {counts['unjudged']} could not be judged: grey below, with the reason" if counts["unjudged"] else ""
+    unjudged = counts["open"] + counts["unjudged"]
+    left = f"; {unjudged} could not be judged" if unjudged else ""
     return f"{held}{failed}{left}."
 
 
 def _row(finding: Finding, deciding: DecidingParameter | None = None) -> FindingRow:
-    state = state_of(finding.ok)
-    planned, flown, limit, margin = (
-        in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.limit, finding.margin)
+    state = state_of(finding.ok, is_open=bool(undecided_findings([finding])))
+    planned, flown, margin = (
+        in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.margin)
     )
-    method, mended = finding.method, finding.suggestion
-    if finding.tolerance:
-        method = f"{method} (±\u00a0{quantity(finding.tolerance, finding.unit)})" if method else ""
+    left = None if margin is None else margin + (in_unit(finding.tolerance, finding.unit)[0] or 0.0)
+    method, mended, digits = finding.method, finding.suggestion, _digits_of(finding)
+    if finding.tolerance and method and finding.limit is not None:
+        stated, tolerance = (quantity(value, finding.unit) for value in (finding.limit, finding.tolerance))
+        method = f"{method}; limit {stated} with a tolerance of {tolerance}"
     return FindingRow(
         state=state,
         sign=f"{_SIGNS[state]} {_WORDS[state]}",
         rule=rule_word(finding.rule),
         where=finding.where,
-        planned=number(planned),
-        flown=number(flown),
-        limit=number(limit),
+        planned=number(planned, digits=digits),
+        flown=number(flown, digits=digits),
+        limit=_limit_text(finding, digits),
         limit_source=finding.limit_source,
-        margin=number(margin, signed=True),
+        margin=number(left, signed=True),
         unit=in_unit(None, finding.unit)[1],
         method=method,
         reason=finding.reason + (f"; would pass: {mended}" if mended else ""),
@@ -323,17 +312,36 @@ def _row(finding: Finding, deciding: DecidingParameter | None = None) -> Finding
     )
 
 
+# Most decimals of a value and its limit.
+_MOST_DECIMALS = 6
+
+
+def _digits_of(finding: Finding) -> int | None:
+    """Return the number of decimals with which a value differs from its limit, or None if the usual ones do."""
+    value, limit = (in_unit(one, finding.unit)[0] for one in (finding.value, finding.effective_limit))
+    if value is None or limit is None or value == limit or number(value) != number(limit):
+        return None
+    apart = (digits for digits in range(_MOST_DECIMALS) if number(value, digits=digits) != number(limit, digits=digits))
+    return next(apart, _MOST_DECIMALS)
+
+
+def _limit_text(finding: Finding, digits: int | None) -> str:
+    """Write the values that pass; an en dash without a limit."""
+    text = number(in_unit(finding.effective_limit, finding.unit)[0], digits=digits)
+    return text if text == NOTHING else f"{finding.limit_sign}\u00a0{text}"
+
+
 def _sentence(finding: Finding) -> str:
     """Describe a finding in words: the flown or planned value, its limit, and the reason."""
     parts: list[str] = []
-    for word, value in (("flown", finding.flown), ("planned", finding.planned)):
-        if value is not None and not parts:
-            parts.append(f"{word} {quantity(value, finding.unit)}")
+    digits, unit = _digits_of(finding), in_unit(None, finding.unit)[1]
+    space = "" if unit in ("", "°", "%") else "\u00a0"
+    if (value := finding.value) is not None:
+        word = "planned" if finding.flown is None or value != finding.flown else "flown"
+        parts.append(f"{word} {number(in_unit(value, finding.unit)[0], digits=digits)}{space}{unit}")
     if finding.limit is not None:
         source = f" ({finding.limit_source})" if finding.limit_source else ""
-        parts.append(f"limit {quantity(finding.limit, finding.unit)}{source}")
-    if finding.margin is not None and finding.margin < 0.0:
-        parts.append(f"beyond it by {quantity(-finding.margin, finding.unit)}")
+        parts.append(f"limit {_limit_text(finding, digits)}{space}{unit}{source}")
     numbers = ", ".join(parts)
     return f"{numbers}; {finding.reason}" if numbers and finding.reason else numbers or finding.reason
 
@@ -345,7 +353,8 @@ def rule_rows(findings: Sequence[Finding]) -> list[RuleRow]:
 
 def _rule_row(rule: RuleFindings) -> RuleRow:
     failed, judged = len(rule.failed), rule.judged
-    state = "fail" if failed else "pass" if judged and not undecided_findings(rule.findings) else "unjudged"
+    is_open = bool(undecided_findings(rule.findings))
+    state = "fail" if failed else "open" if is_open else "pass" if judged else "unjudged"
     parts: list[str] = [f"{failed} of {judged} fail" if failed else f"{judged} ok"] if judged else []
     if judged < len(rule.findings):
         parts.append(f"{len(rule.findings) - judged} not judged")

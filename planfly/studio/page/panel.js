@@ -11,6 +11,12 @@ const MOST_ROWS = 600;
 // Ways that one search looks for.
 const WAYS = 6;
 
+// The answer of a verdict, in the same words in the header and on its card.
+export function answerText(verdict, stale) {
+  const failed = verdict.state === "fail" && verdict.failed ? `: ${verdict.failed} ${verdict.failed === 1 ? "finding" : "findings"}` : "";
+  return `${verdict.answer}${failed}${stale ? ", changed since" : ""}`;
+}
+
 export class Panel {
   constructor(app) {
     this.app = app;
@@ -105,9 +111,9 @@ export class Panel {
     const { now, flight } = this;
     if (!now) return;
     const box = clear(this.boxes.verdict), stale = flight && flight.rev !== now.rev;
-    box.append(this.answerOf("Geometry", now.verdict, "every leg and corner against what the aircraft can do"));
+    box.append(this.answerOf("Geometry", answerText(now.verdict), now.verdict, "every leg and corner against what the aircraft can do"));
     if (flight) {
-      const part = this.answerOf("Flown", flight.verdict, `${flight.autopilot}, ${duration(flight.seconds)}${stale ? ", before the last change" : ""}`);
+      const part = this.answerOf("Flown", answerText(flight.verdict, stale), flight.verdict, `${flight.autopilot}, ${duration(flight.seconds)}${stale ? ", before the last change" : ""}`);
       part.classList.toggle("stale", Boolean(stale));
       if (flight.changes.length) part.append(element("p", {}, element("b", {}, "Since the last flight")), element("ul", { class: "changes" }, ...flight.changes.map((text) => element("li", {}, text))));
       box.append(part);
@@ -131,10 +137,10 @@ export class Panel {
     return element("p", {}, element("button", { type: "button", "data-job": job, onclick: () => this.app.send({ kind: job }) }, words), element("small", {}, more));
   }
 
-  answerOf(name, verdict, more) {
+  answerOf(name, answer, verdict, more) {
     const lines = verdict.lines.slice(0, 6);
     return element("section", { class: "card", "data-state": verdict.state },
-      element("h2", {}, `${name}: ${verdict.answer}`), element("p", { class: "more" }, more),
+      element("h2", {}, `${name}: ${answer}`), element("p", { class: "more" }, more),
       verdict.state === "ok" ? null : element("p", {}, verdict.headline),
       lines.length ? element("details", {}, element("summary", {}, "In full"), ...lines.map((line) => element("p", { class: "line" }, line))) : null);
   }

@@ -4,7 +4,7 @@ import { clear, element, groundAt, plain } from "/axes.js";
 import { Hands } from "/hands.js";
 import { Link } from "/link.js";
 import { MapView } from "/map.js";
-import { Panel } from "/panel.js";
+import { Panel, answerText } from "/panel.js";
 import { Profile } from "/profile.js";
 import { Scene } from "/scene.js";
 
@@ -254,26 +254,24 @@ function drawAll() {
 
 // ---- the answers in the header
 
-const SHORT = { ok: "flyable", open: "not judged in full", fail: "not flyable" };
-
 function answers() {
   const { model, flown } = now;
   if (!model) return;
   const unplanned = model.items.length === 2 && now.work.plan;
   const state = now.fault ? "fail" : model.verdict.state;
   const failing = [...model.states.legs, ...model.states.corners].filter((one) => one[0] === "fail").length;
-  let words = SHORT[state];
+  let words = answerText(model.verdict);
   let shown = state;
   if (now.dragging && now.checking && !now.fault) {
     shown = failing ? "fail" : "checking";
     words = failing ? `${failing} ${failing === 1 ? "place fails" : "places fail"}` : "checking \u2026";
-  } else if (state === "fail" && !now.fault) words = `not flyable: ${model.verdict.failed} ${model.verdict.failed === 1 ? "finding" : "findings"}`;
+  }
   setAnswer("geometry", unplanned ? "none" : shown, unplanned ? "planning \u2026" : now.fault || words, model.verdict.headline);
   const work = now.work.fly;
   if (work && !now.dragging) setAnswer("flown", "checking", `flying ${Math.round(100 * (work.share || 0))} %`, work.text || "");
   else if (!flown) setAnswer("flown", "none", "not yet", "");
-  else if (isStale()) setAnswer("flown", "stale", "changed since", flown.verdict.headline);
-  else setAnswer("flown", flown.verdict.state, SHORT[flown.verdict.state], flown.verdict.headline);
+  else if (isStale()) setAnswer("flown", "stale", answerText(flown.verdict, true), flown.verdict.headline);
+  else setAnswer("flown", flown.verdict.state, answerText(flown.verdict), flown.verdict.headline);
 }
 
 function setAnswer(id, state, words, title) {

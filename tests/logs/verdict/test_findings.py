@@ -286,7 +286,7 @@ def test_a_rule_with_a_finding_left_open_is_not_called_ok_in_the_report() -> Non
     passed = make_finding("slope", Place("leg", 0), ok=True, reason="", margin=1.0, unit="deg")
     unsure = make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)
     assert [row.state for row in rule_rows([passed])] == ["pass"]
-    assert [(row.state, row.counts) for row in rule_rows([passed, unsure])] == [("unjudged", "1 ok, 1 not judged")]
+    assert [(row.state, row.counts) for row in rule_rows([passed, unsure])] == [("open", "1 ok, 1 not judged")]
 
 
 def made_verdict() -> Verdict:

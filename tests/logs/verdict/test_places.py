@@ -92,7 +92,7 @@ def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> Non
 def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: FlightSetup) -> None:
     verdict = aside(autopilot, 70.0, ReferenceFlights(PASSED, DECIDING))
     assert verdict.lines[:2] == (
-        "not flyable: corridor on leg 1, to item 2 (70.0 m > 60.0 m)",
+        "not flyable: corridor on leg 1, to item 2 (70 m > 60 m)",
         "The aircraft can, ArduPlane with these parameters cannot: NAVL1_PERIOD 17 takes it 70 m off leg 1; 14 would"
         " pass",
     )

@@ -40,8 +40,8 @@ def test_the_worst_of_each_rule_comes_before_the_second_worst_of_any() -> None:
     slopes = [failed("slope", leg(k), -float(k), planned=8.0 + k, limit=8.0) for k in range(1, 6)]
     turn = failed("turn", waypoint(2), -0.1, planned=50.1, limit=50.0)
     assert headline([*slopes, turn], False) == (
-        "not flyable: slope on leg 3 (11.0° > 8.0°), slope on leg 4 (12.0° > 8.0°), slope on leg 5 (13.0° > 8.0°),"
-        " turn at waypoint 2 (50.1° > 50.0°), +2 more"
+        "not flyable: slope on leg 3 (11° > 8°), slope on leg 4 (12° > 8°), slope on leg 5 (13° > 8°),"
+        " turn at waypoint 2 (50.1° > 50°), +2 more"
     )
 
 

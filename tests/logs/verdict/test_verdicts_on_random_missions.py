@@ -26,11 +26,26 @@ def levels(made: MadeMission) -> dict[str, Verdict]:
     }
 
 
+def limits_agree_with_results(verdict: Verdict) -> None:
+    """Assert that the printed number of each finding is within its printed limit exactly where its margin says so."""
+    for item in verdict.findings:
+        value, limit = item.value, item.effective_limit
+        if value is None or limit is None or item.margin is None or item.rule == "threat":
+            continue
+        inside = value >= limit - 1e-5 if item.at_least else value <= limit + 1e-5
+        assert inside is (item.margin + (item.tolerance or 0.0) >= -1e-5), item
+        assert inside or item.ok is not True, item
+        if not inside:
+            shown, passes = item.compared_texts()
+            assert shown != passes[2:], item
+
+
 @pytest.mark.parametrize("margin", MARGINS)
 @pytest.mark.parametrize("number", BEYOND)
 def test_beyond_one_limit_is_not_flyable_and_the_rule_is_named(number: int, margin: float) -> None:
     made = infeasible(number, margin)
     for level, verdict in levels(made).items():
+        limits_agree_with_results(verdict)
         named = [item for item in verdict.findings if item.ok is False and item.rule == made.rule]
         assert not verdict.flyable, (made.kind, level)
         assert {bare(item.place) for item in named} & set(made.places), (made.kind, level, verdict.summary)
@@ -40,6 +55,7 @@ def test_beyond_one_limit_is_not_flyable_and_the_rule_is_named(number: int, marg
 @pytest.mark.parametrize("number", INSIDE)
 def test_inside_every_limit_is_flyable(number: int, margin: float) -> None:
     for level, verdict in levels(feasible(number, margin)).items():
+        limits_agree_with_results(verdict)
         assert verdict.flyable, (level, verdict.summary)
 
 

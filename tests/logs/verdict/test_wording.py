@@ -8,11 +8,85 @@ import numpy as np
 import pytest
 
 from flight.simulation.setup import FlightSetup
+from logs.verdict.document import finding_document
+from logs.verdict.findings import Finding, make_finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import FLIGHT, MISSION, PLAN, Change, Place
+from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.verdict import Verdict
 from logs.verdict.wording import change_text, place_text, shortened, suggestion_text, suggestions_text
+from logs.views.report.text import finding_rows
+from planfly.terminal.verdict_lines import verdict_lines
 from tests.logs.verdict.judging import leg, missile, of, suggested, waypoint
 from tests.synthetic import envelope, make_setup
+
+# Of the waypoint of a flight with 5.3 m of navigation error: passed at 4.42 m, where the mission allows 2.99 m.
+PASSED = make_finding(
+    "waypoint",
+    waypoint(1),
+    ok=True,
+    reason="",
+    flown=4.42,
+    limit=2.99,
+    tolerance=5.3,
+    margin=-1.43,
+    unit="m",
+    source="mission",
+)
+STALL = make_finding(
+    "stall", FLIGHT, ok=True, reason="", flown=14.2, limit=10.0, tolerance=0.5, margin=4.2, unit="m/s", at_least=True
+)
+# A descent of 7.04 degrees, where 7 and a tolerance of 0.02 are allowed.
+DESCENT = make_finding(
+    "slope",
+    leg(1),
+    ok=False,
+    reason="",
+    planned=-7.04,
+    limit=-7.0,
+    tolerance=0.02,
+    margin=-0.04,
+    unit="deg",
+    at_least=True,
+)
+
+
+@pytest.mark.parametrize(
+    ("finding", "texts"),
+    [(PASSED, ("4.42 m", "≤ 8.29 m")), (STALL, ("14.2 m/s", "≥ 9.5 m/s")), (DESCENT, ("-7.04°", "≥ -7.02°"))],
+)
+def test_a_limit_is_stated_with_its_side_and_its_tolerance(finding: Finding, texts: tuple[str, str]) -> None:
+    assert finding.compared_texts() == texts
+    verdict = Verdict((finding,), flyable=False, complete=True, lines=("",), level="flown")
+    shown = texts[1].replace("-", "\N{MINUS SIGN}").replace(" ", "\u00a0", 1)
+    assert finding_document(finding).passes == texts[1]
+    assert finding_rows([finding])[0].limit.split()[0] == shown.split("\u00a0")[0]
+    assert f"{texts[0]} (limit {texts[1]}" in "\n".join(verdict_lines(verdict, ()))
+
+
+@pytest.mark.parametrize("beyond", [0.04, 0.004, 0.0004, 0.00004])
+@pytest.mark.parametrize("planned", [-7.0, -0.5, 34.0, 1234.0])
+def test_a_failing_number_never_looks_like_its_limit(planned: float, beyond: float) -> None:
+    """In headline, terminal, report and studio; a descent and a climb."""
+    value = math.copysign(abs(planned) + beyond, planned)
+    failed = make_finding(
+        "slope",
+        leg(1),
+        ok=False,
+        reason="",
+        planned=value,
+        limit=planned,
+        margin=-beyond,
+        unit="deg",
+        at_least=planned < 0.0,
+    )
+    shown, passes = failed.compared_texts()
+    assert shown != passes[2:]
+    left, right = re.split(" [<>] ", RULE_WORDS["slope"].phrase("slope", failed).partition("(")[2].rstrip(")"))
+    assert left != right
+    (row,) = finding_rows([failed])
+    assert row.planned != row.limit[2:]
+
 
 LONGER = Change("length", leg(1), 150.0, 300.0, "m")
 

@@ -16,10 +16,10 @@ def test_each_rule_has_a_row_and_each_autopilot_a_column() -> None:
     flies = Verdict(good, flyable=False, complete=True, lines=("in part",), level="flown", unjudged="terrain")
     fails = Verdict(bad, flyable=False, complete=True, lines=("not flyable", "105 would pass"), level="flown")
     assert autopilot_lines({"ardupilot": flies, "px4-1.17": fails}) == [
-        "             ardupilot   px4-1.17",
-        "  verdict    undecided   not flyable",
+        "             ardupilot           px4-1.17",
+        "  verdict    not judged in full  not flyable",
         "  clearance  not judged",
-        "  corridor   2 ok        1 of 2 failed",
+        "  corridor   2 ok                1 of 2 failed",
         "ardupilot: in part",
         "px4-1.17: not flyable; 105 would pass",
     ]

@@ -80,7 +80,7 @@ def test_failures_stand_below_the_summary_with_what_would_pass(capsys: pytest.Ca
     assert lines[1] == "  failed  slope at leg 1: leg 1 is as it is"
     assert lines[2].endswith("would pass: make leg 1 400 m long instead of 300 m")
     # Of 5 and 7.5 and 9 against 8 the last has the least margin.
-    assert "2 of 3 ok; furthest beyond its limit at leg 1: slope 9° (limit 8°, aircraft)" in lines[3]
+    assert "2 of 3 ok; furthest beyond its limit at leg 1: slope 9° (limit ≤ 8.1°, aircraft)" in lines[3]
     assert lines[-1] == "  note    gusty"
 
 
@@ -89,7 +89,7 @@ def test_large_numbers_stand_without_a_power_of_ten(
     capsys: pytest.CaptureFixture[str], flown: float, limit: float
 ) -> None:
     lines = printed(capsys, Verdict((slope(0, flown, limit),), True, True, ("flyable",), "flown"))
-    assert lines[1].endswith(f"leg 0: slope {round(flown)}° (limit {round(limit)}°, aircraft)")
+    assert lines[1].endswith(f"leg 0: slope {round(flown)}° (limit ≤ {round(limit)}°, aircraft)")
 
 
 def test_failures_of_one_rule_are_one_paragraph_the_worst_first(capsys: pytest.CaptureFixture[str]) -> None:

@@ -187,8 +187,8 @@ def test_verdict_comes_first_then_what_fails() -> None:
         "2 of 3 judged findings hold, 1 fails; 1 could not be judged",
         "Start: in the air",
         "What fails",
-        "leg 1, slope: flown 11.2°, limit 7.80° (aircraft), beyond it by 3.45°; why leg 1",
-        "Would pass: at most 7.80° (misses by 3.45°).",
+        "leg 1, slope: flown 11.2°, limit ≤ 7.90° (aircraft); why leg 1",
+        "Would pass: at most 7.90° (misses by 3.35°).",
         "item 9: no loiter",
         "By rule",
         "Leg by leg",
@@ -199,11 +199,11 @@ def test_verdict_comes_first_then_what_fails() -> None:
     assert positions == sorted(positions)
     tables = [row for row in page.rows if row[0] in ("fail", "pass", "unjudged") and len(row[1]) == 10]
     assert [state for state, _ in tables] == ["fail", "pass", "pass", "unjudged"]
-    assert tables[0][1][:9] == ["leg 1", "slope", "✗ fails", "4.00", "11.2", "7.80", "−3.45", "°", "aircraft"]
+    assert tables[0][1][:9] == ["leg 1", "slope", "✗ fails", "4.00", "11.2", "≤\u00a07.90", "−3.35", "°", "aircraft"]
     assert "no scenario was given" in tables[3][1][9]
     rules = [cells for state, cells in page.rows if state and len(cells) == 9]
-    assert rules[1] == ["slope", "✗ fails", "1 of 2 fail", "leg 1", "4.00", "11.2", "7.80", "−3.45", "°"]
-    assert rules[2] == ["bounds", "? not judged", "1 not judged", "no scenario was given", "–", "–", "–", "–", ""]
+    assert rules[1] == ["slope", "✗ fails", "1 of 2 fail", "leg 1", "4.00", "11.2", "≤\u00a07.90", "−3.35", "°"]
+    assert rules[2] == ["bounds", "– not judged", "1 not judged", "no scenario was given", "–", "–", "–", "–", ""]
 
 
 @pytest.mark.usefixtures("undrawn")
