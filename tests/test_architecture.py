@@ -33,7 +33,6 @@ LONGER = {
     "flight/guidance/path.py:fly_by_path": 62,
     "flight/simulation/simulate.py:make_loop": 98,
     "logs/verdict/returns/glide_reach.py:_look_ahead": 66,
-    "logs/verdict/rules/completion_rule.py:imported_completion": 61,
     "logs/verdict/rules/loiter_rule.py:_loiter_finding": 68,
     "logs/views/exports/log_files.py:_topics": 100,
     "planfly/api/identifying.py:identify_aircraft": 61,

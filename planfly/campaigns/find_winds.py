@@ -11,10 +11,10 @@ from logs.verdict.conditions import Conditions
 from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.dispersions import standard_draws, standard_population
+from planfly.campaigns.failure_counts import RuleFailures, count_failures
 from planfly.campaigns.flight_requests import FlightRequest, FlyOne, code_hash
 from planfly.campaigns.flight_row import FlightRow, fly_one
 from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, WindBoundary, needs_more, next_flights
-from planfly.campaigns.summary import RuleFailures, count_failures
 from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, FlownFlight, StoreError, WindsStore, kept_settings
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
 

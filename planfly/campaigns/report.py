@@ -22,6 +22,7 @@ from logs.views.drawing import page_svg, png_bytes
 from logs.views.report.page import page_template
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import BY_NAME
+from planfly.campaigns.failure_counts import failure_lines, failures_document
 from planfly.campaigns.find_winds import ACCURACY, CALM_MPS, FEWEST, CalmFailures, WindsFound
 from planfly.campaigns.flight_row import STATIONS, FlightRow, fly_one
 from planfly.campaigns.fly_campaign import open_store
@@ -43,8 +44,6 @@ from planfly.campaigns.summary import (
     CampaignSummary,
     campaign_lines,
     closest_text,
-    failure_lines,
-    failures_document,
     log_name,
     summarise,
     summary_json,

@@ -2,8 +2,6 @@
 
 import json
 import math
-from collections import Counter
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -15,6 +13,7 @@ from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import place_text
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import BY_NAME
+from planfly.campaigns.failure_counts import RuleFailures, count_failures, failure_lines, failures_document
 from planfly.campaigns.flight_row import FlightRow, scaled
 from planfly.campaigns.statistics.decision import Estimate, Goal, first_order, rank_slope
 from planfly.campaigns.tables import Store
@@ -25,15 +24,6 @@ SCHEMA = "planfly.campaign-summary/1"
 _MIN_NAMED_FRACTION = 0.05
 # Number of worst flights with a log.
 WORST = 10
-
-
-@dataclass(frozen=True)
-class RuleFailures:
-    """Number of flights that failed a rule, in total and at each place; a flight may fail at several places."""
-
-    rule: str
-    flights: int
-    places: tuple[tuple[Place, int], ...]
 
 
 @dataclass(frozen=True)
@@ -101,45 +91,6 @@ def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) 
 def _failures(store: Store) -> tuple[RuleFailures, ...]:
     listed = map(json.loads, store.texts("failed"))
     return count_failures([(entry.pop("rule"), Place(**entry)) for entry in failed] for failed in listed)
-
-
-def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[RuleFailures, ...]:
-    """Count flights by failed rule and place, from the failed rules and places of each flight.
-
-    >>> [one.flights for one in count_failures([[("slope", Place("leg", 1)), ("slope", Place("leg", 2))], []])]
-    [1]
-    """
-    counts: Counter[str] = Counter()
-    places: dict[str, Counter[Place]] = {}
-    for flight in flights:
-        failed = list(flight)
-        counts.update({rule for rule, _ in failed})
-        for rule, place in failed:
-            places.setdefault(rule, Counter())[place] += 1
-    return tuple(
-        RuleFailures(rule, counts[rule], tuple(places[rule].most_common())) for rule in RULE_WORDS if counts[rule]
-    )
-
-
-def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:
-    """Return failures by rule and place for a JSON document."""
-    return [
-        {
-            "rule": one.rule,
-            "flights": one.flights,
-            "places": [{"where": place_text(place), "flights": n, **asdict(place)} for place, n in one.places],
-        }
-        for one in by_rule
-    ]
-
-
-def failure_lines(by_rule: Iterable[RuleFailures]) -> list[str]:
-    """Return a line for each failed rule: the number of flights, and the places where most of them failed."""
-    lines = []
-    for one in by_rule:
-        where = ", ".join(f"{place_text(place)} in {n}" for place, n in one.places[:3])
-        lines.append(f"  failed  {RULE_WORDS[one.rule].title} in {one.flights}: {where}")
-    return lines
 
 
 def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str, float | None]:

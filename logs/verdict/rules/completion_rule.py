@@ -122,18 +122,13 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
     else:
         last = flown[-1]
         what = f"{finished} of {every} legs flown"
+        ending = f"{stretch_end_text(last.stretch)}, on the way to {_next_waypoint_text(setup, last)}"
         if _ends_in_return(setup, last):
             known.append(f"{what}, and the return that the mission ends with begun at {last.stretch.end:.1f} s")
         elif last.stretch.ended == "log":
-            unknown.append(
-                f"{stretch_end_text(last.stretch)}, on the way to {_next_waypoint_text(setup, last)}: {what}"
-            )
+            unknown.append(f"{ending}: {what}")
         else:
-            faults.append(
-                message(
-                    f"{stretch_end_text(last.stretch)}, on the way to {_next_waypoint_text(setup, last)}", f": {what}"
-                )
-            )
+            faults.append(message(ending, f": {what}"))
     unknown += [f"the way to item {stop.item} is not judged: it is not laid out" for stop in setup.route.unjoined]
     known += _gaps_text(flown)
     return make_finding(

@@ -149,15 +149,10 @@ def _loiter_finding(
     tightest = float(requirements.tightest[inner].max()) if known else math.nan
     bad = [item for item in at if item.ok is False]
     at_middle = requirements.setup.autopilot.loiter_rules.at_middle
-    if at_middle:
-        missed = (
-            not _uses_parameter_radius(requirements, circle)
-            if aligned is None
-            else not _reached(requirements, aligned, circle)
-        )
-        bad = bad if missed else []
-    faults = _too_small(requirements, circle, tightest) if known else []
     own = _uses_parameter_radius(requirements, circle)
+    if at_middle and (own if aligned is None else _reached(requirements, aligned, circle)):
+        bad = []
+    faults = _too_small(requirements, circle, tightest) if known else []
     facts = [f"{circle.turns:.2f} turns with {circle.radius:.0f} m"]
     open_text, name = "", requirements.setup.autopilot.loiter_rules.radius_name
     if own and faults and math.isfinite(tightest):

@@ -55,8 +55,7 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
     command = float(requirements.setup.route.airspeed[leg])
     true = "" if command == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
     notes = [f"{command:.1f} m/s{true} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"]
-    notes += _speed_range_notes(requirements, command)
-    notes += _short_leg_notes(requirements, leg, commanded)
+    notes += [*_speed_range_notes(requirements, command), *_short_leg_notes(requirements, leg, commanded)]
     margin = min(commanded - slowest, fastest - commanded)
     at_least = commanded - slowest <= fastest - commanded
     limit = slowest if at_least else fastest
@@ -83,8 +82,7 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
             if not faults and (unheld := _find_held_speed(requirements, aligned, leg, wanted)):
                 # From here on the flown speed is judged by its command, no longer the command by the envelope.
                 mean, allowed, source = unheld.speed, unheld.allowed, "mission"
-                at_least = mean < wanted
-                limit = wanted + math.copysign(allowed, mean - wanted)
+                limit, at_least = wanted + math.copysign(allowed, mean - wanted), mean < wanted
                 margin, tolerance = allowed - abs(mean - wanted), unheld.tolerance
                 faults.append(message(f"{mean:.1f} m/s held of the commanded {wanted:.1f} m/s"))
         facts.append(Fact("speed error", mean - commanded, "m/s"))

@@ -15,6 +15,7 @@ from logs.verdict.places import Place
 from planfly.campaigns import find_winds as find_winds_module
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.dispersions import default_dispersions
+from planfly.campaigns.failure_counts import RuleFailures
 from planfly.campaigns.find_winds import (
     SEARCHED_QUANTITIES,
     CalmFailures,
@@ -28,7 +29,6 @@ from planfly.campaigns.find_winds import (
 from planfly.campaigns.flight_requests import FlyOne
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.report import wind_lines
-from planfly.campaigns.summary import RuleFailures
 from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, FlownFlight, StoreError
 from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, workers_killed

@@ -10,6 +10,7 @@ import pytest
 
 from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.failure_counts import RuleFailures
 from planfly.campaigns.find_winds import FEWEST, CalmFailures, WindsFound, WindsGoal
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.fly_campaign import open_store
@@ -25,7 +26,7 @@ from planfly.campaigns.report import (
 )
 from planfly.campaigns.statistics.decision import Estimator, Goal
 from planfly.campaigns.statistics.wind_boundary import WindBoundary
-from planfly.campaigns.summary import RuleFailures, campaign_lines
+from planfly.campaigns.summary import campaign_lines
 from planfly.campaigns.tables import DATABASE, StoreError
 from tests.planfly.campaigns.made_campaigns import all_fly, made_flight
 from tests.planfly.campaigns.made_report import made_report
