@@ -200,6 +200,14 @@ def test_a_waypoint_is_dragged_judged_flown_and_undone(page: Browser) -> None:
     assert page.problems == []
 
 
+def test_header_and_cards_say_the_same_words(page: Browser) -> None:
+    words = "[...document.querySelectorAll({})].map((one) => one.textContent.replace(/[: ]+/, ': '))"
+    header = page.value(words.format("'.answer'"))
+    assert len(header) == 2
+    assert header[1] != "Flown: not yet"
+    assert page.value(words.format("'#panel-verdict > .card > h2'"))[:2] == header
+
+
 def test_a_drag_is_taken_back_by_escape(page: Browser) -> None:
     place = centre(page, ".mark .dot", 2)
     drag(page, place, (60.0, 0.0), let_go=False)
