@@ -17,6 +17,7 @@ from platformdirs import user_cache_dir
 
 from world.compile_events import kernel_is_compiled
 from world.kernel_cache import usable_folder, wanted_folder
+from world.kernel_files import check_files
 from world.kernel_saves import CacheWriteLock
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
@@ -110,7 +111,10 @@ def inlined(kernel: _Kernel) -> _Kernel:
 def _compiled(kernel: Any, **options: bool) -> Any:
     njit: Any = numba.njit
     # The wrapper for C is only needed to pass a kernel to another one as a value, which no kernel here does.
-    return njit(cache=_usable is not None, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
+    dispatcher = njit(cache=_usable is not None, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
+    if _usable is not None:
+        check_files(dispatcher)
+    return dispatcher
 
 
 class _InnerKernel:
