@@ -74,7 +74,7 @@ class ScenarioTable(BaseModel):
 # ----------------------------------------------------------------------
 # [[zones]] of a scenario file as a pydantic model.
 
-# Maximum number of corners of a ring.
+# Maximum number of corners of a zone.
 MAX_CORNERS = 100_000
 # Maximum number of rings of a zone.
 MAX_RINGS = 1_000
@@ -143,6 +143,9 @@ class ZoneTable(ScenarioTable):
         given = [key for key in shapes if getattr(self, key) is not None]
         if len(given) != 1:
             raise ValueError(f"polygon_m: give one of {', '.join(shapes)}, not {len(given)}")
+        corners = sum(map(len, self.rings_m or self.rings_deg or ()))
+        if corners > MAX_CORNERS:
+            raise ValueError(f"{given[0]}: {corners:,} corners: at most {MAX_CORNERS:,} are allowed in one zone")
         metres = (self.east_m is not None, self.north_m is not None)
         degrees = (self.lat_deg is not None, self.lon_deg is not None)
         if self.radius_m is None:

@@ -16,11 +16,14 @@ from world.airspace.zone_times import BY_NOTAM, OPEN, parse_period
 from world.airspace.zones import band_outline
 from world.errors import ScenarioError
 from world.frames import GeoOrigin, to_geo, to_map
+from world.scenario_tables import MAX_CORNERS
 
 # m.
 NAUTICAL_MILE = 1852.0
 # Largest distance between an arc and its chords, m.
 ARC_BEND = 1.0
+# Largest radius and width, nautical miles: half the circumference of the Earth.
+MAX_LENGTH_NMI = 10_800.0
 # Classes of airspace that require no clearance.
 _FREE_CLASSES = ("E", "F", "G", "UNC", "W", "GSEC", "FIR", "UIR", "FIS")
 # Types of airspace that require no clearance either.
@@ -137,7 +140,10 @@ def _airway_rings(block: _Block, source: str) -> list[list[_Place]]:
         raise ScenarioError(f"{source}: DY: an airway has at least two points, and a width before (V W=)", file=source)
     origin = GeoOrigin(*block.airway[0])
     east, north = to_map(origin, [lat for lat, _ in block.airway], [lon for _, lon in block.airway])
-    outline = band_outline(list(zip(east.tolist(), north.tolist(), strict=True)), block.width)
+    try:
+        outline = band_outline(list(zip(east.tolist(), north.tolist(), strict=True)), block.width)
+    except ValueError as error:
+        raise ScenarioError(f"{source}: DY: {error}", file=source, field="DY", allowed=str(error)) from error
     lat, lon = to_geo(origin, [at[0] for at in outline], [at[1] for at in outline])
     return [list(zip(lat.tolist(), lon.tolist(), strict=True))]
 
@@ -190,25 +196,25 @@ def _variable(block: _Block, text: str) -> None:
             raise ValueError("allowed D=+ (clockwise) or D=-")
         block.clockwise = value == "+"
     elif name.upper() == "W":
-        block.width = _number(value) * NAUTICAL_MILE
+        block.width = _length(value)
 
 
 def _corner(block: _Block, text: str) -> None:
-    block.corners.append(_place(text))
+    _add_corners(block.corners, [_place(text)])
 
 
 def _circle(block: _Block, text: str) -> None:
     if block.circle is not None:
         raise ValueError("an airspace has one circle")
-    block.circle = _centre(block), _number(text) * NAUTICAL_MILE
+    block.circle = _centre(block), _length(text)
 
 
 def _arc_by_bearings(block: _Block, text: str) -> None:
     parts = text.split(",")
     if len(parts) != 3:
         raise ValueError("radius, first and last bearing are expected: 5, 270, 290")
-    radius, first, last = (_number(part) for part in parts)
-    block.corners += _arc(_centre(block), (radius * NAUTICAL_MILE,) * 2, first, last, block.clockwise)
+    radius, first, last = _length(parts[0]), _number(parts[1]), _number(parts[2])
+    _add_corners(block.corners, _arc(_centre(block), (radius, radius), first, last, block.clockwise))
 
 
 def _arc_by_points(block: _Block, text: str) -> None:
@@ -219,11 +225,17 @@ def _arc_by_points(block: _Block, text: str) -> None:
     (first, near), (last, far) = (_polar(centre, place) for place in found)
     # The end points are kept as stated, even if they do not agree with the centre.
     arc = _arc(centre, (near, far), first, last, block.clockwise)
-    block.corners += [found[0], *arc[1:-1], found[1]]
+    _add_corners(block.corners, [found[0], *arc[1:-1], found[1]])
 
 
 def _airway(block: _Block, text: str) -> None:
-    block.airway.append(_place(text))
+    _add_corners(block.airway, [_place(text)])
+
+
+def _add_corners(corners: list[_Place], more: list[_Place]) -> None:
+    if len(corners) + len(more) > MAX_CORNERS:
+        raise ValueError(f"more corners than a zone may have: at most {MAX_CORNERS:,}")
+    corners += more
 
 
 def _text(name: str) -> Callable[[_Block, str], None]:
@@ -260,6 +272,14 @@ def _number(text: str) -> float:
     if not 0.0 <= value < math.inf:
         raise ValueError("a number from 0 on is expected")
     return value
+
+
+def _length(text: str) -> float:
+    """Parse a length in nautical miles; return it in m."""
+    length = _number(text)
+    if length > MAX_LENGTH_NMI:
+        raise ValueError(f"allowed 0..{MAX_LENGTH_NMI:g} nautical miles")
+    return length * NAUTICAL_MILE
 
 
 def _place(text: str) -> _Place:

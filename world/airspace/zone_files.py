@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from world.airspace.edge_checks import MAX_CROSSINGS
 from world.airspace.geopackage import geopackage_features
 from world.airspace.openair import is_openair, openair_zones
 from world.airspace.uas_zones import ed269_zones, ed318_zones, is_ed269, is_ed318
@@ -107,9 +108,7 @@ def _geojson_zone(feature: Any, where: str, number: int, source: str) -> tuple[s
             coordinates, kind = [coordinates], "MultiPolygon"
         if kind == "MultiPolygon":
             parts = [_rings(part) for part in coordinates]
-            if not all(holes_lie_inside(part) for part in parts if part):
-                message = f"{source}: {label}: coordinates: a hole lies outside its outline"
-                raise ScenarioError(message, file=source, field="coordinates")
+            _check_holes(parts, f"{source}: {label}")
             rings = [[list(corner) for corner in ring] for part in parts for ring in part]
             return label, entries | {"rings_deg": rings}
     except (TypeError, ValueError, IndexError) as error:
@@ -119,6 +118,17 @@ def _geojson_zone(feature: Any, where: str, number: int, source: str) -> tuple[s
     allowed = "a Polygon, MultiPolygon or Point is expected"
     message = f"{source}: {label}: geometry {json.dumps(kind)[:40]}: {allowed}"
     raise ScenarioError(message, file=source, field="geometry", value=kind, allowed=allowed)
+
+
+def _check_holes(parts: list[list[list[tuple[float, float]]]], source: str) -> None:
+    """Raise ScenarioError if a hole of a polygon lies outside its outline."""
+    try:
+        inside = all(holes_lie_inside(part) for part in parts if part)
+    except ValueError as error:
+        raise ScenarioError(f"{source}: coordinates: {error}", file=source, field="coordinates") from error
+    if not inside:
+        message = f"{source}: coordinates: a hole lies outside its outline"
+        raise ScenarioError(message, file=source, field="coordinates")
 
 
 def _rings(coordinates: Any) -> list[list[tuple[float, float]]]:
@@ -284,6 +294,8 @@ _TURNED = "lower and upper limits that stand the wrong way round are swapped"
 _NO_BAND = "upper limits of 0, or equal to the lower one, are taken for none: no ceiling"
 # Maximum size of a file, bytes.
 MAX_BYTES = 64 * 2**20
+# Maximum number of corners of all zones of a file: arcs of OpenAir make hundreds of corners of a few bytes.
+MAX_FILE_CORNERS = 1_500_000
 
 
 @dataclass(slots=True)
@@ -343,6 +355,7 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
         raise ScenarioError(message, file=source, field="suffix", value=path.suffix, allowed=allowed)
     read, free = FileZones(), Counter[str]()
     mended: dict[str, list[str]] = {_CROSSED: [], _TURNED: [], _NO_BAND: [], _EMPTY: []}
+    corners = crossings = 0
     for where, entries in _found(path, suffix, source):
         if isinstance(entries, str):
             free[entries] += 1
@@ -350,7 +363,12 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
         if len(read.zones) >= most:
             message = f"{source}: more zones than may be: at most {MAX_ZONES:,} in all files"
             raise ScenarioError(message, file=source, field="zones", allowed=f"at most {MAX_ZONES:,}")
-        done = _mend(entries)
+        corners += sum(map(len, entries.get("rings_deg", ())))
+        if corners > MAX_FILE_CORNERS:
+            allowed = f"at most {MAX_FILE_CORNERS:,}"
+            raise ScenarioError(f"{source}: more corners than may be: {allowed}", file=source, allowed=allowed)
+        done, repaired = _mend(entries, MAX_CROSSINGS - crossings, f"{source}: {where}")
+        crossings += repaired
         for one in done:
             mended[one].append(str(entries["name"]))
         if _EMPTY in done:
@@ -370,17 +388,23 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
     return read
 
 
-def _mend(entries: dict[str, Any]) -> list[str]:
-    """Repair the outline of an authority's zone and return the notes about it.
+def _mend(entries: dict[str, Any], most: int, source: str) -> tuple[list[str], int]:
+    """Repair the outline of an authority's zone; return the notes about it and the number of its crossings.
 
-    Leave other zones as they are.
+    Leave other zones as they are.  most: maximum number of crossings; more raise ScenarioError.
     """
     published = entries.pop(PUBLISHED, False)
     words = [said for mark, said in ((UPSIDE_DOWN, _TURNED), (NO_BAND, _NO_BAND)) if entries.pop(mark, False)]
-    if published and "rings_deg" in entries and (rings := mended_rings(entries["rings_deg"])) is not None:
-        words.append(_CROSSED if rings else _EMPTY)
-        entries["rings_deg"] = rings
-    return words
+    if not published or "rings_deg" not in entries:
+        return words, 0
+    try:
+        repaired = mended_rings(entries["rings_deg"], most)
+    except ValueError as error:
+        raise ScenarioError(f"{source}: {error}", file=source, field="rings_deg", allowed=str(error)) from error
+    if repaired is None:
+        return words, 0
+    entries["rings_deg"], crossings = repaired
+    return [*words, _CROSSED if entries["rings_deg"] else _EMPTY], crossings
 
 
 def _found(path: Path, suffix: str, source: str) -> Iterator[Found]:

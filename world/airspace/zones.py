@@ -14,6 +14,8 @@ from typing import Literal
 import numpy as np
 import shapely
 
+from world.airspace.edge_checks import MAX_CROSSINGS, check_edges, count_crossings
+
 ZoneKind = Literal["inclusion", "exclusion"]
 Datum = Literal["amsl", "ground"]
 # Corners, (east, north) m; the last corner is joined to the first, which is not repeated.
@@ -83,7 +85,7 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
 
     A place is inside if an odd number of rings contain it.  A corner that repeats the previous corner, or closes a
     ring, is left out.  Raises ValueError for a ring of fewer than three corners, for a ring that crosses itself, for
-    rings that cross each other, and for a polygon of no area.
+    rings that cross each other, for a polygon of no area, and for too many corners or edges (`check_edges`).
 
     >>> make_polygon([[(0.0, 0.0), (0.0, 90.0), (90.0, 90.0), (90.0, 0.0), (0.0, 0.0)]]).rings
     (((90.0, 0.0), (90.0, 90.0), (0.0, 90.0), (0.0, 0.0)),)
@@ -91,6 +93,7 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
     if not rings:
         raise ValueError("no corners: at least three are needed")
     cleaned = [_cleaned(ring) for ring in rings]
+    check_edges(cleaned)
     shapes = [shapely.Polygon(ring) for ring in cleaned]
     for shape in shapes:
         if not shape.is_valid:
@@ -163,10 +166,15 @@ def is_hole(ring: Ring) -> bool:
 def band_outline(corners: Sequence[tuple[float, float]], width: float) -> list[tuple[float, float]]:
     """Return the outline of a band of this width along a line, with half circles at its ends, m.
 
+    Raises ValueError for a line that crosses itself too often.
+
     >>> outline = band_outline([(0.0, 0.0), (0.0, 90.0)], 20.0)
     >>> min(north for _, north in outline), max(east for east, _ in outline)
     (-10.0, 10.0)
     """
+    check_edges([corners], closed=False)
+    if count_crossings([corners], MAX_CROSSINGS, closed=False) > MAX_CROSSINGS:
+        raise ValueError(f"it crosses itself more than {MAX_CROSSINGS:,} times")
     band = shapely.LineString(corners).buffer(0.5 * width, cap_style="round", join_style="mitre")
     return [(float(east), float(north)) for east, north in band.exterior.coords[:-1]]
 
@@ -176,15 +184,21 @@ def band_outline(corners: Sequence[tuple[float, float]], width: float) -> list[t
 MENDED_BY = 1e-6
 
 
-def mended_rings(rings: Sequence[Sequence[Sequence[float]]]) -> list[list[list[float]]] | None:
-    """Repair rings that cross: return the rings of the enclosed area, empty for an outline of no area.
+def mended_rings(
+    rings: Sequence[Sequence[Sequence[float]]], most: int = MAX_CROSSINGS
+) -> tuple[list[list[list[float]]], int] | None:
+    """Repair rings that cross: return the rings of the enclosed area, and the number of crossings of their edges.
+
+    The rings are empty for an outline of no area.
 
     rings: rings of [latitude, longitude], the outline first.  A ring that is not inside another one is a part of the
     area, not a hole; a ring of fewer than three different corners is dropped.  The area grows by `MENDED_BY` on all
-    sides.  Returns None if there is nothing to repair.
+    sides.  Returns None if there is nothing to repair.  Raises ValueError for more crossings than ``most``, and for too
+    many corners or edges (`check_edges`).
 
-    >>> len(mended_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]]))  # both halves of a bow tie, joined in the middle
-    1
+    >>> made, crossings = mended_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]])
+    >>> len(made), crossings  # both halves of a bow tie, joined in the middle
+    (1, 1)
     >>> mended_rings([[[0, 0], [2, 0], [2, 2]]]) is None
     True
     """
@@ -192,16 +206,20 @@ def mended_rings(rings: Sequence[Sequence[Sequence[float]]]) -> list[list[list[f
         return None
     if any(len(set(map(tuple, ring))) < 3 for ring in rings):
         whole = [[list(at) for at in ring] for ring in rings if len(set(map(tuple, ring))) > 2]
-        again = mended_rings(whole) if whole else None
-        return whole if again is None else again
+        again = mended_rings(whole, most) if whole else None
+        return (whole, 0) if again is None else again
+    check_edges(rings)
     if shapely.Polygon(rings[0], rings[1:]).is_valid:
         return None
+    crossings = count_crossings(rings, most)
+    if crossings > most:
+        raise ValueError(f"more crossings than can be repaired: at most {MAX_CROSSINGS:,} in a file")
     made = _enclosed([shapely.Polygon(ring) for ring in rings])
     grown = made.buffer(MENDED_BY, join_style="mitre") if made.area > 0.0 else made
     parts = [one for one in shapely.get_parts(grown) if isinstance(one, shapely.Polygon) and not one.is_empty]
     return [
         [list(corner) for corner in ring.coords[:-1]] for part in parts for ring in (part.exterior, *part.interiors)
-    ]
+    ], crossings
 
 
 def _enclosed(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
@@ -235,6 +253,8 @@ def _enclosed(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
 def holes_lie_inside(rings: Sequence[Sequence[tuple[float, float]]]) -> bool:
     """Return True if all rings but the first are within the first, or if a ring is invalid (see `make_polygon`).
 
+    Raises ValueError for too many corners or edges (`check_edges`).
+
     >>> square = [(0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0)]
     >>> holes_lie_inside([square, [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)]])
     True
@@ -243,5 +263,7 @@ def holes_lie_inside(rings: Sequence[Sequence[tuple[float, float]]]) -> bool:
     """
     if any(len(ring) < 3 for ring in rings):
         return True
+    check_edges(rings)
     outline, *holes = (shapely.Polygon(ring) for ring in rings)
+    shapely.prepare(outline)
     return not all(ring.is_valid for ring in (outline, *holes)) or all(outline.covers(hole) for hole in holes)

@@ -10,7 +10,7 @@ from world.airspace.zones import Cylinder, Polygon, Ring, Zone, ZoneLevel, is_ho
 from world.arrays import Floats
 from world.errors import ScenarioError
 from world.frames import GeoOrigin, to_map
-from world.scenario_tables import ZoneTable
+from world.scenario_tables import MAX_CORNERS, ZoneTable
 from world.terrain import Terrain
 
 # ----------------------------------------------------------------------
@@ -21,6 +21,8 @@ from world.terrain import Terrain
 EDGE_BEND = 0.1
 # Maximum number of pieces of an edge.
 _MAX_PIECES = 2_000
+# Maximum number of corners of all zones on a map, including the inserted corners.
+MAX_MAP_CORNERS = 2_000_000
 
 
 def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
@@ -28,6 +30,7 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
 
     Between two corners a ring is straight in degrees, as in GeoJSON (RFC 7946, 3.1.1) and in the fences of autopilots;
     where that is not straight on the map, corners are inserted.  The longitude takes the shorter direction.
+    Raises ValueError for edges so long that they need too many corners.
 
     >>> origin = GeoOrigin(46.0, 8.0)
     >>> len(ring_on_map(origin, [(46.0, 8.0), (46.0, 8.01), (46.01, 8.0)]))
@@ -45,6 +48,8 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
     off = np.hypot(middle[0] - 0.5 * (east + np.roll(east, -1)), middle[1] - 0.5 * (north + np.roll(north, -1)))
     # The bend of a piece is proportional to the square of its length.
     pieces = np.clip(np.ceil(np.sqrt(off / EDGE_BEND)), 1, _MAX_PIECES).astype(int)
+    if pieces.sum() > MAX_CORNERS:
+        raise ValueError(f"edges too long: {pieces.sum():,} corners on the map; at most {MAX_CORNERS:,} are allowed")
     lats, lons = [], []
     for k, count in enumerate(pieces.tolist()):
         shares = np.arange(count) / count
@@ -54,17 +59,30 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
     return list(zip(east.tolist(), north.tolist(), strict=True))
 
 
+def add_corners(count: int, shape: Polygon | Cylinder) -> int:
+    """Return a number of corners increased by the corners of a shape; raise ValueError above `MAX_MAP_CORNERS`.
+
+    >>> add_corners(4, make_polygon([[(0.0, 0.0), (90.0, 0.0), (90.0, 90.0)]])), add_corners(4, Cylinder(0.0, 0.0, 9.0))
+    (7, 4)
+    """
+    count += 0 if isinstance(shape, Cylinder) else sum(map(len, shape.rings))
+    if count > MAX_MAP_CORNERS:
+        raise ValueError(f"too many corners on the map: at most {MAX_MAP_CORNERS:,} are allowed in all zones")
+    return count
+
+
 def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> tuple[Zone, ...]:
     """Place the zones of a scenario file on its map.
 
     source: name of the file in messages.  Raises ScenarioError for an invalid shape, and for a level above ground
     without terrain.
     """
-    zones = []
+    zones, corners = [], 0
     for k, table in enumerate(tables):
         label = f"{source}: zones[{k}] ({table.name})"
         try:
             shape = _shape(table, origin)
+            corners = add_corners(corners, shape)
         except ValueError as error:
             raise ScenarioError(f"{label}: {error}", file=source, field=f"zones[{k}]") from error
         floor = _level(table.floor_amsl_m, table.floor_agl_m)
