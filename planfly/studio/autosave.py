@@ -9,16 +9,20 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from flight.mission.items import Home, Mission, MissionItem
+from flight.mission.items import MAX_BYTES, Home, Mission, MissionItem, item_problem
 from planfly.studio.documents import planned_mission
 from planfly.studio.edit_context import EditContext
+from planfly.studio.pilot import INTERNAL
 from planfly.studio.settings import SetParameters
 from planfly.studio.view_model import Json
 from planner.plan import Plan, parse_plan, plan_json
 from world.errors import PlanflyError
+from world.files import read_small_file, utf8_text
 from world.scenario import Scenario, from_spec
 
 _SCHEMA = "planfly.studio/1"
+# Maximum size of an autosave, bytes: two missions, a plan and the settings.
+_MAX_BYTES = 4 * MAX_BYTES
 # Tables of a scenario that the studio changes.
 _SAVED_TABLES = ("wind", "flight", "limits", "area")
 
@@ -45,17 +49,19 @@ def kept_text(desk: EditContext, first: Mission, mission: Mission, plan: Plan | 
 
 
 def read_kept(file: Path, desk: EditContext, first: Mission) -> tuple[Mission, EditContext] | None:
-    """Return the saved mission and its editing context; None if this document was not changed.
+    """Return the saved mission and its editing context; None if this document was not changed, or there is no file.
 
-    Raises OSError, ValueError, LookupError, TypeError or PlanflyError for a file that cannot be read.
+    Raises one of `INTERNAL` or PlanflyError for a file that cannot be read.
     """
-    data = json.loads(file.read_text(encoding="utf-8"))
+    if not file.exists():
+        return None
+    data = json.loads(utf8_text(read_small_file(file, _MAX_BYTES, "session", PlanflyError), file, PlanflyError))
     if data["schema"] != _SCHEMA or data["first"] != mission_data(first):
         return None
     mission = first if data["mission"] == data["first"] else mission_from(data["mission"], first)
     try:
         found = _with_plan(_with_settings(desk, data), mission, data)
-    except (ValueError, LookupError, TypeError, PlanflyError):
+    except (*INTERNAL, PlanflyError):
         # If the settings cannot be restored, the edited mission still is.
         found = mission, desk
     return None if found[0] is first and found[1] is desk else found
@@ -109,7 +115,10 @@ def mission_data(mission: Mission) -> Json:
 
 
 def mission_from(data: Json, first: Mission) -> Mission:
-    """Make a mission of its data; all other fields are taken from the first mission."""
+    """Make a mission of its data; all other fields are taken from the first mission.
+
+    Raises ValueError, LookupError or TypeError for data that `mission_data` does not make.
+    """
 
     def number(value: Any) -> float:
         return float("nan") if value is None else float(value)
@@ -119,5 +128,8 @@ def mission_from(data: Json, first: Mission) -> Mission:
         for seq, command, frame, *numbers, go_on in data["items"]
         for p in [[number(value) for value in numbers]]
     ]
+    for item in items:
+        if (problem := item_problem(item)) is not None:
+            raise ValueError(f"item {item.seq}: {problem}")
     home = data["home"]
     return replace(first, items=tuple(items), home=None if home is None else Home(*(number(one) for one in home)))

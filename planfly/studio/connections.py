@@ -1,22 +1,84 @@
-"""Connections to the studio: all except websockets of pages are closed after a few seconds."""
+"""Connections to the studio: without a token they are few, short-lived, and send little."""
 
 import asyncio
+import itertools
+from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+
+from planfly.studio.messages import MAX_FIRST
 
 # Lifetime of a connection, s.  The files of the page are read in far less; its websocket lasts as long as the page.
 LIFETIME = 10.0
+# Greatest number of connections that have not given a token; a page has a few.
+MAX_UNKNOWN = 32
+# Key in a websocket's scope of the function that allows messages of full size, once the token is given.
+WELCOME = "planfly.welcome"
+# Order in which connections were made.
+_numbers = itertools.count()
 
 
-class ShortLived(H11Protocol):
+class _Unknown:
+    """Connection that has not given a token: above `MAX_UNKNOWN` the oldest one ends.
+
+    number: its place in the order of connections, or None if it has given a token or is ending.
+    """
+
+    connections: set[Any]
+    transport: Any
+    number: int | None = None
+
+    def _take_place(self) -> None:
+        self.number = next(_numbers)
+        unknown = [one for one in self.connections if getattr(one, "number", None) is not None]
+        if len(unknown) > MAX_UNKNOWN:
+            min(unknown, key=lambda one: one.number)._drop()
+
+    def _drop(self) -> None:
+        self.number = None
+        self.transport.abort()
+
+
+class ShortLived(_Unknown, H11Protocol):
     """HTTP on a connection that ends after `LIFETIME`, so that silent ones leave their places to others."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin a connection, and schedule its end."""
         super().connection_made(transport)
+        self._take_place()
         asyncio.get_running_loop().call_later(LIFETIME, self._end, transport)
 
     def _end(self, transport: asyncio.Transport) -> None:
         # A websocket has replaced the protocol, and stays.
         if transport.get_protocol() is self:
             transport.abort()
+
+
+class FirstMessageBounded(_Unknown, WebSocketsSansIOProtocol):
+    """Websocket that reads no message above `MAX_FIRST` until the token is given."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._limit_messages(MAX_FIRST)
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Begin a connection."""
+        super().connection_made(transport)
+        self._take_place()
+
+    def handle_connect(self, event: Any) -> None:
+        """Begin a websocket, whose scope holds the function that allows messages of full size."""
+        super().handle_connect(event)
+        scope: Any = getattr(self, "scope", {})
+        scope[WELCOME] = self._welcome
+
+    def _welcome(self) -> None:
+        self.number = None
+        self._limit_messages(self.config.ws_max_size)
+
+    def _limit_messages(self, most: int) -> None:
+        # The name in websockets 16 and later, and the name before.
+        for name in ("max_message_size", "max_size"):
+            if hasattr(self.conn, name):
+                setattr(self.conn, name, most)

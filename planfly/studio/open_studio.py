@@ -30,8 +30,6 @@ USUAL_PORT = 8790
 _POLL_INTERVAL_S = 0.1
 # Time after which open requests are given up at the end, s.
 _GRACE_S = 2
-# Greatest number of connections; a page has a few.
-_MAX_SOCKETS = 32
 
 
 def _never() -> bool:
@@ -71,6 +69,8 @@ def open_studio(
         if restored:
             back = "; undo takes it back" if session.undo_text else ""
             on_message(f"what was done before is there again (kept in {kept}){back}")
+        for file in session.unreadable:
+            on_message(f"{file}: cannot be read as a kept session; it is left as it is, and nothing is kept meanwhile")
         # Imported here: only serving needs the extra.
         from planfly.studio.server import Server
 
@@ -127,7 +127,7 @@ async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], b
     import uvicorn
 
     from planfly.studio.app import make_app
-    from planfly.studio.connections import ShortLived
+    from planfly.studio.connections import FirstMessageBounded, ShortLived
     from planfly.studio.messages import MAX_DROPPED_MESSAGE, MAX_MESSAGE
 
     class Quiet(uvicorn.Server):
@@ -145,10 +145,9 @@ async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], b
         server_header=False,
         date_header=False,
         lifespan="off",
-        ws="websockets-sansio",
+        ws=FirstMessageBounded,
         ws_max_size=MAX_DROPPED_MESSAGE + MAX_MESSAGE,
         timeout_graceful_shutdown=_GRACE_S,
-        limit_concurrency=_MAX_SOCKETS,
         h11_max_incomplete_event_size=16_384,
         http=ShortLived,
     )

@@ -4,6 +4,7 @@ A task is a function with an argument that can be pickled; it reports progress r
 The process is spawned, never forked, because the server has threads.  A process that dies is started again.
 """
 
+import contextlib
 import multiprocessing
 import pickle
 import threading
@@ -97,8 +98,8 @@ class Pilot:
         return None if self._process is None else self._process.pid
 
     def start(self) -> None:
-        """Start the process before it is needed."""
-        with self._changed:
+        """Start the process before it is needed; a process that cannot be started is reported when it is needed."""
+        with self._changed, contextlib.suppress(OSError):
             self._ensure_process()
 
     def ask(self, work: Work) -> None:
@@ -146,21 +147,19 @@ class Pilot:
                 if self._closed:
                     return
                 work, self._sent = self._wanted, True
-                pipe = self._pipe if work is None else self._ensure_process()
                 self._unanswered += [] if work is None else [work.number]
-            if pipe is None:
-                continue
             try:
-                data = self._pack(work)
-            except (CancelledError, *INTERNAL) as error:
                 with self._changed:
-                    if self._closed:
-                        return
-                    if work is not None:
-                        self._unanswered = [one for one in self._unanswered if one != work.number]
-                        self._wanted = None if self._wanted is work else self._wanted
-                if work is not None:
-                    self._on_answer(Answer(work.number, "fault", internal_text(error)))
+                    pipe = self._pipe if work is None or self._closed else self._ensure_process()
+                data = b"" if pipe is None else self._pack(work)
+            except OSError as error:
+                # Too many open files, or too many processes.
+                self._give_up(work, f"the process for this cannot be started: {error.strerror}: ask again")
+                continue
+            except (CancelledError, *INTERNAL) as error:
+                self._give_up(work, internal_text(error))
+                continue
+            if pipe is None:
                 continue
             try:
                 pipe.send_bytes(data)
@@ -172,6 +171,15 @@ class Pilot:
                     if work is not None and self._wanted is work:
                         self._sent = False
                         self._unanswered = [one for one in self._unanswered if one != work.number]
+
+    def _give_up(self, work: Work | None, fault: str) -> None:
+        """Answer a task that was not sent with a fault."""
+        with self._changed:
+            if work is None or self._closed:
+                return
+            self._unanswered = [one for one in self._unanswered if one != work.number]
+            self._wanted = None if self._wanted is work else self._wanted
+        self._on_answer(Answer(work.number, "fault", fault))
 
     def _kill_if_stuck(self, pipe: Connection, number: int) -> None:
         """Kill a process that still does a cancelled task; a new process does the newest task."""
@@ -207,8 +215,13 @@ class Pilot:
         ours, theirs = context.Pipe()
         # Not a daemon: a campaign starts child processes.
         process = context.Process(target=work_on, args=(theirs,), name=self._name)
-        process.start()
-        theirs.close()
+        try:
+            process.start()
+        except OSError:
+            ours.close()
+            raise
+        finally:
+            theirs.close()
         self._process, self._pipe = process, ours
         threading.Thread(target=self._listen, args=(ours,), name=self._name, daemon=True).start()
         return ours

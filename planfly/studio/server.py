@@ -24,6 +24,7 @@ from pydantic import ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from planfly.studio import messages
+from planfly.studio.connections import WELCOME
 from planfly.studio.documents import open_document, open_dropped
 from planfly.studio.folder import file_inside, folder_json, shown_path
 from planfly.studio.ground_picture import ground_grid, ground_picture
@@ -44,8 +45,8 @@ MAX_PAGES = 4
 PATIENCE = 5.0
 # Interval between two autosaves, s.
 KEEPING = 3.0
-# Greatest number of sockets that have not given a token yet.
-MAX_UNWELCOMED = 16
+# Pause after each message of a page, s: a page that floods the server with messages leaves time to the others.
+MESSAGE_PAUSE_S = 0.002
 # Greatest number of frames that wait for a slow page.
 _MAX_WAITING_FRAMES = 64
 # Pause for an answer to leave before the next place is judged, s.
@@ -99,7 +100,7 @@ class Server:
         self.jobs = Jobs(self._answered_elsewhere, self._packed)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._take_task: asyncio.Future[None] | None = None
-        self._autosave_error, self._pending_sockets = "", 0
+        self._autosave_error = ""
         self.welcomed = threading.Event()
 
     # ------------------------------------------------------------------
@@ -144,15 +145,8 @@ class Server:
 
     async def serve(self, socket: WebSocket) -> None:
         """Serve a page until it goes."""
-        if self._pending_sockets >= MAX_UNWELCOMED:
-            await socket.close(TOO_MANY)
-            return
-        self._pending_sockets += 1
-        try:
-            await socket.accept()
-            page = await self._welcome(socket)
-        finally:
-            self._pending_sockets -= 1
+        await socket.accept()
+        page = await self._welcome(socket)
         if page is None:
             return
         self._pages.add(page)
@@ -181,6 +175,7 @@ class Server:
         await self._show_all(page)
         while True:
             await self._hear(page, await _text(page.socket))
+            await asyncio.sleep(MESSAGE_PAUSE_S)
 
     async def _has_place(self) -> None:
         while len(self._pages) >= MAX_PAGES:
@@ -198,6 +193,7 @@ class Server:
                 first.token.encode(), self._token.encode()
             )
             if given and isinstance(first, messages.Hello):
+                socket.scope.get(WELCOME, lambda: None)()
                 code = TOO_MANY
                 # A page that has gone occupies its place until that is noticed, which takes time on a busy machine.
                 await asyncio.wait_for(self._has_place(), PATIENCE)

@@ -4,6 +4,7 @@ The session does not know connections or processes, which belong to `planfly.stu
 revision; an edit of an older revision is refused, so that no page changes what another page does not show.
 """
 
+import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from planfly.studio.edit_context import EditContext, Judged
 from planfly.studio.history import History
 from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, Raise, Settings
+from planfly.studio.pilot import INTERNAL
 from planfly.studio.settings import changed_parameters, changed_world, settings_json
 from planfly.studio.view_model import Json, sheet_json, window_json, world_json
 from planner.plan import Plan
@@ -59,6 +61,8 @@ class Session:
     world_rev: int = 1
     plans: tuple[list[Plan], tuple[int, int] | None] = field(default_factory=lambda: ([], None))
     kept_rev: int = 0
+    # Autosave files that cannot be read.
+    unreadable: list[Path] = field(default_factory=list)
     named: Path | None = None
     written: Mission | None = None
     document_rev: int = 1
@@ -372,6 +376,8 @@ class Session:
         if self.kept_rev == self.rev:
             return
         file = self.kept_file(file)
+        if file in self.unreadable:
+            return
         file.parent.mkdir(parents=True, exist_ok=True)
         plan = self.judged.setup.plan
         write_whole(file, kept_text(self.desk, self.history.first, self.mission, plan, self.document.name))
@@ -380,14 +386,19 @@ class Session:
     def restore(self, file: Path) -> bool:
         """Restore the autosave of the same document, its mission as an edit; return True if there was one.
 
-        An autosave of another document, or one that cannot be read, is ignored.
+        An autosave of another document is ignored.  An autosave that cannot be read is named in `unreadable`, and is
+        neither restored nor written over.
         """
+        before = self.desk, self.judged, self.plans
         try:
             found = read_kept(file, self.desk, self.history.first)
             if found is None:
                 return False
             self._show(*found)
-        except (OSError, ValueError, LookupError, TypeError, PlanflyError):
+            json.dumps(self.sheet(), allow_nan=False)
+        except (*INTERNAL, PlanflyError):
+            self.desk, self.judged, self.plans = before
+            self.unreadable.append(file)
             return False
         if found[0] is not self.history.first:
             self._add_to_history(found[0], "what was done before the studio ended")

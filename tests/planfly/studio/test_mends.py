@@ -20,7 +20,7 @@ from planfly.studio import documents, edits, messages
 from planfly.studio.documents import open_document, open_dropped, straight_plan
 from planfly.studio.jobs import LONG, Jobs
 from planfly.studio.pilot import Answer, Work
-from planfly.studio.server import MAX_UNWELCOMED, NO_TOKEN, TOO_MANY, Page, Server
+from planfly.studio.server import NO_TOKEN, Page, Server
 from planfly.studio.session import Session, StaleEdit, open_session
 from planner.plan import read_plan
 from tests.planfly.made_plans import default_run
@@ -296,6 +296,7 @@ class NoSocket:
 
     def __init__(self) -> None:
         self.closed: list[int] = []
+        self.scope: dict[str, Any] = {}
 
 
 def server_of(session: Session, kept: Path | None = None) -> Server:
@@ -397,37 +398,50 @@ def test_a_fault_of_the_server_ends_the_command(tmp_path: Path, monkeypatch: pyt
         )
 
 
-class SilentSocket(NoSocket):
-    """A socket that says nothing, or one long first message."""
+class TalkingSocket(NoSocket):
+    """A socket of which messages are always there."""
 
-    def __init__(self, text: str = "") -> None:
+    def __init__(self, *texts: str) -> None:
         super().__init__()
-        self.text = text
+        self.texts = list(texts)
+        self.read = 0
 
     async def accept(self) -> None:
         pass
 
     async def receive(self) -> dict[str, str]:
-        if not self.text:
-            await asyncio.sleep(60.0)
-        return {"type": "websocket.receive", "text": self.text}
+        self.read += 1
+        if self.read > len(self.texts):
+            return {"type": "websocket.disconnect"}
+        return {"type": "websocket.receive", "text": self.texts[self.read - 1]}
+
+    async def send_text(self, text: str) -> None:
+        pass
+
+    async def send_bytes(self, data: bytes) -> None:
+        pass
 
     async def close(self, code: int) -> None:
         self.closed.append(code)
 
 
-def test_sockets_without_a_token_are_few_and_say_little() -> None:
-    async def run() -> tuple[list[int], list[int]]:
-        server = server_of(drawn_session(5, 12))
-        hello = json.dumps({"kind": "hello", "token": "token"})
-        long, late = SilentSocket(hello + " " * 2_000), SilentSocket()
-        await server.serve(long)  # type: ignore[arg-type]
-        waiting = [asyncio.create_task(server.serve(SilentSocket())) for _ in range(MAX_UNWELCOMED)]  # type: ignore[arg-type]
-        await asyncio.sleep(0.05)
-        await asyncio.wait_for(server.serve(late), 1.0)  # type: ignore[arg-type]
-        for one in waiting:
-            one.cancel()
-        await asyncio.gather(*waiting, return_exceptions=True)
-        return long.closed, late.closed
+HELLO = json.dumps({"kind": "hello", "token": "token"})
 
-    assert asyncio.run(run()) == ([NO_TOKEN], [TOO_MANY])
+
+def test_a_first_message_is_short() -> None:
+    long = TalkingSocket(HELLO + " " * 2_000)
+    asyncio.run(server_of(drawn_session(5, 12)).serve(long))  # type: ignore[arg-type]
+    assert long.closed == [NO_TOKEN]
+
+
+def test_a_page_that_floods_the_server_leaves_time_to_others() -> None:
+    async def run() -> int:
+        flood = TalkingSocket(HELLO, *['{"kind": "stop"}'] * 100_000)
+        serving = asyncio.create_task(server_of(drawn_session(5, 12)).serve(flood))  # type: ignore[arg-type]
+        while not flood.read:
+            await asyncio.sleep(0.001)
+        await asyncio.sleep(0.1)
+        serving.cancel()
+        return flood.read
+
+    assert asyncio.run(run()) < 1_000

@@ -62,6 +62,29 @@ def test_the_newest_work_is_done_and_the_others_are_cancelled() -> None:
         heard.pilot.close()
 
 
+def test_a_process_that_cannot_be_started_is_reported_and_started_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    heard = Heard()
+
+    def refuse(_process: Any) -> None:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    try:
+        with monkeypatch.context() as patched:
+            patched.setattr("multiprocessing.process.BaseProcess.start", refuse)
+            heard.pilot.start()
+            for number in (1, 2):
+                heard.pilot.ask(Work(number, COUNT, 3))
+                fault = heard.next("fault")
+                assert fault.number == number
+                assert fault.value == (
+                    "the process for this cannot be started: Resource temporarily unavailable: ask again"
+                )
+        heard.pilot.ask(Work(3, COUNT, 3))
+        assert heard.next("done").number == 3
+    finally:
+        heard.pilot.close()
+
+
 def test_a_process_that_reads_nothing_holds_up_nobody() -> None:
     heard = Heard(patience=1.0)
     try:

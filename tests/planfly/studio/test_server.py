@@ -112,6 +112,12 @@ def test_another_page_reaches_no_websocket(studio: Served, origin: str | None) -
     assert refused.value.response.status_code == 403
 
 
+HANDSHAKE = (
+    "GET /session HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nOrigin: http://127.0.0.1:{port}\r\nUpgrade: websocket\r\n"
+    "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\n\r\n"
+)
+
+
 def asked(studio: Served, method: str, path: str, **headers: str) -> tuple[int, bytes]:
     link = http.client.HTTPConnection("127.0.0.1", studio.port, timeout=20)
     link.putrequest(method, path, skip_host="Host" in headers)
@@ -178,6 +184,37 @@ def test_a_connection_that_asks_for_nothing_ends(studio: Served, monkeypatch: py
         # The page's own is another matter.
         page.send(kind="save", form="kml")
         page.until("saved")
+
+
+def test_connections_without_a_token_are_few(studio: Served) -> None:
+    """Neither silent connections nor websockets that say nothing, or too much, keep a page out."""
+    process, address = psutil.Process(), ("127.0.0.1", studio.port)
+    before = process.num_fds()
+    with contextlib.ExitStack() as links, studio.page() as earlier:
+        earlier.until("sheet")
+        count = 3 * connections.MAX_UNKNOWN
+        for _ in range(count):
+            links.enter_context(contextlib.closing(socket.create_connection(address, timeout=20)))
+        for _ in range(count):
+            link = links.enter_context(contextlib.closing(socket.create_connection(address, timeout=20)))
+            link.sendall(HANDSHAKE.format(port=studio.port).encode())
+            assert link.recv(12) == b"HTTP/1.1 101"
+        # Both ends are in this process.  The server's: the unknown ones, and those of the pages.
+        assert process.num_fds() - before - 2 * count <= connections.MAX_UNKNOWN + 20
+        with studio.page() as page:
+            page.until("sheet")
+        earlier.send(kind="save", form="kml")
+        earlier.until("saved")
+
+
+def test_a_first_message_is_bounded_before_it_is_read(studio: Served) -> None:
+    with studio.socket() as one:
+        assert code_of(one, "x" * (messages.MAX_FIRST + 1)) == 1009
+    with studio.socket() as one:
+        assert code_of(one, "x" * messages.MAX_FIRST) == 4403
+    with studio.page() as page:
+        page.until("sheet")
+        assert code_after(page, " " * messages.MAX_FIRST + '{"kind": "stop"}') == 0
 
 
 def test_four_pages_are_enough(studio: Served) -> None:

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -242,6 +243,41 @@ def test_what_cannot_be_set_any_more_leaves_the_edits(tmp_path: Path) -> None:
     assert again.restore(kept)
     assert again.mission.items == session.mission.items
     assert again.desk.scenario.wind.speed != 9.0
+
+
+# Changes of a kept session: whole texts, and values of keys.
+SHAPES: dict[str, Any] = {
+    "nothing": "",
+    "a list": "[]",
+    "a number": "1e999",
+    "no text": b"\xff\xfe",
+    "nested lists": "[" * 100_000,
+    "a mission that is a number": {"mission": 3},
+    "items that are numbers": {"mission": {"home": None, "items": [3]}},
+    "a latitude beyond the pole": {"mission": {"home": None, "items": [[0, 16, 3, 0, 0, 0, 0, 1e300, 8.0, 90.0, 1]]}},
+    "an infinite number": {"mission": {"home": None, "items": [[float("inf")] * 11]}},
+    "a home that is a word": {"mission": {"home": "here", "items": []}},
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_an_altered_kept_session_is_left_alone(shape: str, tmp_path: Path) -> None:
+    kept, session = tmp_path / "m.json", drawn_session(8, 10)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    session.keep(kept)
+    changed = SHAPES[shape]
+    if isinstance(changed, dict):
+        changed = json.dumps(json.loads(kept.read_text(encoding="utf-8")) | changed)
+    kept.write_bytes(changed if isinstance(changed, bytes) else changed.encode())
+    altered = kept.read_bytes()
+    again = drawn_session(8, 10)
+    before = again.mission, again.judged, again.rev
+    assert not again.restore(kept)
+    assert again.unreadable == [kept]
+    assert (again.mission, again.judged) == before[:2]
+    again.edit(messages.Raise(kind="raise", rev=again.rev, by=10.0))
+    again.keep(kept)
+    assert kept.read_bytes() == altered
 
 
 def test_a_mission_comes_back_from_its_data() -> None:
