@@ -10,7 +10,7 @@ from planfly.runtime.process_setup import prepare_process, with_large_stack
 from planfly.terminal.arguments import ASKS_COMPLETION, answer_shell
 from planfly.terminal.command_parser import coloured, error_text
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
-from planfly.terminal.output import asked_output, open_standard_streams, printable, tolerate_closed_output
+from planfly.terminal.output import asked_output, open_standard_streams, printable, safe_streams
 from planfly.terminal.signal_watch import end_process, ended_by_signals
 from world.errors import CrashError, PlanflyError
 from world.interruption import Interrupted
@@ -46,14 +46,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _outcome(argv: Sequence[str] | None) -> int:
     try:
-        line = build_parser()
-        args = line.parse_args(argv)
-        try:
-            with tolerate_closed_output(), asked_output(args):
-                return find_command(args.command)(args)
-        except PlanflyError as error:
-            code = FAULT if isinstance(error, CrashError) or _is_machines(error.__cause__) else BAD_INPUT
-            return _fail(code, error_text(error, line.commands[args.command]))
+        with safe_streams():
+            return _carried_out(argv)
     except OSError as error:
         return _fail(FAULT, f"{error.filename or 'file'}: {error.strerror or error}")
     except MemoryError as error:
@@ -63,6 +57,17 @@ def _outcome(argv: Sequence[str] | None) -> int:
         return _fail(128 + interrupted.number, "interrupted")
     except KeyboardInterrupt:
         return _fail(INTERRUPTED, "interrupted")
+
+
+def _carried_out(argv: Sequence[str] | None) -> int:
+    line = build_parser()
+    args = line.parse_args(argv)
+    try:
+        with asked_output(args):
+            return find_command(args.command)(args)
+    except PlanflyError as error:
+        code = FAULT if isinstance(error, CrashError) or _is_machines(error.__cause__) else BAD_INPUT
+        return _fail(code, error_text(error, line.commands[args.command]))
 
 
 def _is_machines(cause: BaseException | None) -> bool:

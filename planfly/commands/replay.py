@@ -19,7 +19,7 @@ from planfly.terminal.options import (
     result_options,
     stop_signals,
 )
-from planfly.terminal.output import give_answer
+from planfly.terminal.output import give_answer, plain_stream, without_controls
 from planfly.terminal.results import warn_of_loss
 from world.errors import PlanflyError
 from world.running_clock import RunningClock
@@ -148,12 +148,13 @@ def _show_instruments(log: "FlightLog", args: argparse.Namespace) -> None:
     """Show frames until the end or an interruption; the last one stays on the terminal."""
     speed, lines = args.speed or 1.0, list[str]()
     frames = call(planfly.replay, args, log=log, width=lambda: shutil.get_terminal_size().columns)
-    print(_ENTER_SCREEN, end="")
+    screen = plain_stream(sys.stdout)
+    print(_ENTER_SCREEN, end="", file=screen)
     try:
         for _, lines in frames:
             fitting = [*lines[: max(1, shutil.get_terminal_size().lines - 2)], f"x {speed:g}, Ctrl-C stops"]
-            text = "".join(line + _ERASE_LINE_END + "\n" for line in fitting)
-            print(_HOME + text + _ERASE_SCREEN_END, end="", flush=True)
+            text = "".join(without_controls(line) + _ERASE_LINE_END + "\n" for line in fitting)
+            print(_HOME + text + _ERASE_SCREEN_END, end="", flush=True, file=screen)
     finally:
-        print(_LEAVE_SCREEN, end="", flush=True)
+        print(_LEAVE_SCREEN, end="", flush=True, file=screen)
     print("\n".join(lines))

@@ -18,6 +18,8 @@ from world.files import did_you_mean
 Style = Literal["good", "bad", "warning", "hint"]
 # Colours of ECMA-48, "select graphic rendition": green, red, yellow and cyan.
 _STYLES: dict[Style, int] = {"good": 32, "bad": 31, "warning": 33, "hint": 36}
+# Regular expression of the sequences that begin and end a colour.
+COLOUR_SEQUENCE = rf"\x1b\[(?:0|{'|'.join(map(str, _STYLES.values()))})m"
 # Style of an answer by its state: what was not judged is amber, not red.
 STATE_STYLES: dict[str, Style] = {"ok": "good", "open": "warning", "fail": "bad"}
 

@@ -7,9 +7,11 @@ import itertools
 import json
 import math
 import os
+import re
 import sys
 import threading
 import time
+import unicodedata
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -17,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 from planfly.runtime.stages import Advance, Receiver, received_by
+from planfly.terminal.command_parser import COLOUR_SEQUENCE, wants_colour
 from planfly.workflow.output_paths import refuse_existing
 from world.errors import PlanflyError
 from world.files import read_at_most, write_whole
@@ -25,15 +28,41 @@ if TYPE_CHECKING:
     from logs.verdict.verdict import Verdict
 
 # ----------------------------------------------------------------------
-# Standard output that tolerates a closed pipe: ``planfly check M | head -1`` still exits with the code of the verdict.
+# Standard streams: no text of a foreign file controls the terminal, and a closed pipe is tolerated:
+# ``planfly check M | head -1`` still exits with the code of the verdict.
+
+# Categories of Unicode of characters that move the cursor, reverse the text, or are no text.
+_CONTROLS = ("Cc", "Cf", "Cs", "Zl", "Zp")
+# Colours of planfly's own on a stream in colour, and any character beyond plain ASCII, which may be a control.
+_COLOUR_OR_SPECIAL = re.compile(COLOUR_SEQUENCE + r"|[^\n\t\x20-\x7e]")
+_SPECIAL = re.compile(r"[^\n\t\x20-\x7e]")
 
 
-class _TolerantStream(io.TextIOBase):
-    """Stream that writes until its reader has gone, and drops the rest."""
+def without_controls(text: str, *, colours: bool = False) -> str:
+    r"""Return a text with escapes for all control characters except line feeds and tabs.
+
+    colours: True to keep planfly's own colours.
+
+    >>> print(without_controls("a\x1b[2J \u202e\x9b \xb0"))
+    a\x1b[2J \u202e\x9b °
+    """
+    return (_COLOUR_OR_SPECIAL if colours else _SPECIAL).sub(_escape, text)
+
+
+def _escape(found: re.Match[str]) -> str:
+    text = found[0]
+    is_control = len(text) == 1 and unicodedata.category(text) in _CONTROLS
+    return text.encode("unicode_escape").decode() if is_control else text
+
+
+class _SafeStream(io.TextIOBase):
+    """Stream without control characters in its text.
+
+    plain: the underlying stream, for text that moves the cursor.
+    """
 
     def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self._gone = False
+        self.plain = stream
 
     def writable(self) -> bool:
         """Return True: the stream always takes text."""
@@ -41,13 +70,34 @@ class _TolerantStream(io.TextIOBase):
 
     def isatty(self) -> bool:
         """Return True if the underlying stream is a terminal."""
-        return self._stream.isatty()
+        return self.plain.isatty()
+
+    def fileno(self) -> int:
+        """Return the descriptor of the underlying stream."""
+        return self.plain.fileno()
+
+    def write(self, text: str, /) -> int:
+        """Pass the text on."""
+        self.plain.write(without_controls(text, colours=wants_colour(self.plain)))
+        return len(text)
+
+    def flush(self) -> None:
+        """Pass on what is buffered."""
+        self.plain.flush()
+
+
+class _TolerantStream(_SafeStream):
+    """Stream that writes until its reader has gone, and drops the rest."""
+
+    def __init__(self, stream: TextIO) -> None:
+        super().__init__(stream)
+        self._gone = False
 
     def write(self, text: str, /) -> int:
         """Pass the text on, or drop it."""
         if not self._gone:
             try:
-                self._stream.write(text)
+                super().write(text)
             except BrokenPipeError:
                 self._leave()
             except OSError as error:
@@ -58,7 +108,7 @@ class _TolerantStream(io.TextIOBase):
         """Pass on what is buffered, or drop it."""
         if not self._gone:
             try:
-                self._stream.flush()
+                super().flush()
             except BrokenPipeError:
                 self._leave()
             except OSError as error:
@@ -70,7 +120,7 @@ class _TolerantStream(io.TextIOBase):
         self._gone = True
         # When the interpreter ends, the buffered text must have somewhere to go.
         with contextlib.suppress(OSError, ValueError), Path(os.devnull).open("w") as nowhere:
-            os.dup2(nowhere.fileno(), self._stream.fileno())
+            os.dup2(nowhere.fileno(), self.fileno())
 
 
 def _named(error: OSError) -> OSError:
@@ -104,15 +154,20 @@ def printable(text: str) -> str:
     >>> print(printable("a\nb \x1b[2J \u202e"))
     a b \x1b[2J \u202e
     """
-    line = " ".join(text.split())
-    return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in line)
+    return without_controls(" ".join(text.split()))
+
+
+def plain_stream(stream: TextIO) -> TextIO:
+    """Return the stream for text that moves the cursor, below a stream without control characters."""
+    plain: TextIO = getattr(stream, "plain", stream)
+    return plain
 
 
 @contextlib.contextmanager
-def tolerate_closed_output() -> Iterator[None]:
-    """Tolerate that the reader of standard output closes it."""
+def safe_streams() -> Iterator[None]:
+    """Keep control characters from both standard streams, and tolerate that the reader of standard output closes it."""
     tolerant = _TolerantStream(sys.stdout)
-    with contextlib.redirect_stdout(tolerant):
+    with contextlib.redirect_stdout(tolerant), contextlib.redirect_stderr(_SafeStream(sys.stderr)):
         try:
             yield
         finally:
@@ -305,7 +360,8 @@ class _Bar:
         self._remark, self._measured = "", False
         self._at_first = left.at_first(0.0)
         form = "{desc:<22} {bar:30} {percentage:3.0f} %{postfix}"
-        self._bar = tqdm(total=100, desc=title, bar_format=form, leave=True)
+        file = plain_stream(sys.stderr)
+        self._bar = tqdm(total=100, desc=printable(title), bar_format=form, leave=True, file=file)
 
     def __enter__(self) -> None:
         self.look()
@@ -313,7 +369,7 @@ class _Bar:
     def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
         with self._lock:
             if error is None:
-                self._bar.set_postfix_str(self._remark, refresh=False)
+                self._bar.set_postfix_str(printable(self._remark), refresh=False)
                 self._bar.update(100 - self._bar.n)
             self._bar.close()
 
@@ -329,13 +385,15 @@ class _Bar:
             if not self._measured:
                 self._at_first = self._left.at_first(max(0.0, total - done))
                 estimate = self._at_first
-            self._bar.set_postfix_str(_joined(remark, "" if _states_time_left(remark) else estimate))
+            text = _joined(remark, "" if _states_time_left(remark) else estimate)
+            self._bar.set_postfix_str(printable(text))
 
     def look(self) -> None:
         """Show the elapsed time until progress is measured."""
         with self._lock:
             if not self._measured and not self._bar.disable:
-                self._bar.set_postfix_str(_joined(self._remark, self._at_first, f"{self._left.elapsed():.0f} s so far"))
+                text = _joined(self._remark, self._at_first, f"{self._left.elapsed():.0f} s so far")
+                self._bar.set_postfix_str(printable(text))
 
 
 class _Lines:
@@ -459,9 +517,14 @@ def give_answer(args: argparse.Namespace, answer: Callable[[], object | str]) ->
     made = answer()
     text = made if isinstance(made, str) else answer_text(made)
     if target == STANDARD_OUTPUT:
-        print(text, end="", file=_output.get() or sys.stdout)
+        print(_escaped_json(text), end="", file=_output.get() or sys.stdout)
     else:
         write_whole(Path(target), text)
+
+
+def _escaped_json(text: str) -> str:
+    """Return JSON text with JSON's escapes for control characters in its strings."""
+    return _SPECIAL.sub(lambda found: found[0] if _escape(found) == found[0] else json.dumps(found[0])[1:-1], text)
 
 
 def give_junit(args: argparse.Namespace, verdicts: Mapping[str, "Verdict"]) -> None:

@@ -1,5 +1,6 @@
 """Standard output that outlives its reader: what is printed after it has gone is dropped, and no error is left."""
 
+import argparse
 import contextlib
 import io
 import json
@@ -12,12 +13,13 @@ from pathlib import Path
 import pytest
 
 from planfly.terminal import output
+from planfly.terminal.command_parser import coloured
 from planfly.terminal.output import progress
 
 CODE = """
 import sys
-from planfly.terminal.output import tolerate_closed_output
-with tolerate_closed_output():
+from planfly.terminal.output import safe_streams
+with safe_streams():
     print("first", flush=True)
     sys.stdin.readline()
     for number in range(100_000):
@@ -47,6 +49,52 @@ def test_a_reader_that_stays_gets_every_line() -> None:
     done = subprocess.run([sys.executable, "-c", CODE], input="go on\n", capture_output=True, text=True, check=False)
     assert done.returncode == 4
     assert done.stdout.splitlines() == ["first", *(f"line {number}" for number in range(100_000))]
+
+
+# ----------------------------------------------------------------------
+# Control characters of foreign files.
+
+# Clears the screen, sets a title, rings, reverses, and begins a colour by its 8-bit code.
+HOSTILE = "\x1b[2J\x1b]0;x\x07\r\b\x7f\x9b31m\u202eevil\u2028\x00"
+ESCAPED = r"\x1b[2J\x1b]0;x\x07\r\x08\x7f\x9b31m\u202eevil\u2028\x00"
+
+
+def test_no_control_character_is_printed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("FORCE_COLOR", raising=False)
+    with output.safe_streams():
+        print(f"21 °C\t{HOSTILE}\nend \x1b[31m")
+        print(HOSTILE, file=sys.stderr)
+    printed = capsys.readouterr()
+    assert printed.out == f"21 °C\t{ESCAPED}\nend \\x1b[31m\n"
+    assert printed.err == f"{ESCAPED}\n"
+
+
+def test_colours_of_planfly_are_kept(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    with output.safe_streams():
+        print(coloured("flyable", "good") + "\x1b[2J\x1b[8m")
+    assert capsys.readouterr().out == "\x1b[32mflyable\x1b[0m\\x1b[2J\\x1b[8m\n"
+
+
+def test_an_answer_on_standard_output_stays_json(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = argparse.Namespace(json="-", quiet=False, command="test")
+    with output.safe_streams(), output.asked_output(arguments):
+        output.give_answer(arguments, lambda: json.dumps({"title": HOSTILE}, ensure_ascii=False) + "\n")
+    text = capsys.readouterr().out
+    assert json.loads(text) == {"title": HOSTILE}
+    assert text[:-1].isprintable()
+
+
+def test_a_progress_bar_has_no_control_characters_of_titles(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = io.StringIO()
+    monkeypatch.setattr(shown, "isatty", lambda: True)
+    monkeypatch.setattr(sys, "stderr", shown)
+    with output.safe_streams(), progress("flying \x1b[2J") as advance:
+        advance(1.0, 4.0, "\x1b]0;x\x07")
+    text = shown.getvalue()
+    assert "flying \\x1b[2J" in text
+    assert not {"\x1b", "\x07"} & set(text)
 
 
 # ----------------------------------------------------------------------
