@@ -1,6 +1,6 @@
 """Fly default plans on three terrains with an autopilot's law or the program itself, and count violations.
 
-``python -m benchmarks.planned_for_autopilots [--law LAW] [--plans N] [--from NUMBER] [--autopilot PATH]`` plans random
+``python -m benchmarks.planned_for_autopilots [--law LAW] [--plans N] [--from NUMBER] [--sitl PATH]`` plans random
 scenarios (`tests.autopilot_plans`: winds of 0 to 10 m/s, none to moderate turbulence, GNSS errors) for a law, flies
 each, and prints the margins of the certificate and of the flight, and at the end the number of violations, with a
 separate number for moderate turbulence.
@@ -32,9 +32,9 @@ class Flown:
     turbulence: str
 
 
-def fly(number: int, law: str, autopilot: Path | None) -> Flown:
+def fly(number: int, law: str, sitl: Path | None) -> Flown:
     """Plan and fly the scenario of this number, and print a line about it."""
-    scenario = with_flight(plan_scenario(number), **flight_entries({"autopilot_law": law}))
+    scenario = with_flight(plan_scenario(number), **flight_entries({"autopilot": law}))
     airframe = load_airframe(scenario)
     plan = make_plan(scenario, airframe, number + 1)
     if not plan.safe:
@@ -44,7 +44,7 @@ def fly(number: int, law: str, autopilot: Path | None) -> Flown:
     longer = float(plan.objectives[0] / make_plan(scenario, exact, number + 1).objectives[0])
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
     setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
-    judged = fly_and_judge(setup, airframe, None, autopilot=autopilot)
+    judged = fly_and_judge(setup, airframe, None, autopilot=sitl)
     harm = harm_of(scenario, plan.waypoints, judged.track)
     parts = [harm.text(scenario), "" if judged.ended == "completed" else judged.ended]
     parts += [f"{found.rule}: {found.reason}" for found in judged.verdict.findings if found.ok is False]
@@ -62,14 +62,12 @@ def fly(number: int, law: str, autopilot: Path | None) -> Flown:
 def main() -> None:
     """Fly, print, and sum up."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.planned_for_autopilots")
-    parser.add_argument(
-        "--law", choices=CHOICES["autopilot_law"], default="ardupilot", help="planned for, and flown by"
-    )
+    parser.add_argument("--law", choices=CHOICES["autopilot"], default="ardupilot", help="planned for, and flown by")
     parser.add_argument("--plans", type=int, default=100)
     parser.add_argument("--from", dest="first", type=int, default=0, help="number of the first scenario")
-    parser.add_argument("--autopilot", type=Path, help="the program of the autopilot itself (default: its law)")
+    parser.add_argument("--sitl", type=Path, help="the program of the autopilot itself (default: its law)")
     args = parser.parse_args()
-    flown = [fly(number, args.law, args.autopilot) for number in range(args.first, args.first + args.plans)]
+    flown = [fly(number, args.law, args.sitl) for number in range(args.first, args.first + args.plans)]
     made = [one for one in flown if one.harm is not None]
     longer = sorted(one.longer for one in made)
     print(

@@ -73,7 +73,7 @@ def by_program(made: FieldMission, program: Path) -> tuple[Verdict, bool]:
 
 def compare(seed: int, law_name: str, program: Path) -> Answer:
     """Fly the mission of a seed by both."""
-    flight = {name: value for name, value in flight_entries({"autopilot_law": law_name}).items() if value is not None}
+    flight = {name: value for name, value in flight_entries({"autopilot": law_name}).items() if value is not None}
     made = close_mission(seed, energy=lambda ordinary: by_law(ordinary)[1], **flight)
     (law, _), (real, lost) = by_law(made), by_program(made, program)
     agree = law.flyable == real.flyable
@@ -83,9 +83,7 @@ def compare(seed: int, law_name: str, program: Path) -> Answer:
 def main() -> None:
     """Fly, print, and sum up."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.verdict_agreement")
-    parser.add_argument(
-        "--law", choices=CHOICES["autopilot_law"], default="ardupilot", help="compared with its program"
-    )
+    parser.add_argument("--law", choices=CHOICES["autopilot"], default="ardupilot", help="compared with its program")
     parser.add_argument("--missions", type=int, default=100)
     parser.add_argument("--from", dest="first", type=int, default=0, help="seed of the first mission")
     parser.add_argument("--ordinary", type=int, help="so many ordinary missions, by the law alone")

@@ -12,7 +12,7 @@
 plan, replan, what_blocks            make a path; plan again in flight; why there is no feasible path
 plan_front                           a choice of paths: short, unseen, high above ground, sparing
 fly, plan_then_fly, run              fly a plan or a mission file; both at once; the whole chain into a folder
-fly_by_each                          fly it by the laws of several autopilots
+fly_by_each                          fly it by several simulated autopilots
 check, judge, read_log               judge a log, a plan or a mission; read a log, its track as a table
 figures, report, compare             matplotlib figures; a page of a flight; two flights beside each other
 export, foxglove_layout              files for ground stations, maps and other programs

@@ -83,7 +83,7 @@ RANGES: Mapping[str, Range] = {
 CHOICES: Mapping[str, tuple[Any, ...]] = {
     "turbulence": ("none", "light", "moderate"),
     "guidance": ("path", "l1", "vector-field"),
-    "autopilot_law": ("ardupilot", "px4", "px4-1.16", "px4-1.17", "ideal"),
+    "autopilot": ("ardupilot", "px4", "px4-1.16", "px4-1.17", "planfly"),
     "nav": ("perfect", "rtk", "gnss"),
     "log_hz": (60, 30, 20, 10),
     "datum": ("amsl", "ellipsoid"),

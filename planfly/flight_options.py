@@ -39,7 +39,8 @@ class FlightOptions(TypedDict, total=False):
     left out; None leaves none out.
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
     guidance: planfly's own law ("path", "l1", "vector-field") instead of the law of ArduPlane.
-    autopilot_law: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16", "px4-1.17" or "ideal".
+    autopilot: the simulated autopilot: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16",
+    "px4-1.17" or "planfly".
     nav: "perfect", "rtk" or "gnss".
     """
 
@@ -51,7 +52,7 @@ class FlightOptions(TypedDict, total=False):
     airspeed: float | None
     params: str | Path | None
     guidance: Guidance | None
-    autopilot_law: str | None
+    autopilot: str | None
     nav: Navigation | None
 
 
@@ -103,14 +104,14 @@ LOG_OPTIONS = ("plan", "flight", "datum")
 class SimulationOptions(TypedDict, total=False):
     """Autopilot of a simulated flight, its recording, and its limits.
 
-    autopilot: the program of ArduPlane or PX4, which then flies the mission.
+    sitl: the program of ArduPlane or PX4 built for software in the loop, which then flies the mission.
     log_hz: rows per second in the log.
     max_hours: simulated hours after which the flight is stopped.  max_log: size of the log at which it is stopped, MB.
     levels: True also flies a mission that passes with planfly's guidance, as is done for one that fails, and compares
     the two flights.
     """
 
-    autopilot: str | Path | None
+    sitl: str | Path | None
     log_hz: Annotated[Literal[10, 20, 30, 60], 60]
     max_hours: Annotated[float, MAX_HOURS]
     max_log: Annotated[float, MAX_MEGABYTES]
@@ -268,15 +269,15 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
 
     Raises ArgumentError for an unknown law, and for a law in addition to a program.
 
-    >>> entries = flight_entries({"autopilot_law": "px4-1.16"})
+    >>> entries = flight_entries({"autopilot": "px4-1.16"})
     >>> entries["autopilot"], entries["px4_version"]
     ('px4', '1.16')
     """
-    aircraft, params, named = options.get("aircraft"), options.get("params"), options.get("autopilot_law")
-    check_arguments(autopilot_law=named)
+    aircraft, params, named = options.get("aircraft"), options.get("params"), options.get("autopilot")
+    check_arguments(autopilot=named)
     if program is not None and named is not None:
-        allowed = "not with autopilot: a program flies by its own law"
-        raise ArgumentError.of_argument("autopilot_law", named, allowed)
+        allowed = "not with sitl: a real autopilot flies by its own control laws"
+        raise ArgumentError.of_argument("autopilot", named, allowed)
     law, _, version = (named or "").partition("-")
     return {
         # A `Path` is a folder; its absolute path marks it as a folder instead of a name.

@@ -13,7 +13,7 @@ from world.scenario import Scenario, from_spec
 
 SEED = 39
 AIRCRAFT = ("aerosonde", "x8", "zagi", "ultrastick25e")
-AUTOPILOTS = ("ardupilot", "px4", "ideal")
+AUTOPILOTS = ("ardupilot", "px4", "planfly")
 # Cruise speeds, m/s, which winds are shares of.
 _CRUISE = {"aerosonde": 25.0, "x8": 18.0, "zagi": 15.0, "ultrastick25e": 17.0}
 _HIGHEST = 4000.0

@@ -159,7 +159,7 @@ def _scenario(draft: Draft, points: Floats, numbers: dict[str, float | None], na
         origin={"lat_deg": float(rng.uniform(-60.0, 60.0)), "lon_deg": float(rng.uniform(-180.0, 180.0))},
         terrain=terrain,
         limits=angles | {"min_clearance_m": limits.min_clearance},
-        flight={"airspeed_mps": limits.airspeed, "autopilot": "ideal"},
+        flight={"airspeed_mps": limits.airspeed, "autopilot": "planfly"},
         wind={
             "speed_mps": limits.wind.speed,
             "from_deg": math.degrees(limits.wind.from_course),

@@ -43,7 +43,7 @@ EXTRAS = {
         Extra(
             "live",
             "MAVLink needs",
-            "`planfly serve`, `replay --to IP:PORT`, ArduPlane itself (`--autopilot PATH`), `.tlog` files",
+            "`planfly serve`, `replay --to IP:PORT`, ArduPlane itself (`--sitl PATH`), `.tlog` files",
             ("pymavlink",),
         ),
         Extra("studio", "the studio needs", "`planfly studio`", ("starlette", "uvicorn", "websockets")),

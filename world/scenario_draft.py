@@ -275,7 +275,7 @@ def _flight_tables(draft: Draft) -> str:
     return f"""\
 [flight]
 {_line("aircraft", _text(draft.aircraft), "planfly aircraft lists them; a folder of your own")}
-{_line("autopilot", _text(draft.autopilot), '"ardupilot", "px4", or "ideal": planfly' + "'s own guidance")}{version}
+{_line("autopilot", _text(draft.autopilot), '"ardupilot", "px4", or "planfly": planfly' + "'s own guidance")}{version}
 {_line("# params", '"mine.param"', "its parameters, as a ground station saves them")}
 {_line("# airspeed_mps", _number(draft.airspeed), "equivalent, by planfly's guidance true; by default this")}
 

@@ -390,7 +390,7 @@ def names_folder(aircraft: str) -> bool:
 # Autopilot of a scenario that names neither an autopilot nor an autopilot's settings.
 DEFAULT_AUTOPILOT = "ardupilot"
 # Planfly's own guidance: the only one with a choice of laws, and the only one without parameters.
-OWN_GUIDANCE = "ideal"
+OWN_GUIDANCE = "planfly"
 # The only autopilot with a choice of release.
 _PX4 = "px4"
 
@@ -398,9 +398,9 @@ _PX4 = "px4"
 class Steering(NamedTuple):
     """Autopilot, guidance law and navigation accuracy of a flight.
 
-    autopilot: "ardupilot" for ArduPlane's laws, "ideal" for planfly's guidance, or another one of
+    autopilot: "ardupilot" for ArduPlane's laws, "planfly" for planfly's guidance, or another one of
     `flight.autopilots.catalog`.
-    guidance: the guidance law of "ideal"; other autopilots ignore it.
+    guidance: the guidance law of "planfly"; other autopilots ignore it.
     nav: navigation accuracy, a key of `flight.guidance.navigation_error.ERRORS`.
     """
 
@@ -412,11 +412,11 @@ class Steering(NamedTuple):
 class FlightTable(ScenarioTable):
     """[flight].  A None was not stated; `steering` replaces it with its default.
 
-    autopilot: name of the autopilot; guidance alone means "ideal", params alone "ardupilot".
+    autopilot: name of the autopilot; guidance alone means "planfly", params alone "ardupilot".
     autopilot_from: file that the autopilot was inferred from, see `planfly.workflow.file_autopilots`.
     params: file with the autopilot's parameters.
     px4_version: release of autopilot = "px4", as releases fly differently; None for the newest.
-    guidance: guidance law of "ideal".
+    guidance: guidance law of "planfly".
     nav: navigation accuracy, see `flight.guidance.navigation_error`.
     """
 
@@ -441,7 +441,7 @@ class FlightTable(ScenarioTable):
         if self.guidance is not None and autopilot != OWN_GUIDANCE:
             raise ValueError(f'guidance: not a key of autopilot = "{autopilot}"')
         if self.params is not None and autopilot == OWN_GUIDANCE:
-            raise ValueError('params: not a key of autopilot = "ideal", which guidance alone means')
+            raise ValueError('params: not a key of autopilot = "planfly", which guidance alone means')
         if self.px4_version is not None and autopilot != _PX4:
             raise ValueError(f'px4_version: a key of autopilot = "px4" alone, not of "{autopilot}"')
         return self

@@ -41,7 +41,7 @@ LONG = 0.02
 SLOW = 1.0
 
 
-def random_task(seed: int, threats: int = THREATS, family: str = "passable", autopilot: str = "ideal") -> Task:
+def random_task(seed: int, threats: int = THREATS, family: str = "passable", autopilot: str = "planfly") -> Task:
     """Make the task of a random instance."""
     if family == "wild":
         scenario = wild_scenario(seed, autopilot)
@@ -145,14 +145,14 @@ def main() -> None:
     parser.add_argument("--from", dest="first", type=int, default=7001, help="seed of the first instance")
     parser.add_argument("--count", type=int, default=60, help="instances")
     parser.add_argument("--runs", type=int, default=1, help="seeds of each algorithm on each")
-    parser.add_argument("--autopilot", default="ideal", help="for whom plans leave room")
+    parser.add_argument("--autopilot", default="planfly", help="for whom plans leave room")
     parser.add_argument("--kept", type=Path, default=KEPT, help="file that keeps what the reference finds")
     parser.add_argument("--without-reference", action="store_true", help="best known is the best of the runs")
     parser.add_argument("--algorithms", nargs="+", default=[DEFAULT])
     args = parser.parse_args()
     seeds = range(args.first, args.first + args.count)
     tasks = [random_task(seed, family=args.family, autopilot=args.autopilot) for seed in seeds]
-    suffix = "" if args.autopilot == "ideal" else f" {args.autopilot}"
+    suffix = "" if args.autopilot == "planfly" else f" {args.autopilot}"
     names = [f"{args.family} {seed}{suffix}" for seed in seeds]
     nothing = np.full(len(tasks), np.nan)
     reference = nothing if args.without_reference else reference_ratios(names, tasks, args.kept)

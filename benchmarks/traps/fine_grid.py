@@ -187,5 +187,5 @@ def measure(autopilot: str, seed: int = 1) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    for planned_for in ("ideal", "ardupilot"):
+    for planned_for in ("planfly", "ardupilot"):
         measure(planned_for)

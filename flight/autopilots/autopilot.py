@@ -293,7 +293,7 @@ class Autopilot(ABC):
 
     @classmethod
     def recognises(cls, program: Path) -> bool:
-        """Return True if the program that --autopilot names flies this autopilot; False for a law."""
+        """Return True if the program that --sitl names flies this autopilot; False for a law."""
         return False
 
     @classmethod

@@ -18,7 +18,7 @@ from world.files import read_small_file, utf8_text
 ARDUPILOT = "ardupilot"
 PX4 = "px4"
 TITLES: Mapping[str, str] = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
-_MODELS: Mapping[str, str] = {ARDUPILOT: "ArduPlane", PX4: "PX4", "ideal": "planfly's own guidance"}
+_MODELS: Mapping[str, str] = {ARDUPILOT: "ArduPlane", PX4: "PX4", "planfly": "planfly's own guidance"}
 
 # Weight of a header, in names: a file may be edited below its header.
 _HEADER_WEIGHT = 3
@@ -245,14 +245,14 @@ def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], kno
         return
     names = ", ".join(list(entries)[:_SHOWN_NAMES])
     allowed = f"a parameter file of {TITLES[autopilot]} is expected"
-    message = f"{path}: {names}: no name that {_MODELS[autopilot]}'s law knows: {allowed}"
+    message = f"{path}: {names}: no name that the simulated {_MODELS[autopilot]} knows: {allowed}"
     raise ParameterError(message, file=path, value=names, allowed=allowed)
 
 
 def other_autopilot(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:
     """Return the error for a file that was written for another autopilot than the one that is to fly."""
     because = f" ({evidence})" if evidence else ""
-    allowed = f"{_MODELS[flying]} is to fly: --autopilot-law {written_for} flies it by {_MODELS[written_for]}'s law"
+    allowed = f"{_MODELS[flying]} is to fly: --autopilot {written_for} simulates {_MODELS[written_for]} instead"
     message = f"{where}: written for {TITLES[written_for]}{because}, and {allowed}"
     return ParameterError(message, file=where, field="autopilot", value=written_for, allowed=allowed)
 

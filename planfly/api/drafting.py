@@ -28,7 +28,7 @@ def new_scenario(
     terrain: str | Path | None = None,
     height: float = 120.0,
     aircraft: str | Path = "aerosonde",
-    autopilot_law: str | None = None,
+    autopilot: str | None = None,
     overwrite: bool = False,
 ) -> Path:
     """Write a commented scenario from one place to another, ready to be planned and flown.
@@ -36,7 +36,7 @@ def new_scenario(
     folder: the folder for FOLDER/NAME.toml, where NAME is the name of the folder; it is made if it is missing.
     start, destination: latitude and longitude, degrees.  height: height of both above ground, m.
     terrain: an elevation file, a folder of tiles, or an embedded name; None for flat ground.
-    aircraft: a name, or a folder.  autopilot_law: as of `planfly.fly`.
+    aircraft: a name, or a folder.  autopilot: as of `planfly.fly`.
     overwrite: True replaces a scenario of that name.
     The area holds the straight line and a margin of a third of its length, within the coverage of the elevation file.
     Returns the file.  Raises a `planfly.PlanflyError` for bad input; nothing is written then.
@@ -48,12 +48,12 @@ def new_scenario(
     >>> file.name, path.safe
     ('ridge.toml', True)
     """
-    check_arguments(height=height, autopilot_law=autopilot_law)
+    check_arguments(height=height, autopilot=autopilot)
     ends = _place("start", start), _place("destination", destination)
     target = Path(folder)
     name = Path(whole_path(target)).name if ".." in target.parts else target.absolute().name
     file = _target(target, name, overwrite=overwrite)
-    law, _, version = (autopilot_law or DEFAULT_AUTOPILOT).partition("-")
+    law, _, version = (autopilot or DEFAULT_AUTOPILOT).partition("-")
     ground = None if terrain is None else _whole(terrain, is_name=terrain in EMBEDDED)
     model = _whole(aircraft, is_name=isinstance(aircraft, str) and not names_folder(aircraft))
     airspeed = find_aircraft(model).airspeed

@@ -182,10 +182,11 @@ def fly(
 
     The aircraft and its control:
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
-    autopilot_law: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16", "px4-1.17" or "ideal".
+    autopilot: the simulated autopilot: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16",
+    "px4-1.17" or "planfly".
     guidance: planfly's own law ("path", "l1", "vector-field") instead of the law of ArduPlane.
     nav: "perfect", "rtk" or "gnss".
-    autopilot: the program of ArduPlane or PX4, which then flies the mission.
+    sitl: the program of ArduPlane or PX4 built for software in the loop, which then flies the mission.
 
     log_hz: rows per second in the log.  max_hours, max_log: limits at which a flight is stopped, h and MB.
     levels: True also flies a mission that passes with planfly's guidance, as is done for one that fails, and compares
@@ -199,7 +200,7 @@ def fly(
     """
     limits = FlightLimits(options["max_hours"], options["max_log"])
     check_arguments(seed=options["seed"], log_hz=options["log_hz"], max_hours=limits.hours, max_log=limits.megabytes)
-    program = named_program(options["autopilot"])
+    program = named_program(options["sitl"])
     setup = open_flight(mission, options, program)
     target = None if log is None else _log_target(log, setup, mission, program, overwrite)
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
@@ -224,26 +225,26 @@ def fly(
 def fly_by_each(
     mission: Plan | str | Path, autopilots: Sequence[str], **options: Unpack[MissionOptions]
 ) -> dict[str, FlownMission]:
-    """Fly a mission by the laws of several autopilots with default parameters, and judge each flight.
+    """Fly a mission by several simulated autopilots with default parameters, and judge each flight.
 
-    autopilots: names, as `autopilot_law` of `planfly.fly` takes them.
-    options: as of `planfly.fly`, except `autopilot_law`, `params` and `guidance`.
+    autopilots: names, as `autopilot` of `planfly.fly` takes them.
+    options: as of `planfly.fly`, except `autopilot`, `params` and `guidance`.
     Returns the flights by these names.  Raises a `planfly.PlanflyError` for bad input.
 
     >>> import planfly
-    >>> flown = planfly.fly_by_each(planfly.plan("paper-07", seed=1), ["ideal", "px4"])
-    >>> list(flown), flown["ideal"].flyable
-    (['ideal', 'px4'], True)
+    >>> flown = planfly.fly_by_each(planfly.plan("paper-07", seed=1), ["planfly", "px4"])
+    >>> list(flown), flown["planfly"].flyable
+    (['planfly', 'px4'], True)
     """
     named = list(dict.fromkeys(autopilots))
     if not named:
         raise ArgumentError.of_argument("autopilots", "", "at least one autopilot is expected")
-    check_arguments(autopilot_law=named)
-    own = {name: value for name, value in options.items() if name in ("params", "guidance", "autopilot_law")}
+    check_arguments(autopilot=named)
+    own = {name: value for name, value in options.items() if name in ("params", "guidance", "autopilot")}
     refuse(_source_of(mission), own, "belongs to one autopilot, and several are named")
     flown = {}
     for name in named:
-        options["autopilot_law"] = name
+        options["autopilot"] = name
         flown[name] = fly(mission, **options)
     return flown
 
@@ -365,14 +366,14 @@ def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, 
     return Judged(setup, verdict, track=flight.track, is_log=True)
 
 
-def named_program(autopilot: str | Path | None) -> Path | None:
+def named_program(sitl: str | Path | None) -> Path | None:
     """Return the autopilot's program that is to fly, or None if none is named.
 
     Raises FlightError for a file that cannot be run, and MissingExtraError.
     """
-    if autopilot is None:
+    if sitl is None:
         return None
-    need_extra("live", "--autopilot needs")
-    program = Path(autopilot)
+    need_extra("live", "--sitl needs")
+    program = Path(sitl)
     check_binary(program, program_autopilot(program).title)
     return program

@@ -45,7 +45,7 @@ def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFli
 
     Raises ScenarioError for an option that a flown log cannot take.
     """
-    for name in ("params", "guidance", "autopilot_law", "airspeed", "nav", "seed"):
+    for name in ("params", "guidance", "autopilot", "airspeed", "nav", "seed"):
         if (value := dict(options)[name]) is not None:
             allowed = "an imported flight is judged by the autopilot and the speeds of its log"
             raise ScenarioError.of_argument(name, value, allowed, shown="", file=log)

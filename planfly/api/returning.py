@@ -171,7 +171,7 @@ def returns(
     *,
     every: float = 1.0,
     suggest: bool = False,
-    autopilot: str | Path | None = None,
+    sitl: str | Path | None = None,
     points: int = 3,
     out: str | Path | None = None,
     overwrite: bool = True,
@@ -182,7 +182,7 @@ def returns(
     what: a `Plan`, the path of a plan.json, .waypoints or .plan, which is flown first; or a flight: a result of
     `planfly.fly`, a flight log or its path, or an autopilot's log.
     every: time between two returns, s.  suggest: True looks for remedies that make all returns safe.
-    autopilot: ArduPlane's program, which then also flies the worst ``points`` returns, spaced far apart.
+    sitl: ArduPlane's program, which then also flies the worst ``points`` returns, spaced far apart.
     out: folder for pictures; None writes none.  overwrite: True replaces results in the folder.
     options: for a plan or mission, as of `planfly.fly`; for a flight, only terrain.
     plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
@@ -195,7 +195,7 @@ def returns(
     """
     check_arguments(every=every, points=points, seed=options["seed"], flight=options["flight"], datum=options["datum"])
     path = Path(what) if isinstance(what, str | Path) else None
-    asked = _asked(every, suggest, out, autopilot, points, overwrite=overwrite)
+    asked = _asked(every, suggest, out, sitl, points, overwrite=overwrite)
     if path is not None and is_imported_log(path):
         refuse(str(path), {"seed": options["seed"], "nav": options["nav"]}, _AS_FLOWN)
         return _of_import(_imported(path, options), asked)
@@ -233,13 +233,13 @@ class _Asked(NamedTuple):
 
 
 def _asked(
-    every: float, suggest: bool, out: str | Path | None, autopilot: str | Path | None, points: int, *, overwrite: bool
+    every: float, suggest: bool, out: str | Path | None, sitl: str | Path | None, points: int, *, overwrite: bool
 ) -> _Asked:
     """Check a request.
 
     Raises PlanflyError for a folder that is a file or is not empty, and for a wrong program.
     """
-    program = named_program(autopilot)
+    program = named_program(sitl)
     if program is not None:
         refuse_program(program)
     if out is not None:

@@ -143,7 +143,7 @@ def run(
     check_arguments(
         seed=seed, refine=refine, log_hz=options["log_hz"], max_hours=limits.hours, max_log=limits.megabytes
     )
-    program = named_program(options["autopilot"])
+    program = named_program(options["sitl"])
     world = named_scenario(scenario, options, program)
     number, airframe = choose_seed(world, seed), load_airframe(world)
     folder = expand_path_pattern(out, world.name, number)
@@ -161,8 +161,8 @@ def run(
 def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
     """Return the command line of ``planfly run`` for options by their keywords.
 
-    >>> command_line("tight", 3, {"wind": (8.0, 270.0), "autopilot_law": "px4", "params": "my file.parm"})
-    "planfly run tight --seed 3 --wind 8,270 --autopilot-law px4 --params 'my file.parm'"
+    >>> command_line("tight", 3, {"wind": (8.0, 270.0), "autopilot": "px4", "params": "my file.parm"})
+    "planfly run tight --seed 3 --wind 8,270 --autopilot px4 --params 'my file.parm'"
     """
     words = [f"planfly run {shlex.quote(scenario)} --seed {seed}"]
     for name, value in options.items():

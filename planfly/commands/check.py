@@ -54,8 +54,8 @@ def check_options(line: LineParser) -> None:
         dest="autopilots",
         metavar="AUTOPILOT,...",
         type=autopilots,
-        help="fly a mission by the laws of several autopilots, and print one table, a column each: "
-        + ", ".join(CHOICES["autopilot_law"]),
+        help="fly a mission by several simulated autopilots, and print one table with a column for each: "
+        + ", ".join(CHOICES["autopilot"]),
     )
     group.add_argument(
         "--geometry",
@@ -83,7 +83,7 @@ def check(args: argparse.Namespace) -> int:
 
 
 # Options that are not allowed with --for, because they belong to one autopilot or to a log.
-_SINGLE_AUTOPILOT_OPTIONS = ("params", "guidance", "autopilot_law", "plan", "flight", "datum", "geometry")
+_SINGLE_AUTOPILOT_OPTIONS = ("params", "guidance", "autopilot", "plan", "flight", "datum", "geometry")
 
 
 def _check_for(args: argparse.Namespace) -> int:

@@ -44,7 +44,7 @@ def new_options(line: LineParser) -> None:
         ),
         aircraft_words,
     )
-    flown.add_argument("--autopilot-law", choices=CHOICES["autopilot_law"], help="whose law flies (default: ardupilot)")
+    flown.add_argument("--autopilot", choices=CHOICES["autopilot"], help="simulated autopilot (default: ardupilot)")
     result_options(parser)
 
 

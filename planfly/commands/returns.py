@@ -35,7 +35,7 @@ def returns_options(line: LineParser) -> None:
         " what can be reached without the engine",
         "planfly returns mission.waypoints --terrain jacksboro --wind 5,250",
         "planfly returns flight.mcap --every 5 --out pictures",
-        "planfly returns flight.mcap --autopilot ./arduplane --points 5",
+        "planfly returns flight.mcap --sitl ./arduplane --points 5",
     )
     completed(
         parser.add_argument(

@@ -19,7 +19,7 @@ from planfly.terminal.options import (
 # Help text on the modes and commands of the vehicle.
 _VEHICLE_HELP = """
 It flies the modes AUTO, LOITER, GUIDED (to a place) and RTL, and changes between them in flight.
-Parameters are read, listed and set by name before a flight: those of the autopilot's law, and PFLY_FORCE,
+Parameters are read, listed and set by name before a flight: those of the simulated autopilot, and PFLY_FORCE,
 which at 1 has a mission that is judged not flyable armed and flown all the same (default: 0)."""
 
 

@@ -21,7 +21,7 @@ def survey_options(line: LineParser) -> None:
     parser = line.command(
         "survey",
         "fly a survey: say how much of each photo line can be used, and what would help those that are lost",
-        "planfly survey field.plan --terrain dem.tif --aircraft x8 --autopilot-law ardupilot --wind 5,250",
+        "planfly survey field.plan --terrain dem.tif --aircraft x8 --autopilot ardupilot --wind 5,250",
         "planfly survey field.waypoints --suggest --out better",
     )
     completed(

@@ -77,7 +77,7 @@ class Jobs:
         """Return the choices that a page offers."""
         return {
             "aircraft": aircraft_names(),
-            "autopilots": list(CHOICES["autopilot_law"]),
+            "autopilots": list(CHOICES["autopilot"]),
             "turbulence": list(CHOICES["turbulence"]),
             "algorithms": {name: one.summary for name, one in ALGORITHMS.items()},
         }

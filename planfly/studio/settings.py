@@ -64,7 +64,7 @@ def changed_world(scenario: Scenario, asked: Settings) -> Scenario:
         "turbulence": asked.turbulence,
         "aircraft": asked.aircraft,
         "airspeed": asked.airspeed,
-        "autopilot_law": asked.autopilot,
+        "autopilot": asked.autopilot,
     }
     changed = apply_options(scenario, options)
     if asked.limits is None and asked.ceiling is None:

@@ -93,8 +93,8 @@ def autopilots(text: str) -> list[str]:
     """Convert names of autopilots separated by commas."""
     names = [name.strip() for name in text.split(",")]
     for name in names:
-        if name not in CHOICES["autopilot_law"]:
-            raise argparse.ArgumentTypeError(f"{name!r}: {', '.join(CHOICES['autopilot_law'])} is expected")
+        if name not in CHOICES["autopilot"]:
+            raise argparse.ArgumentTypeError(f"{name!r}: {', '.join(CHOICES['autopilot'])} is expected")
     return names
 
 

@@ -166,21 +166,21 @@ def pilot_options(parser: CommandParser) -> OptionTaker:
     found = group.add_argument(
         "--params",
         metavar="FILE",
-        help="fly the autopilot's law, ArduPlane's unless another is named, with these parameters, as a ground station "
-        "saves them",
+        help="parameters of the simulated autopilot, in a file as a ground station saves it; the file also decides the "
+        "autopilot if none is named",
     )
     completed(found, files("param", "parm", "params"))
     group.add_argument(
-        "--autopilot-law",
-        choices=CHOICES["autopilot_law"],
-        help="whose law flies: ArduPlane's (ardupilot, the default), PX4's for fixed wing (px4, the newest release "
-        "that planfly knows, px4-1.16 or px4-1.17), or planfly's own guidance (ideal)",
+        "--autopilot",
+        choices=CHOICES["autopilot"],
+        help="simulated autopilot: ArduPlane (ardupilot, the default), PX4 for fixed wing (px4, the newest release "
+        "that planfly knows, px4-1.16 or px4-1.17), or planfly's own guidance (planfly)",
     )
     group.add_argument(
         "--guidance",
         choices=CHOICES["guidance"],
-        help="fly planfly's own guidance instead: its path law (path), L1 along the legs (l1), or Beard and McLain's "
-        "vector field (default: ArduPlane's law with its default parameters)",
+        help="fly planfly's own guidance instead: along the path (path), L1 along the legs (l1), or Beard and McLain's "
+        "vector field",
     )
     return group
 
@@ -199,7 +199,7 @@ def steering_options(parser: CommandParser) -> OptionTaker:
 
 def program_option(group: OptionTaker, does: str) -> None:
     """Add the option for the program of an autopilot."""
-    group.add_argument("--autopilot", metavar="PATH", help=does)
+    group.add_argument("--sitl", metavar="PATH", help=does)
 
 
 def flight_options(parser: CommandParser) -> None:
@@ -208,8 +208,8 @@ def flight_options(parser: CommandParser) -> None:
     group = steering_options(parser)
     program_option(
         group,
-        "fly ArduPlane or PX4 itself in planfly's physics: the path of its program, built for software in the"
-        " loop (extra planfly[live])",
+        "fly ArduPlane or PX4 itself in planfly's flight dynamics: the path of its program, built for software in the "
+        "loop (extra planfly[live])",
     )
     group.add_argument(
         "--levels",

@@ -195,7 +195,7 @@ class ReturnsAnswer:
     """What leaves the returns open: terrain, law, autoland, return path or landing; empty where nothing does."""
     ranges: list[ReturnEntry]
     by_program: ByProgram | None
-    """Of --autopilot; what is worse there is counted in headline and ranges."""
+    """Of --sitl; what is worse there is counted in headline and ranges."""
     left_out: int
     """How many more there would be on the ground, or too low in a take-off or a landing to return."""
     no_return: str

@@ -52,7 +52,7 @@ _FIRMWARE = {ARDUPILOT: "firmwareType 3", PX4: "firmwareType 12"}
 def _of_parameters(scenario: Scenario, params: str) -> Scenario:
     found = read_origin(Path(params))
     if found.mixed:
-        allowed = "--autopilot-law names the autopilot that is to fly"
+        allowed = "--autopilot names the autopilot that is to fly"
         message = f"{params}: {found.evidence}: {allowed}"
         raise ParameterError(message, file=params, field="autopilot", value=found.evidence, allowed=allowed)
     return _taken(scenario, found.autopilot, params) if found.autopilot else scenario

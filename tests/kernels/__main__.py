@@ -79,7 +79,7 @@ PROCESSES = (
         (*FLY, "--log", "path.mcap", "--guidance", "path"),
         (*FLY, "--log", "l1.mcap", "--guidance", "l1"),
         (*FLY, "--log", "field.mcap", "--guidance", "vector-field"),
-        (*FLY, "--log", "px4.mcap", "--autopilot-law", "px4"),
+        (*FLY, "--log", "px4.mcap", "--autopilot", "px4"),
         ("replay", "path.mcap"),
         ("report", "path.mcap", "--out", "report"),
     ),

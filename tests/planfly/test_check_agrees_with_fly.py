@@ -68,7 +68,7 @@ def test_a_mission_that_check_calls_flyable_is_one_that_fly_calls_flyable(tmp_pa
         text, law = draw_mission(seed)
         file.write_text(text, encoding="utf-8")
         log = ("--log", str(tmp_path / f"{seed}.mcap"))
-        given = [str(file), "--terrain", "jacksboro", "--autopilot-law", law]
+        given = [str(file), "--terrain", "jacksboro", "--autopilot", law]
         codes = [main([command, *given, *more]) for command, more in (("check", ()), ("fly", log))]
         assert codes[0] == codes[1], text
         same += 1
@@ -84,7 +84,7 @@ def compare_levels(count: int) -> None:
             text, law = draw_mission(seed)
             file.write_text(text, encoding="utf-8")
             flown, geometric = (
-                planfly.check(str(file), terrain="jacksboro", autopilot_law=law, geometry=geometry)
+                planfly.check(str(file), terrain="jacksboro", autopilot=law, geometry=geometry)
                 for geometry in (False, True)
             )
             said = tuple(

@@ -78,7 +78,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 VERDICT = (0, 3, 4)
 BASE: dict[str, tuple[tuple[int, ...], str]] = {
     "plan paper-07 --seed 1 --out plan.json": ((0,), "plan.json"),
-    "fly mission.waypoints --terrain dem.tif --log flown.mcap --autopilot-law px4": (VERDICT, "flown.mcap"),
+    "fly mission.waypoints --terrain dem.tif --log flown.mcap --autopilot px4": (VERDICT, "flown.mcap"),
     "check mission.waypoints --terrain dem.tif": (VERDICT, ""),
     "check flight.mcap": (VERDICT, ""),
     "compare flight.mcap flight.mcap --out compared": ((0,), "compared"),
@@ -101,8 +101,8 @@ MISSED = {
     "studio": ("studio", "the studio needs"),
     "serve": ("live", "serve needs"),
     "replay flight.mcap --to 127.0.0.1:9": ("live", "playing to ground stations needs"),
-    "fly mission.waypoints --terrain dem.tif --autopilot ./arduplane --log l.mcap": ("live", "--autopilot needs"),
-    "run paper-07 --autopilot ./arduplane": ("live", "--autopilot needs"),
+    "fly mission.waypoints --terrain dem.tif --sitl ./arduplane --log l.mcap": ("live", "--sitl needs"),
+    "run paper-07 --sitl ./arduplane": ("live", "--sitl needs"),
     "export flight.mcap b.csv b.tlog": ("live", ".tlog needs"),
     "import flight.tlog b.mcap": ("live", "flight.tlog: reading .tlog needs"),
     "check flight.tlog": ("live", "flight.tlog: reading .tlog needs"),

@@ -145,7 +145,7 @@ CASES = {
 }
 
 
-def setup_of(case: Case, autopilot: str = "ideal") -> FlightSetup:
+def setup_of(case: Case, autopilot: str = "planfly") -> FlightSetup:
     made = {
         "origin": {"lat_deg": ORIGIN.lat_deg, "lon_deg": ORIGIN.lon_deg},
         "terrain": {"kind": "flat", "amsl_m": case.ground},

@@ -126,7 +126,7 @@ def test_what_leads_through_a_ridge_is_not_flyable(
         lines = [row(16, home, float(ground(home[None])[0])), *rows]
         text = "\n".join(["QGC WPL 110", *(f"{k} 0 {one} 1" for k, one in enumerate(lines))])
         file.write_text(text, encoding="utf-8")
-        code = main(["check", str(file), "--terrain", "jacksboro", "--autopilot-law", "ardupilot"])
+        code = main(["check", str(file), "--terrain", "jacksboro", "--autopilot", "ardupilot"])
         told = capsys.readouterr().out.splitlines()[0]
         assert code in codes, (text, told)
         assert said in told, (text, told)

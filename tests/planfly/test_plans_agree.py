@@ -31,7 +31,7 @@ def planned(scenario: Scenario) -> Plan:
 
 def planned_again(scenario: Scenario) -> Plan:
     """Again from the third leg on; the first two were planned for planfly's own law in still air."""
-    calm = scenario_of("none", "ideal", threats=scenario.to_json().get("threats", []))
+    calm = scenario_of("none", "planfly", threats=scenario.to_json().get("threats", []))
     return planfly.replan(scenario, planned(calm), 2, seed=SEED)
 
 

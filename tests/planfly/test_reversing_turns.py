@@ -17,7 +17,7 @@ HOME = (36.5, -84.2)
 # m by degree of latitude, and of longitude there.
 NORTH, EAST = 110_950.0, 111_320.0 * math.cos(math.radians(HOME[0]))
 GROUND = 300.0
-LAWS = ("ardupilot", "px4", "ideal")
+LAWS = ("ardupilot", "px4", "planfly")
 
 
 def row(seq: int, east: float, north: float, height: float, frame: int = 3) -> str:
@@ -54,32 +54,32 @@ def test_a_waypoint_inside_a_hill_is_not_flyable_however_sharp_its_turn(
     aside = 2400.0 * math.sin(math.radians(180.0 - turn_deg))
     mission = write_mission(tmp_path, (0.0, 0.0, 200.0), (0.0, 2500.0, 200.0), (aside, 2500.0 - back, 200.0))
     terrain = write_hill(tmp_path, 2500.0, 400.0, slope=2.0)
-    assert main(["check", mission, "--terrain", terrain, "--autopilot-law", law]) == 4
-    geometry = planfly.check(mission, terrain=terrain, autopilot_law=law, geometry=True)
+    assert main(["check", mission, "--terrain", terrain, "--autopilot", law]) == 4
+    geometry = planfly.check(mission, terrain=terrain, autopilot=law, geometry=True)
     assert {item.place.to_item for item in geometry.failed if item.rule == "clearance"} == {2, 3}
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_there_and_back_over_level_ground_is_flown_to_the_waypoint_and_flyable(law: str, tmp_path: Path) -> None:
     mission = write_mission(tmp_path, (0.0, 0.0, 200.0), (0.0, 2500.0, 200.0), (0.0, 0.0, 200.0))
-    flown = planfly.fly(mission, terrain=write_hill(tmp_path, 7000.0, 1.0), autopilot_law=law)
+    flown = planfly.fly(mission, terrain=write_hill(tmp_path, 7000.0, 1.0), autopilot=law)
     assert flown.verdict.flyable, flown.verdict.summary
     # ArduPlane turns at WP_RADIUS, 90 m; the other two fly over the waypoint.
     assert flown.track.position[:, 1].max() > 2500.0 - (91.0 if law == "ardupilot" else 10.0)
-    assert planfly.check(mission, terrain=write_hill(tmp_path, 7000.0, 1.0), autopilot_law=law, geometry=True).flyable
+    assert planfly.check(mission, terrain=write_hill(tmp_path, 7000.0, 1.0), autopilot=law, geometry=True).flyable
 
 
-@pytest.mark.parametrize("law", ["ardupilot", "ideal"])
+@pytest.mark.parametrize("law", ["ardupilot", "planfly"])
 def test_a_leg_above_ground_follows_the_ground(law: str, tmp_path: Path) -> None:
     """A straight leg would meet the hill's flank of 5 degrees 30 m below its top."""
     places = (0.0, 0.0, 100.0), (0.0, 1000.0, 100.0), (0.0, 6500.0, 100.0)
     terrain = write_hill(tmp_path, 4000.0, 130.0, slope=math.tan(math.radians(5.0)))
-    flown = planfly.fly(write_mission(tmp_path, *places, frame=10), terrain=terrain, autopilot_law=law)
+    flown = planfly.fly(write_mission(tmp_path, *places, frame=10), terrain=terrain, autopilot=law)
     assert flown.verdict.flyable, flown.verdict.summary
     assert flown.track.clearance.min() > 85.0
     # TERRAIN_LOOKAHD lifts ArduPlane before the top, by no more than the hill's height above half of its climb.
     assert flown.track.clearance.max() < 130.0
-    straight = planfly.fly(write_mission(tmp_path, *places, frame=3), terrain=terrain, autopilot_law=law)
+    straight = planfly.fly(write_mission(tmp_path, *places, frame=3), terrain=terrain, autopilot=law)
     assert straight.ended == "ground contact"
 
 
@@ -108,7 +108,7 @@ def test_a_zone_on_one_side_of_a_reversal_is_never_flyable(side: float, law: str
     }
     file = tmp_path / "yard.geojson"
     file.write_text(json.dumps(zone), encoding="utf-8")
-    given = {"terrain": write_hill(tmp_path, 7000.0, 1.0), "fence": [str(file)], "autopilot_law": law}
+    given = {"terrain": write_hill(tmp_path, 7000.0, 1.0), "fence": [str(file)], "autopilot": law}
     for geometry in (False, True):
         assert not planfly.check(mission, **given, geometry=geometry).flyable
 
@@ -119,6 +119,6 @@ def test_arduplane_reads_an_acceptance_radius_as_a_byte(law: str, reads: float, 
     mission = write_mission(tmp_path, (0.0, 0.0, 200.0), (0.0, 2500.0, 200.0), (2500.0, 2500.0, 200.0))
     text = Path(mission).read_text(encoding="utf-8").replace("16 0 0 0 0", "16 0 300 0 0")
     Path(mission).write_text(text, encoding="utf-8")
-    verdict = planfly.check(mission, terrain=write_hill(tmp_path, 7000.0, 1.0), autopilot_law=law)
+    verdict = planfly.check(mission, terrain=write_hill(tmp_path, 7000.0, 1.0), autopilot=law)
     passed = [item.limit for item in verdict.findings if item.rule == "waypoint" and item.place.item == 2]
     assert passed == [reads]

@@ -154,10 +154,10 @@ def test_every_default() -> None:
 @pytest.mark.parametrize(
     ("stated", "flown_by"),
     [
-        ({}, (DEFAULT_AUTOPILOT, "path", "perfect" if DEFAULT_AUTOPILOT == "ideal" else "gnss")),
-        ({"guidance": "l1"}, ("ideal", "l1", "perfect")),
-        ({"autopilot": "ideal"}, ("ideal", "path", "perfect")),
-        ({"autopilot": "ideal", "nav": "gnss"}, ("ideal", "path", "gnss")),
+        ({}, (DEFAULT_AUTOPILOT, "path", "perfect" if DEFAULT_AUTOPILOT == "planfly" else "gnss")),
+        ({"guidance": "l1"}, ("planfly", "l1", "perfect")),
+        ({"autopilot": "planfly"}, ("planfly", "path", "perfect")),
+        ({"autopilot": "planfly", "nav": "gnss"}, ("planfly", "path", "gnss")),
         ({"autopilot": "ardupilot"}, ("ardupilot", "path", "gnss")),
         ({"params": "mine.parm"}, ("ardupilot", "path", "gnss")),
         ({"params": "mine.parm", "nav": "perfect"}, ("ardupilot", "path", "perfect")),

@@ -26,7 +26,7 @@ class PlanflyGuidance(Autopilot):
     guidance: its lateral law, as in `[flight] guidance`.
     """
 
-    name: ClassVar = "ideal"
+    name: ClassVar = "planfly"
     title: ClassVar = "planfly's guidance"
     level: ClassVar[Level] = "airframe"
     guidance: Guidance = "path"

@@ -103,7 +103,7 @@ def test_a_name_that_is_not_listed_is_one_line() -> None:
     with pytest.raises(ScenarioError) as refused:
         load_autopilot(tight(autopilot="ardupilott"), AEROSONDE)
     laws = [kind.name for kind in AUTOPILOTS if not issubclass(kind, ProgramAutopilot)]
-    assert laws[:2] == ["ardupilot", "ideal"]
+    assert laws[:2] == ["ardupilot", "planfly"]
     expected = " or ".join(f"'{name}'" for name in laws)
     assert str(refused.value) == (
         f"tight: flight.autopilot: 'ardupilott': {expected} is expected: did you mean 'ardupilot'?"

@@ -169,10 +169,10 @@ def test_what_is_written_to_the_byte() -> None:
     assert (data["fileType"], data["version"], data["mission"]["version"]) == ("Plan", 1, 2)
     assert (data["geoFence"]["version"], data["rallyPoints"]["version"]) == (2, 2)
     assert (data["mission"]["firmwareType"], data["mission"]["vehicleType"]) == (0, 1)
-    for autopilot, firmware in (("ardupilot", 3), ("px4", 12), ("ideal", 0)):
+    for autopilot, firmware in (("ardupilot", 3), ("px4", 12), ("planfly", 0)):
         written = mission_text(replace(mission, autopilot=autopilot), "plan")
         assert json.loads(written)["mission"]["firmwareType"] == firmware
-        assert parse_mission(written, "a.plan").autopilot == ("" if autopilot == "ideal" else autopilot)
+        assert parse_mission(written, "a.plan").autopilot == ("" if autopilot == "planfly" else autopilot)
     assert data["mission"]["plannedHomePosition"] == [36.5, -84.25, 354.5]
     assert data["mission"]["items"] == [
         {

@@ -285,7 +285,7 @@ def _airframe() -> Any:
     return load_airframe(from_spec(spec, "made"))
 
 
-FLIGHT = {"airspeed_mps": SPEED, "autopilot": "ideal"}
+FLIGHT = {"airspeed_mps": SPEED, "autopilot": "planfly"}
 
 
 def fenced_mission(number: int) -> FencedMission:

@@ -56,7 +56,7 @@ def test_parameters_mean_arduplane_and_a_law_of_guidance_takes_its_place(tmp_pat
     assert by_arduplane.flight.steering == ("ardupilot", "path", "gnss")
     assert by_arduplane.flight.params == str(mine)
     again = apply_options(by_arduplane, FlightOptions(guidance="l1")).flight
-    assert (again.params, again.steering) == (None, ("ideal", "l1", "perfect"))
+    assert (again.params, again.steering) == (None, ("planfly", "l1", "perfect"))
     assert apply_options(scenario, FlightOptions(params=mine, nav="rtk")).flight.steering.nav == "rtk"
     # A program is an ArduPlane, whatever the scenario says.
     assert (

@@ -35,7 +35,7 @@ amsl_m = 180
 [limits]
 min_clearance_m = 60
 [flight]
-autopilot = "ideal"
+autopilot = "planfly"
 [wind]
 speed_mps = 5
 from_deg = 250

@@ -24,10 +24,10 @@ from planfly.campaigns.tables import DATABASE, read_table
 from planfly.commands.registry import build_parser
 from tests.planfly.campaigns.made_report import made_report
 
-FLOWN = ("aircraft", "airspeed", "wind", "turbulence", "at", "params", "guidance", "autopilot_law", "nav")
+FLOWN = ("aircraft", "airspeed", "wind", "turbulence", "at", "params", "guidance", "autopilot", "nav")
 FLOWN_BY = (
     "--wind 8.25,270 --turbulence light --nav rtk --aircraft aerosonde --airspeed 21.5 --fence a.fence --fence b.kml "
-    "--autopilot-law px4"
+    "--autopilot px4"
 )
 
 

@@ -1,4 +1,4 @@
-"""``planfly fly --autopilot``: a real autopilot's flight, its log beside ours, its verdict again, and its failures."""
+"""``planfly fly --sitl``: a real autopilot's flight, its log beside ours, its verdict again, and its failures."""
 
 import json
 import os
@@ -46,7 +46,7 @@ def test_a_flight_is_logged_judged_and_judged_again(
     params, log = tmp_path / "mine.parm", tmp_path / "f.mcap"
     params.write_text("LIM_ROLL_CD 3500\nSERVO1_MIN 1000\nNAVL1_PERIOD 17\n", encoding="utf-8")
     given = ["--params", str(params), "--log", str(log)]
-    code = main(["fly", str(mission), "--autopilot", str(write_fake(tmp_path)), *given])
+    code = main(["fly", str(mission), "--sitl", str(write_fake(tmp_path)), *given])
     printed = capsys.readouterr().out
     assert "Flown by: ArduPlane V0.0-fake (0badc0de) (sha256 " in printed
     assert "changed: NAVL1_PERIOD 17, ROLL_LIMIT_DEG 35" in printed
@@ -71,7 +71,7 @@ def test_a_program_with_px4s_start_up_files_is_flown_as_px4(
     params, log = tmp_path / "mine.params", tmp_path / "f.mcap"
     params.write_text("1\t1\tFW_R_LIM\t35.0\t9\n1\t1\tBAT1_N_CELLS\t3\t6\n", encoding="utf-8")
     program = write_fake_px4(tmp_path)
-    code = main(["fly", str(mission), "--autopilot", str(program), "--params", str(params), "--log", str(log)])
+    code = main(["fly", str(mission), "--sitl", str(program), "--params", str(params), "--log", str(log)])
     printed = capsys.readouterr().out
     assert "Flown by: PX4 1.16.0 (sha256 " in printed
     assert "changed: FW_R_LIM 35" in printed
@@ -100,7 +100,7 @@ def test_a_program_that_fails_is_one_line_and_leaves_no_log(
     mission: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], fault: str, code: int, said: str
 ) -> None:
     program, log = write_fake(tmp_path, fault), tmp_path / "f.mcap"
-    assert main(["fly", str(mission), "--autopilot", str(program), "--log", str(log)]) == code
+    assert main(["fly", str(mission), "--sitl", str(program), "--log", str(log)]) == code
     errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("planfly: ")]
     assert len(errors) == 1
     assert errors[0].startswith(f"planfly: {program}: {said}")
@@ -112,14 +112,14 @@ def test_what_cannot_be_run_is_one_line_before_anything_is_read(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for command in (["fly", "no.waypoints"], ["run", "no-scenario"]):
-        assert main([*command, "--autopilot", str(tmp_path / "none")]) == 2
+        assert main([*command, "--sitl", str(tmp_path / "none")]) == 2
         assert capsys.readouterr().err.startswith(f"planfly: {tmp_path / 'none'}: no such file; ")
 
 
 def test_a_law_of_guidance_and_a_real_autopilot_exclude_each_other(
     mission: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["fly", str(mission), "--autopilot", str(write_fake(tmp_path)), "--guidance", "l1"]) == 2
+    assert main(["fly", str(mission), "--sitl", str(write_fake(tmp_path)), "--guidance", "l1"]) == 2
     assert 'guidance: not a key of autopilot = "ardupilot"' in capsys.readouterr().err
 
 
@@ -128,7 +128,7 @@ def test_the_autopilots_log_is_not_written_over_another(
 ) -> None:
     mine = tmp_path / "f.BIN"
     mine.write_bytes(b"mine")
-    given = ["--autopilot", str(write_fake(tmp_path)), "--log", str(tmp_path / "f.mcap")]
+    given = ["--sitl", str(write_fake(tmp_path)), "--log", str(tmp_path / "f.mcap")]
     assert main(["fly", str(mission), *given]) == 2
     assert capsys.readouterr().err == f"planfly: {mine}: exists; --overwrite replaces it\n"
     assert mine.read_bytes() == b"mine"
@@ -140,7 +140,7 @@ def test_a_signal_ends_the_program_and_leaves_none_of_its_files(
 ) -> None:
     temporary = tmp_path / "temporary"
     temporary.mkdir()
-    command = [sys.executable, "-m", "planfly", "fly", str(mission), "--autopilot", str(write_fake(tmp_path, "silent"))]
+    command = [sys.executable, "-m", "planfly", "fly", str(mission), "--sitl", str(write_fake(tmp_path, "silent"))]
     running = subprocess.Popen(
         [*command, "--log", str(tmp_path / "f.mcap")],
         cwd=ROOT,
@@ -168,7 +168,7 @@ def test_a_signal_ends_the_program_and_leaves_none_of_its_files(
 @pytest.mark.client
 def test_arduplane_flies_a_mission_file(mission: Path, tmp_path: Path) -> None:
     log = tmp_path / "f.mcap"
-    given = ["--autopilot", str(need_arduplane()), "--log", str(log), "--wind", "5,250", "--turbulence", "light"]
+    given = ["--sitl", str(need_arduplane()), "--log", str(log), "--wind", "5,250", "--turbulence", "light"]
     main(["fly", str(mission), *given])
     recorded = read_log(log)
     assert recorded.ended == "completed"

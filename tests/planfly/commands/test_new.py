@@ -62,14 +62,14 @@ def test_a_scenario_over_ones_own_ground(here: Path, capsys: pytest.CaptureFixtu
     assert main(["plan", "elsewhere/site/site.toml", "--out", "plan.json"]) == 0
 
 
-@pytest.mark.parametrize("law", ["ardupilot", "px4-1.16", "ideal"])
+@pytest.mark.parametrize("law", ["ardupilot", "px4-1.16", "planfly"])
 def test_every_example_may_be_switched_on(law: str, here: Path) -> None:
-    file = planfly.new_scenario("site", (46.5, 8.0), (46.55, 8.09), autopilot_law=law)
+    file = planfly.new_scenario("site", (46.5, 8.0), (46.55, 8.09), autopilot=law)
     text, switched = EXAMPLE.subn(
         "", file.read_text(encoding="utf-8").replace('\n# kind = "dem"', "").replace('\n# path = "dem.tif"', "\n#")
     )
     assert switched > 20
-    if law == "ideal":
+    if law == "planfly":
         text = text.replace("\nparams = ", "\n# params = ")
     file.write_text(text, encoding="utf-8")
     (file.parent / "mine.param").write_text("NAV_ACC_RAD,12\n" if "px4" in law else "WP_RADIUS,60\n", encoding="ascii")

@@ -130,9 +130,9 @@ def test_returns_that_follow_the_terrain_end_with_3(hill: Path, capsys: pytest.C
 
 def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (hill / "short.waypoints").write_text(mission_text(0.0, 2000.0), encoding="utf-8")
-    asked = ["returns", "short.waypoints", "--scenario", "hill.toml", "--every", "20", "--autopilot-law"]
+    asked = ["returns", "short.waypoints", "--scenario", "hill.toml", "--every", "20", "--autopilot"]
     # From before the hill all returns are safe by ArduPlane's law, which is planfly's own guidance's too.
-    assert main([*asked, "ideal"]) == 0
+    assert main([*asked, "planfly"]) == 0
     assert "it returns: the pilot's RTL" in capsys.readouterr().out
     assert main([*asked, "px4", "--json", "px4.json"]) == 3
     out = capsys.readouterr().out

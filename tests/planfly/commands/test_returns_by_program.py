@@ -1,4 +1,4 @@
-"""``planfly returns --autopilot``: the worst returns by a program; what counts where it and the law disagree."""
+"""``planfly returns --sitl``: the worst returns by a program; what counts where it and the law disagree."""
 
 import json
 from dataclasses import replace
@@ -52,7 +52,7 @@ def test_a_return_that_a_program_flies_as_the_law_does_agrees(
 
         monkeypatch.setattr(program_returns, "fly_and_judge", by_law)
     flat = [word.replace("mound.toml", "flat.toml") for word in ASKED]
-    assert main([*flat, "--autopilot", str(write_fake(mound)), "--out", "drawn"]) == 0
+    assert main([*flat, "--sitl", str(write_fake(mound)), "--out", "drawn"]) == 0
     assert " itself: 1 of the worst flown, all of them as by the law" in capsys.readouterr().out
     (one,) = json.loads((mound / "a.json").read_text(encoding="utf-8"))["by_program"]["returns"]
     assert (one["agrees"], one["worse"], one["reason"]) == (True, False, "")
@@ -67,7 +67,7 @@ def test_a_return_that_a_program_flies_as_the_law_does_agrees(
 def test_harm_that_a_program_does_counts_where_the_law_does_none(
     mound: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main([*ASKED, "--autopilot", str(write_fake(mound, "dives-home")), "--out", "drawn"]) == 4
+    assert main([*ASKED, "--sitl", str(write_fake(mound, "dives-home")), "--out", "drawn"]) == 4
     out = capsys.readouterr().out
     assert "returns 1 hits the ground" in out
     program = "by ArduPlane V0.0-fake (0badc0de) itself: 1 of the worst flown"
@@ -88,7 +88,7 @@ def test_no_program_but_arduplanes_is_flown(mound: Path, capsys: pytest.CaptureF
         (write_fake_px4(mound), "ArduPlane's program is expected: how PX4 returns is not flown here"),
         (mound / "none", "no such file"),
     ):
-        assert main(["returns", "mound.waypoints", "--autopilot", str(program)]) == 2
+        assert main(["returns", "mound.waypoints", "--sitl", str(program)]) == 2
         captured = capsys.readouterr()
         assert captured.out == ""
         assert said in captured.err

@@ -46,9 +46,9 @@ def set_mode(station: UdpStation, mode: int) -> None:
     in_mode(station, mode)
 
 
-@pytest.mark.parametrize("law", some(["ardupilot", "px4", "ideal"], 3))
+@pytest.mark.parametrize("law", some(["ardupilot", "px4", "planfly"], 3))
 def test_it_holds_goes_elsewhere_goes_on_and_returns(serve: Callable[..., Served], law: str) -> None:
-    vehicle = serve("--scenario", "field.toml", "--speed", "20", "--autopilot-law", law)
+    vehicle = serve("--scenario", "field.toml", "--speed", "20", "--autopilot", law)
     with UdpStation(vehicle.port) as station:
         assert station.upload(ROUTE) == 0
         assert station.command(mavlink.MAV_CMD_DO_SET_MODE, 1, 11) == mavlink.MAV_RESULT_DENIED, "on the ground"

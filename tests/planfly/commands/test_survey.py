@@ -18,7 +18,7 @@ from planfly.workflow.airframe import Airframe
 from tests.soak import SOAK
 
 FIELD_SURVEY = Path(__file__).with_name("field.waypoints")
-BY = ["--aircraft", "x8", "--autopilot-law", "ardupilot"]
+BY = ["--aircraft", "x8", "--autopilot", "ardupilot"]
 
 
 def test_each_line_is_told_and_what_would_help_is_flown(
@@ -57,7 +57,7 @@ def test_each_line_is_told_and_what_would_help_is_flown(
 
 
 def test_a_flight_and_its_log_say_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    flown = planfly.fly(FIELD_SURVEY, aircraft="x8", autopilot_law="ardupilot", log=tmp_path / "f.mcap")
+    flown = planfly.fly(FIELD_SURVEY, aircraft="x8", autopilot="ardupilot", log=tmp_path / "f.mcap")
     assert [item.rule for item in flown.verdict.findings if item.ok is False] == ["survey"] * 4
     of_flight, of_log = planfly.survey(flown), planfly.survey(tmp_path / "f.mcap")
     assert of_flight.lines_of_lines == of_log.lines_of_lines

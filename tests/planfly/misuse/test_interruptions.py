@@ -213,7 +213,7 @@ def test_every_command_at_any_moment(inputs: Path, flight: Path, broken: Path, t
     commands, under_way = list(EVERY), set[str]()
     arduplane = find_arduplane()
     if arduplane is not None:
-        commands.append((*EVERY[2], "--autopilot", str(arduplane)))
+        commands.append((*EVERY[2], "--sitl", str(arduplane)))
     rng = np.random.default_rng(17)
     longest, count = 0.0, 0
     for n, argv in enumerate(commands):

@@ -24,10 +24,10 @@ PAGE = ROOT / "docs" / "network-security.md"
 # What opens a socket, in a source; and the files that may, with the commands of the table whose listeners they hold.
 OPENS = re.compile(r"socket\.socket\(|create_server\(|start_server\(|\.LocalCluster\(|HTTPServer\(|\bListener\(")
 HOLD = {
-    "flight/autopilots/arduplane_sitl/physics.py": "`fly`, `run` with `--autopilot`",
-    "flight/autopilots/px4_sitl/physics.py": "`fly`, `run` with `--autopilot ./px4`",
+    "flight/autopilots/arduplane_sitl/physics.py": "`fly`, `run` with `--sitl`",
+    "flight/autopilots/px4_sitl/physics.py": "`fly`, `run` with `--sitl ./px4`",
     # Of both; it also asks the system for ports that are free, and closes them.
-    "flight/autopilots/sitl/link.py": "`fly`, `run` with `--autopilot`",
+    "flight/autopilots/sitl/link.py": "`fly`, `run` with `--sitl`",
     "flight/live/link.py": "`serve`",
     "planfly/replays/foxglove_server.py": "`replay --foxglove`",
     "planfly/replays/origin_gate.py": "`replay --foxglove`",
@@ -89,7 +89,7 @@ def test_the_studio(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("command", "sockets"),
-    [("--autopilot", (PhysicsPort, TcpLink)), ("--autopilot ./px4", (SimulatorPort, UdpLink))],
+    [("--sitl", (PhysicsPort, TcpLink)), ("--sitl ./px4", (SimulatorPort, UdpLink))],
 )
 def test_an_autopilot(command: str, sockets: tuple[type[PhysicsPort | SimulatorPort], type[TcpLink | UdpLink]]) -> None:
     before = listening(psutil.Process().pid)

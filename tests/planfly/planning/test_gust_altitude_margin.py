@@ -32,7 +32,7 @@ def scenario_of(turbulence: str, height: float = 60.0, **tables: Any) -> Scenari
     """8 km for the Zagi with planfly's guidance over level ground at 3,000 m, 50 m of which are to be kept."""
     made: dict[str, Any] = {
         "terrain": {"kind": "flat", "amsl_m": GROUND},
-        "flight": {"aircraft": "zagi", "autopilot": "ideal"},
+        "flight": {"aircraft": "zagi", "autopilot": "planfly"},
         "limits": {"min_clearance_m": 50.0},
         "wind": {"speed_mps": 0.0, "from_deg": 0.0, "turbulence": turbulence},
     }
@@ -352,11 +352,11 @@ def band_of(most: float, autopilot: str = "ardupilot", **tables: Any) -> Scenari
         (0.0, "none", 0.0),
     ],
 )
-@pytest.mark.parametrize("autopilot", ["ardupilot", "px4", "ideal"])
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4", "planfly"])
 def test_an_updraft_lifts_those_who_keep_their_airspeed(
     sink: float, turbulence: Turbulence, rise: float, autopilot: str
 ) -> None:
-    expected = 0.0 if autopilot == "ideal" else rise
+    expected = 0.0 if autopilot == "planfly" else rise
     found = load_airframe(band_of(300.0, autopilot)).autopilot.gust_rise(sink, turbulence)
     assert found == pytest.approx(expected, abs=0.3)
 

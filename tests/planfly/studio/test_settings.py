@@ -86,7 +86,7 @@ def test_a_value_that_is_not_allowed_is_refused_in_one_line(kept: Session, asked
 
 def test_planflys_own_guidance_has_no_parameters() -> None:
     session = drawn_session(6, 14)
-    set_in(session, autopilot="ideal")
+    set_in(session, autopilot="planfly")
     assert session.settings_json()["known"] == {}
     with pytest.raises(PlanflyError, match="has no parameters"):
         set_in(session, parameter="WP_RADIUS=60")

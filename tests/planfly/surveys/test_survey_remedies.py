@@ -54,7 +54,7 @@ class Flights:
 
 
 def opened(path: Path) -> FlightSetup:
-    return open_flight(path, {"aircraft": "x8", "autopilot_law": "ardupilot"})
+    return open_flight(path, {"aircraft": "x8", "autopilot": "ardupilot"})
 
 
 def tried(monkeypatch: pytest.MonkeyPatch, answer: Answer, path: Path = FIELD) -> tuple[TriedRemedies, list[float]]:

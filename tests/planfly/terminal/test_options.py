@@ -54,12 +54,12 @@ def test_a_wind_is_a_speed_and_where_it_blows_from() -> None:
         parser_with(flown_by_options).parse_args(["--turbulence", "severe"])
 
 
-@pytest.mark.parametrize("line", ["fly m.waypoints --autopilot bin/arduplane", "run tight --autopilot bin/arduplane"])
+@pytest.mark.parametrize("line", ["fly m.waypoints --sitl bin/arduplane", "run tight --sitl bin/arduplane"])
 def test_a_real_autopilot_flies_for_the_commands_that_fly(line: str) -> None:
     assert build_parser().parse_args(line.split()).autopilot == "bin/arduplane"
 
 
-@pytest.mark.parametrize("line", ["check m.plan --autopilot a", "plan tight --autopilot a", "serve --autopilot a"])
+@pytest.mark.parametrize("line", ["check m.plan --sitl a", "plan tight --sitl a", "serve --sitl a"])
 def test_and_for_no_other(line: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stopped:
         build_parser().parse_args(line.split())
@@ -70,7 +70,7 @@ def test_and_for_no_other(line: str, capsys: pytest.CaptureFixture[str]) -> None
 def test_run_takes_what_fly_takes_of_a_flight() -> None:
     commands = build_parser().commands
     shared = set(parser_with(flight_options).options())
-    assert {"--wind", "--turbulence", "--aircraft", "--airspeed", "--params", "--nav", "--autopilot"} < shared
+    assert {"--wind", "--turbulence", "--aircraft", "--airspeed", "--params", "--nav", "--sitl"} < shared
     for name in ("run", "fly"):
         assert shared <= set(commands[name].options())
     # What is left is a mission's: whose scenario it is judged in, and where its log goes.

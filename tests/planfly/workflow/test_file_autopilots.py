@@ -65,13 +65,13 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("plane.plan", {"params": "plane.param"}, "ardupilot"),
         ("generic.plan", {}, "ardupilot"),
         ("generic.plan", {"params": "px4.params"}, "px4"),
-        ("unstated.plan", {"autopilot_law": "px4"}, "px4"),
-        ("px4.plan", {"autopilot_law": "px4-1.16"}, "px4"),
+        ("unstated.plan", {"autopilot": "px4"}, "px4"),
+        ("px4.plan", {"autopilot": "px4-1.16"}, "px4"),
         # planfly's own guidance says nothing of an autopilot.
-        ("px4.plan", {"autopilot_law": "ideal"}, "ideal"),
+        ("px4.plan", {"autopilot": "planfly"}, "planfly"),
         # Whoever names an autopilot says which of the names apply.
-        ("m.waypoints", {"params": "mixed.param", "autopilot_law": "px4"}, "px4"),
-        ("m.waypoints", {"params": "mixed.param", "autopilot_law": "ardupilot"}, "ardupilot"),
+        ("m.waypoints", {"params": "mixed.param", "autopilot": "px4"}, "px4"),
+        ("m.waypoints", {"params": "mixed.param", "autopilot": "ardupilot"}, "ardupilot"),
     ],
 )
 @pytest.mark.usefixtures("files")
@@ -79,7 +79,7 @@ def test_the_autopilot_is_taken_from_the_files(mission: str, options: dict[str, 
     judged = planfly.judge(mission, geometry=True, **options)  # type: ignore[arg-type]
     assert judged.setup.autopilot.name == flies
     (line,) = [line for line in judged.verdict.lines if line.startswith("Autopilot: ")]
-    taken = flies == "px4" and "autopilot_law" not in options
+    taken = flies == "px4" and "autopilot" not in options
     assert line.endswith(", for nobody named an autopilot") is taken
     if taken:
         file = options.get("params", mission)
@@ -87,24 +87,24 @@ def test_the_autopilot_is_taken_from_the_files(mission: str, options: dict[str, 
         assert f"; taken from {Path(file).resolve() if file.endswith('params') else file}, for nobody" in line
 
 
-TO_PX4 = "and ArduPlane is to fly: --autopilot-law px4 flies it by PX4's law"
-TO_ARDUPLANE = "and PX4 is to fly: --autopilot-law ardupilot flies it by ArduPlane's law"
+TO_PX4 = "and ArduPlane is to fly: --autopilot px4 simulates PX4 instead"
+TO_ARDUPLANE = "and PX4 is to fly: --autopilot ardupilot simulates ArduPlane instead"
 
 
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("m.waypoints --params px4.params --autopilot-law ardupilot", f'PX4 ("# Stack: PX4 Pro"), {TO_PX4}'),
+        ("m.waypoints --params px4.params --autopilot ardupilot", f'PX4 ("# Stack: PX4 Pro"), {TO_PX4}'),
         (
-            "m.waypoints --params plane.param --autopilot-law px4",
+            "m.waypoints --params plane.param --autopilot px4",
             f"(TECS_CLMB_MAX, WP_RADIUS), {TO_ARDUPLANE}",
         ),
-        ("px4.plan --autopilot-law ardupilot", f"px4.plan: written for PX4 (firmwareType 12), {TO_PX4}"),
-        ("plane.plan --autopilot-law px4", f"plane.plan: written for ArduPilot (firmwareType 3), {TO_ARDUPLANE}"),
+        ("px4.plan --autopilot ardupilot", f"px4.plan: written for PX4 (firmwareType 12), {TO_PX4}"),
+        ("plane.plan --autopilot px4", f"plane.plan: written for ArduPilot (firmwareType 3), {TO_ARDUPLANE}"),
         ("px4.plan --params plane.param", "px4.plan: written for PX4 (firmwareType 12), and"),
         ("plane.plan --params px4.params", "plane.plan: written for ArduPilot (firmwareType 3), and"),
         ("m.waypoints --params copter.param", "copter.param: parameters of a multicopter or helicopter (ArduPilot): "),
-        ("m.waypoints --params mixed.param", "FW_R_TC is PX4's and TECS_CLMB_MAX ArduPilot's: --autopilot-law names"),
+        ("m.waypoints --params mixed.param", "FW_R_TC is PX4's and TECS_CLMB_MAX ArduPilot's: --autopilot names"),
         ("copter.plan", "copter.plan: mission.vehicleType: 2: a multicopter or helicopter"),
         ("vtol.plan", "vtol.plan: mission.vehicleType: 22: a VTOL aircraft"),
         ("tracker.plan", "tracker.plan: mission.vehicleType: 5: another vehicle"),
@@ -154,7 +154,7 @@ amsl_m = 400
 def test_a_scenario_that_names_an_autopilot_is_held_to_it(entries: str, flies: str | None, files: Path) -> None:
     (files / "field.toml").write_text(SCENARIO + entries + "\n", encoding="utf-8")
     if flies is None:
-        with pytest.raises(planfly.PlanflyError, match=r"written for .*--autopilot-law"):
+        with pytest.raises(planfly.PlanflyError, match=r"written for .*--autopilot"):
             planfly.judge("m.waypoints", scenario="field.toml")
         return
     assert planfly.judge("m.waypoints", scenario="field.toml").setup.autopilot.name == flies

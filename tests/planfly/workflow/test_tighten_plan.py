@@ -95,7 +95,7 @@ FLAT = {
     "start": {"east_m": 0.0, "north_m": 0.0, "amsl_m": 150.0},
     "destination": {"east_m": 5000.0, "north_m": 0.0, "amsl_m": 150.0},
     "limits": {"min_clearance_m": 60.0, "max_height_m": 300.0},
-    "flight": {"autopilot": "ideal"},
+    "flight": {"autopilot": "planfly"},
     "zones": [MILL],
 }
 

@@ -22,7 +22,7 @@ def plain(objective: str, from_deg: float, **tables: Any) -> Scenario:
     """12 km to the north over a plain, at 150 m, in a wind of 8 m/s there, which rises by 2 m/s every 100 m."""
     ends = [[0.0, 0.0, LOW], [0.0, RUN, LOW]]
     wind = {"speed_mps": WIND, "from_deg": from_deg, "gradient": SHEAR}
-    flight = {"aircraft": "aerosonde", "autopilot": "ideal"}
+    flight = {"aircraft": "aerosonde", "autopilot": "planfly"}
     planner = {"objective": objective}
     spec = spec_around(ends, buffer=3000.0, ceiling=CEILING, wind=wind, flight=flight, planner=planner, **tables)
     return from_spec(spec, "plain")

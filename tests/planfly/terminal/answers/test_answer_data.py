@@ -17,7 +17,7 @@ from tests.planfly.made_plans import made_plan
 from tests.planfly.terminal.answers.checked_answers import answered
 
 Output = pytest.CaptureFixture[str]
-QUICK = '[flight]\nautopilot = "ideal"\n[planner]\npopulation = 20\ngenerations = 5\n'
+QUICK = '[flight]\nautopilot = "planfly"\n[planner]\npopulation = 20\ngenerations = 5\n'
 
 
 @pytest.fixture(autouse=True)
