@@ -37,14 +37,15 @@ def test_a_process_sleeps_in_full_while_the_thread_that_waits_for_it_has_no_core
     os.sched_setaffinity(0, core)
     try:
         with subprocess.Popen([sys.executable, "-S", "-c", ON_ONE_CORE + "while True: pass"]) as other:
-            process = subprocess.Popen(["sleep", "0.4"], start_new_session=True)
+            process = subprocess.Popen(["sleep", "1.2"], start_new_session=True)
             with Stopwatch(process.pid) as watch:
                 while process.poll() is None:
                     pass
             other.kill()
     finally:
         os.sched_setaffinity(0, usual)
-    assert watch.seconds > 0.3
+    # Its wait for a core before it begins is left out, too: tenths of a second on a loaded machine.
+    assert watch.seconds > 0.8
 
 
 def test_the_thread_that_enters_it_counts_and_no_other() -> None:

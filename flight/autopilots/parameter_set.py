@@ -232,7 +232,7 @@ class ParameterSet:
     def changed(self, **values: float) -> Self:
         """Return the same parameters with other values, by the autopilot's names and in its units."""
         if unknown := sorted(set(values) - self.table.by_name.keys()):
-            raise ValueError(f"{unknown[0]}: not a parameter of the law")
+            raise ValueError(f"{unknown[0]}: not a parameter of the simulated autopilot")
         made = tuple(
             parameter._replace(value=values[parameter.name], origin="file") if parameter.name in values else parameter
             for parameter in self.values

@@ -93,11 +93,11 @@ class LoiterRules:
         """Return a note for people on what happens after the mission's end.
 
         >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
-        'after the last waypoint it circles about that without end, with NAV_LOITER_RAD, 80 m: flown once by its law'
+        'after the last waypoint it circles about that without end, with NAV_LOITER_RAD, 80 m: flown once'
         """
         name = f"{self.radius_name}, " if self.radius_name else ""
         circle = f"with {name}{abs(self.radius):g} m"
-        return f"after the last waypoint it circles about that without end, {circle}: flown once by its law"
+        return f"after the last waypoint it circles about that without end, {circle}: flown once"
 
 
 # Rules of an autopilot without its own.

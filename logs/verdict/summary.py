@@ -213,7 +213,7 @@ def _airframe_or_autopilot_lines(
     by_law = setup.autopilot.program is not None
     why = "" if by_law or not whose else ": no single parameter that was tried would pass"
     if deciding is not None:
-        why = f": {deciding_text(deciding)}{', by the flight of its law' if by_law else ''}"
+        why = f": {deciding_text(deciding)}{', by the simulated flight' if by_law else ''}"
     return [f"The aircraft can, {setup.autopilot.title}{whose} cannot{why}"]
 
 

@@ -210,7 +210,9 @@ FIGURES = (
         _of_returns("worst-returns"),
         file=False,
         alternative=_text("Heights of the worst returns along their ways: terrain, required clearance and spheres."),
-        caption=_text("Flown on a point mass by ArduPlane's law, in the mean wind, from where each turns back."),
+        caption=_text(
+            "Flown by the simulated ArduPlane on a point mass, in the mean wind, from where each turns back."
+        ),
     ),
     FigureEntry(
         "return-heights",

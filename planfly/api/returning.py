@@ -133,14 +133,12 @@ class ReturnsFound:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on how the returns were flown."""
-        found = ["on a point mass by ArduPlane's law, in the mean wind"]
+        found = ["by the simulated ArduPlane on a point mass, in the mean wind"]
         if self.returns.again:
             most = max(abs(one) for one in self.returns.again)
             found.append(f"{len(self.returns.again)} of the least sure flown again in JSBSim: up to {most:.0f} m apart")
         if self.returns.stands_in:
-            found.append(
-                f"{self.setup.autopilot.title} would come home by a law that is not flown here: ArduPlane's stands in"
-            )
+            found.append(f"{self.setup.autopilot.title}'s own return is not simulated: ArduPlane's return stands in")
         if self.setup.envelope.battery_guessed and self.setup.scenario.flight.battery_wh is None:
             found.append("the battery is guessed: energy is not judged; battery_wh in the scenario states it")
         if self.returns.lands:

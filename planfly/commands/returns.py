@@ -54,7 +54,7 @@ def returns_options(line: LineParser) -> None:
     )
     program_option(
         group,
-        "fly the worst returns by ArduPlane itself, too, and say whether it does as its law: the path of its program,"
+        "fly the worst returns by ArduPlane itself, too, and say whether it does as simulated: the path of its program,"
         " built for software in the loop (extra planfly[live])",
     )
     group.add_argument(

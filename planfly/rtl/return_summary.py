@@ -64,7 +64,7 @@ def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
     except PlanflyError as error:
         return ReturnSummary(f"not judged: {error}")
     own = world.stands_in and not world.other_law
-    stands_in = f" (by ArduPlane's law in place of {setup.autopilot.title}'s)" if own else ""
+    stands_in = f" (by the simulated ArduPlane in place of {setup.autopilot.title})" if own else ""
     return ReturnSummary(headline(found) + stands_in, world, starts, found)
 
 

@@ -106,8 +106,8 @@ class ProgramReturns:
             return "by the program: no return could be flown"
         same = sum(one.agrees for one in self.flown)
         worse = sum(one.worse for one in self.flown)
-        compared = "all of them as by the law" if same == len(self.flown) else f"{same} of them as by the law"
-        compared += f"; {worse} worse than by the law, which errs there" if worse else ""
+        compared = "all of them as simulated" if same == len(self.flown) else f"{same} of them as simulated"
+        compared += f"; {worse} worse than simulated, so that the simulation errs there" if worse else ""
         return f"by {self.program} itself: {len(self.flown)} of the worst flown, {compared}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
@@ -118,13 +118,17 @@ class ProgramReturns:
             begins = f"{one.law.time:.0f} s, from {east:.0f} m east, {north:.0f} m north"
             law = measured_text(one.law, returns.limit, scenario)
             if one.flown is None:
-                out.append(f"{begins}: by the law {law}; not flown by the program: {one.reason}")
+                out.append(f"{begins}: simulated {law}; not flown by the program: {one.reason}")
                 continue
             agree = (
-                "they agree" if one.agrees else "the program's counts" if one.worse else "the law's, the worse, counts"
+                "they agree"
+                if one.agrees
+                else "the program's outcome counts"
+                if one.worse
+                else "the simulated outcome, the worse one, counts"
             )
             flown = measured_text(one.flown, returns.limit, scenario)
-            out.append(f"{begins}: by the law {law}; by the program {flown}: {agree}")
+            out.append(f"{begins}: simulated {law}; by the program {flown}: {agree}")
         return out
 
     def put_right(self, returns: Returns) -> Returns:

@@ -95,7 +95,7 @@ def changed_parameters(old: SetParameters, scenario: Scenario, asked: Settings) 
         found = read_parameters(scenario, asked.parameter, "parameter")
         if found.unused:
             name, known = found.unused[0], [one.name for one in _law_parameters(scenario).values]
-            allowed = f"one that the law of this autopilot has is expected{did_you_mean(name, known)}"
+            allowed = f"a parameter of the simulated autopilot is expected{did_you_mean(name, known)}"
             raise PlanflyError(f"parameter: {name}: {allowed}", field="parameter", value=name, allowed=allowed)
         made = SetParameters(values | found.values, made.file, made.unused)
     return made

@@ -190,7 +190,7 @@ class ReturnsAnswer:
     least_clearance_m: float
     causes: list[CauseEntry]
     rtl_autoland: int | None
-    """ArduPlane's parameter; null by another autopilot's law."""
+    """ArduPlane's parameter; null if another autopilot flies."""
     not_judged: list[str]
     """What leaves the returns open: terrain, law, autoland, return path or landing; empty where nothing does."""
     ranges: list[ReturnEntry]

@@ -129,7 +129,7 @@ class ArduPlane(Autopilot):
         made = self.parameters
         whose = f"the parameters of {made.source}" if made.source else "its default parameters"
         return (
-            f"ArduPlane {RELEASE}'s law with {whose} (WP_RADIUS {made.wp_radius:g} m,"
+            f"the simulated ArduPlane {RELEASE} with {whose} (WP_RADIUS {made.wp_radius:g} m,"
             f" NAVL1_PERIOD {made.navl1_period:g} s, TECS_HDEM_TCONST {made.tecs_height_demand_time:g} s)"
         )
 

@@ -105,7 +105,7 @@ class Px4(Autopilot):
         made = self.parameters
         whose = f"the parameters of {made.source}" if made.source else "its default parameters"
         return (
-            f"PX4 {made.version}'s law with {whose} (NAV_ACC_RAD {made['NAV_ACC_RAD']:g} m, FW_T_CLMB_R_SP"
+            f"the simulated PX4 {made.version} with {whose} (NAV_ACC_RAD {made['NAV_ACC_RAD']:g} m, FW_T_CLMB_R_SP"
             f" {made['FW_T_CLMB_R_SP']:g} and FW_T_SINK_R_SP {made['FW_T_SINK_R_SP']:g} m/s)"
         )
 

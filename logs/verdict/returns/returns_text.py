@@ -59,7 +59,7 @@ _ACTION_TEXTS = {
 }
 _OPEN_TEXTS: dict[Open, str] = {
     "terrain": "TERRAIN_FOLLOW has returns follow the terrain, which is not flown here",
-    "law": "the autopilot returns by a law of its own, and ArduPlane's stands in",
+    "law": "the autopilot's own return is not simulated; ArduPlane's return stands in",
     "autoland": "mode AUTOLAND lands by a pattern of its own",
     "return path": "RTL_AUTOLAND 4 returns by the mission's return path",
     "landing": "the landing sequence begins with the landing itself",

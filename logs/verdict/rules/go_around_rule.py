@@ -145,7 +145,7 @@ def go_around_findings(
     if not required or setup.source is not None:
         return []
     reason = message(
-        "a go-around is not judged", ": it takes ArduPlane's law, a home, known ground and a glide to land by"
+        "a go-around is not judged", ": that takes the simulated ArduPlane, a home, known ground and a glide to land by"
     )
     return [make_finding("go_around", FLIGHT, ok=None, reason=reason.text, faults=[reason], check=GROUND_WAY)]
 
@@ -243,7 +243,7 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
         tolerance=0.0,
         margin=None if worst.entered or worst.lost else worst.room - worst.needed,
         unit="m",
-        method=f"flown by ArduPlane's law on a point mass from {len(flown)} places of the glide",
+        method=f"flown by the simulated ArduPlane on a point mass from {len(flown)} places of the glide",
         facts=[climb],
     )
 

@@ -70,7 +70,7 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
     open_ = []
     if not faults and LAUNCH_CLEARANCE_M <= room < LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M:
         brief = f"the launch passes {room:.1f} m above ground {where:.0f} m from home"
-        open_.append(message(brief, ", nearer than the law's climb is known"))
+        open_.append(message(brief, ", less than the error of the simulated climb"))
     elif not faults and math.isnan(room):
         open_.append(message("the ground below the launch's climb is not known"))
     return make_finding(

@@ -104,7 +104,7 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
     ]
 
 
-_METHOD = "on a point mass by ArduPlane's law"
+_METHOD = "by the simulated ArduPlane on a point mass"
 _NOT_KNOWN = "whether the aircraft gets home as the scenario requires is not known in full"
 
 
@@ -177,7 +177,7 @@ def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> 
         return []
     name = f"{Command.NAV_RETURN_TO_LAUNCH.name}: "
     note_text = next((note.partition(name)[2] for note in route.notes if name in note), "")
-    reason = f"by {requirements.setup.autopilot.title}'s law: {note_text}; {outcome}"
+    reason = f"by the simulated {requirements.setup.autopilot.title}: {note_text}; {outcome}"
     other = next((note.partition(": ")[2] for note in route.notes if RETURN_NOT_FLOWN_ON in note), "")
     faults = []
     if other and requirements.setup.source is None:

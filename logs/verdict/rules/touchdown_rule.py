@@ -248,7 +248,7 @@ def _undecided_messages(approach: Approach, landing: _Landing, *, gusts: bool) -
         found.append(message(brief, ": it flares too early, and falls"))
     if landing.room < FINAL_APPROACH_CLEARANCE_M:
         brief = f"the final passes the ground by {landing.room:.1f} m"
-        found.append(message(brief, f", and may be flown {FINAL_APPROACH_CLEARANCE_M:.0f} m lower than by the law"))
+        found.append(message(brief, f", and may be flown {FINAL_APPROACH_CLEARANCE_M:.0f} m lower than simulated"))
     if landing.towards > MAX_TOUCHDOWN_SINK_MPS:
         brief = f"sinks at {landing.towards:.1f} m/s towards the ground at its touch-down"
         found.append(message(brief, f"; up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s are known of ArduPlane's landings"))

@@ -76,7 +76,7 @@ function parameters(settings, app, send) {
     element("datalist", { id: "known-parameters" }, ...known.map((name) => element("option", { value: `${name}=${settings.known[name]}` }))),
     field("From a file", file),
     element("p", { class: "more" }, set.length ? from : `None is set here: ${settings.autopilot_title} flies with those of the aircraft and of the scenario. A file takes the place of all.`),
-    ...(settings.unused ? [element("p", { class: "more" }, `This law has no use for ${settings.unused}.`)] : []),
+    ...(settings.unused ? [element("p", { class: "more" }, `The simulated autopilot does not use ${settings.unused}.`)] : []),
     ...(set.length ? [element("ul", { class: "parameters" }, ...rows), element("p", {}, element("button", { type: "button", onclick: () => send({ without: set.map(([name]) => name) }) }, "Set none of them"), " ", element("button", { type: "button", onclick: () => app.send({ kind: "save", form: "parm" }) }, "Save as .parm"))] : []),
   ];
 }

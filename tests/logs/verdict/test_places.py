@@ -115,7 +115,7 @@ def test_what_decides_a_real_autopilots_flight_is_what_its_law_shows(autopilot: 
     program = AutopilotProgram("ArduPlane V4.6.0-dev (7fbc1660)", "0" * 64, {}, {})
     real = replace(autopilot, autopilot=ArduPlaneSitl(ArduPilotParameters.defaults(), program))
     said = aside(real, 70.0, ReferenceFlights(PASSED, DECIDING)).lines[1]
-    assert said.endswith(f"cannot: {deciding_text(DECIDING)}, by the flight of its law")
+    assert said.endswith(f"cannot: {deciding_text(DECIDING)}, by the simulated flight")
     assert aside(real, 70.0, ReferenceFlights(PASSED)).lines[1].endswith("with these parameters cannot")
 
 

@@ -228,7 +228,7 @@ def test_several_autopilots_are_told_in_one_table(tmp_path: Path, capsys: pytest
     assert said[-7].startswith(
         "  Aircraft: aerosonde, 11 kg, 25 m/s equivalent airspeed (its cruise speed); nobody named"
     )
-    assert said[-5].startswith("  Flown by: ArduPlane 4.6's law with its default parameters")
+    assert said[-5].startswith("  Flown by: the simulated ArduPlane 4.6 with its default parameters")
     assert any("px4: not flyable: mission" in line for line in said[-5:])
 
 

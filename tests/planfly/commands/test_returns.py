@@ -136,8 +136,8 @@ def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFi
     assert "it returns: the pilot's RTL" in capsys.readouterr().out
     assert main([*asked, "px4", "--json", "px4.json"]) == 3
     out = capsys.readouterr().out
-    assert "not judged in full (the autopilot returns by a law of its own, and ArduPlane's stands in): all " in out
-    assert "PX4 would come home by a law that is not flown here: ArduPlane's stands in" in out
+    assert "not judged in full (the autopilot's own return is not simulated; ArduPlane's return stands in): all " in out
+    assert "PX4's own return is not simulated: ArduPlane's return stands in" in out
     for words in ("FS_", "RTL_AUTOLAND", "it returns:", "it does not:"):
         assert words not in out
     answer = json.loads((hill / "px4.json").read_text(encoding="utf-8"))

@@ -69,7 +69,7 @@ def test_parameters_are_flown_with_and_saved() -> None:
         ({"aircraft": "../x8"}, "aircraft"),
         ({"parameter": "WP_RADIUS=99999"}, "parameter:1: WP_RADIUS: 99999: allowed 0..32767"),
         ({"parameter": "WP_RADIUS=wide"}, "parameter:1: WP_RADIUS: 'wide': a finite number is expected"),
-        ({"parameter": "WP_RADIU=50"}, "parameter: WP_RADIU: no name that ArduPlane's law knows"),
+        ({"parameter": "WP_RADIU=50"}, "parameter: WP_RADIU: no name that the simulated ArduPlane knows"),
         ({"parameter": "THR_MIN=100"}, "THR_MIN 100: must be below THR_MAX"),
         ({"parameter_file": "a.parm", "parameter_text": "\n"}, "a.parm: no parameter"),
     ],

@@ -83,7 +83,7 @@ def test_the_autopilot_is_taken_from_the_files(mission: str, options: dict[str, 
     assert line.endswith(", for nobody named an autopilot") is taken
     if taken:
         file = options.get("params", mission)
-        assert line.startswith("Autopilot: PX4 1.17's law with")
+        assert line.startswith("Autopilot: the simulated PX4 1.17 with")
         assert f"; taken from {Path(file).resolve() if file.endswith('params') else file}, for nobody" in line
 
 

@@ -109,7 +109,7 @@ def test_what_is_stored_is_restored_and_another_version_is_not() -> None:
 
 def test_only_parameters_of_the_law_are_changed() -> None:
     assert Px4Parameters.defaults().changed(FW_R_LIM=40.0).by_origin("file") == {"FW_R_LIM": 40.0}
-    with pytest.raises(ValueError, match=r"^WP_RADIUS: not a parameter of the law$"):
+    with pytest.raises(ValueError, match=r"^WP_RADIUS: not a parameter of the simulated autopilot$"):
         Px4Parameters.defaults().changed(WP_RADIUS=40.0)
 
 
