@@ -11,14 +11,14 @@ _BAD_USAGE = 2
 
 
 class Hidden(NamedTuple):
-    """A package of ours that Python would not find.  found: the file of its name that it finds.  own: ours."""
+    """Package of planfly that Python would not find.  found: the file that hides it.  own: file of the package."""
 
     found: str
     own: str
 
 
 def hidden_package(home: Path) -> Hidden | None:
-    """The first package of ours that another's module of its name hides; None where all are found.  Imports nothing.
+    """Return the first package of planfly that a module of the same name hides, or None; nothing is imported.
 
     home: the folder that planfly and its packages lie in.
 

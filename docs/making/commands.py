@@ -14,7 +14,7 @@ _ENTRY = re.compile(r"^  (\S.*?)(?:  +(\S.*))?$")
 
 @contextmanager
 def _wide(columns: int) -> Iterator[None]:
-    """Formats help with so many columns and without colour."""
+    """Return a formatter of help with this number of columns and without colour."""
     before = {name: os.environ.get(name) for name in ("COLUMNS", "NO_COLOR")}
     os.environ.update(COLUMNS=str(columns), NO_COLOR="1")
     try:
@@ -25,7 +25,7 @@ def _wide(columns: int) -> Iterator[None]:
 
 
 def command_pages() -> str:
-    """One section per command: description, usage, grouped options, examples; exit codes at the end."""
+    """Return one section per command: description, usage, grouped options, examples; exit codes at the end."""
     parts = [_section(name, parser) for name, parser in build_parser().commands.items()]
     return "\n\n".join([*parts, f"## Exit codes\n\n```text\n{EXIT_CODES.strip()}\n```"])
 
@@ -48,7 +48,7 @@ def _section(name: str, parser: CommandParser) -> str:
 
 
 def _definitions(entries: str) -> str:
-    """Options and their meaning, as a definition list."""
+    """Return the options and their meaning, as a definition list."""
     found: list[list[str]] = []
     for line in entries.splitlines():
         if not line.strip():

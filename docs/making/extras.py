@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def extras_table() -> str:
-    """A row an extra."""
+    """Return one row per extra."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     rows = ["| extra | for | installs |", "|---|---|---|"]
     for extra in EXTRAS.values():

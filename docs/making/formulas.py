@@ -6,12 +6,12 @@ from sphinx.writers.html5 import HTML5Translator
 
 
 def inline_formula(writer: HTML5Translator, node: nodes.math) -> None:
-    """An inline formula."""
+    """Return an inline formula."""
     writer.body.append(convert(node.astext(), display="inline"))
     raise nodes.SkipNode
 
 
 def block_formula(writer: HTML5Translator, node: nodes.math_block) -> None:
-    """A display formula."""
+    """Return a display formula."""
     writer.body.append(convert(node.astext(), display="block"))
     raise nodes.SkipNode

@@ -26,5 +26,5 @@ MAKERS: dict[str, Callable[..., str]] = {
 
 
 def filled(text: str) -> str:
-    """The page with its placeholders replaced.  Raises KeyError for an unknown placeholder."""
+    """Return the page with its placeholders replaced.  Raises KeyError for an unknown placeholder."""
     return _PLACE.sub(lambda found: MAKERS[found[1]](*found[2].split()), text)

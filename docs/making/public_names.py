@@ -38,7 +38,7 @@ _TITLES = {"function": "Functions", "class": "Classes", "error": "Errors"}
 
 
 def kind_of(name: str) -> str:
-    """function, class or error; "" for anything else."""
+    """Return "function", "class" or "error"; "" for anything else."""
     value = getattr(planfly, name)
     if not inspect.isclass(value):
         return "function" if callable(value) else ""
@@ -46,7 +46,7 @@ def kind_of(name: str) -> str:
 
 
 def public_names() -> str:
-    """One section per kind, one entry per name."""
+    """Return one section per kind, one entry per name."""
     parts = []
     for kind, title in _TITLES.items():
         names = [name for name in dict.fromkeys((*_ORDER, *planfly.__all__)) if kind_of(name) == kind]

@@ -7,7 +7,7 @@ from planfly.commands.registry import answer_objects, answering_commands, schema
 
 
 def schema_tables(command: str) -> str:
-    """The fields of a command's answer and of its nested objects: name, type, meaning."""
+    """Return the fields of a command's answer and of its nested objects: name, type, meaning."""
     schema = json.loads(schema_text(command))
     parts = [_table(answer_objects(schema)[0])]
     for name, one in schema.get("$defs", {}).items():
@@ -41,7 +41,7 @@ def _type(one: dict[str, Any]) -> str:
 
 
 def answer_table() -> str:
-    """One row per command: the name of its schema, and its top-level fields."""
+    """Return one row per command: the name of its schema, and its top-level fields."""
     rows = []
     for command in answering_commands():
         schema = json.loads(schema_text(command))

@@ -25,7 +25,7 @@ class Tolerance(NamedTuple):
 
 
 def _shown(value: object, angle: bool) -> str:
-    """A value as text; an angle in degrees."""
+    """Return a value as text; an angle in degrees."""
     if isinstance(value, dict):
         return ", ".join(f"{key} {_shown(one, angle)}" for key, one in value.items())
     if isinstance(value, int | float):
@@ -35,7 +35,7 @@ def _shown(value: object, angle: bool) -> str:
 
 @cache
 def tolerance_list() -> tuple[Tolerance, ...]:
-    """Every constant of `logs.verdict.tolerances`, in the order of the file."""
+    """Return every constant of `logs.verdict.tolerances`, in the order of the file."""
     source = (VERDICT / "tolerances.py").read_text(encoding="utf-8")
     lines, out, heading = source.splitlines(), [], ""
     starts = {node.lineno - 1: node for node in ast.parse(source).body if isinstance(node, ast.Assign)}
@@ -60,7 +60,7 @@ def tolerance_list() -> tuple[Tolerance, ...]:
 
 
 def _assigned(node: ast.Assign) -> list[tuple[str, str]]:
-    """Each name of an assignment with its expression."""
+    """Yield each name of an assignment with its expression."""
     target, value = node.targets[0], node.value
     if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
         pairs = zip(target.elts, value.elts, strict=True)
@@ -74,12 +74,12 @@ def _table(rows: list[Tolerance]) -> str:
 
 
 def rule_tolerances(rule: str) -> str:
-    """The table of the tolerances that a rule and its measures judge with."""
+    """Return the table of the tolerances that a rule and its measures judge with."""
     return _table([one for one in tolerance_list() if one.name in RULES[rule].tolerances])
 
 
 def all_tolerances() -> str:
-    """Every tolerance, one table per heading."""
+    """Return every tolerance, one table per heading."""
     headings = dict.fromkeys(one.heading for one in tolerance_list())
     parts = [
         f"### {heading}\n\n{_table([one for one in tolerance_list() if one.heading == heading])}"

@@ -317,7 +317,7 @@ def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, numbered: bool
 
 
 def _number_places(axes: Any, panel: Panel) -> None:
-    """Number the horizontal axis by waypoints or legs, with failing ones in the colour of failures."""
+    """Label the horizontal axis with waypoints or legs, with failing ones in the colour of failures."""
     at = np.unique(np.concatenate([layer.x for layer in panel.layers]))
     failing = {float(x) for layer in panel.layers if layer.kind == "rings" for x in layer.x}
     step = -(-len(at) // _MAX_TICKS)
