@@ -14,7 +14,7 @@ _ENTRY = re.compile(r"^  (\S.*?)(?:  +(\S.*))?$")
 
 @contextmanager
 def _wide(columns: int) -> Iterator[None]:
-    """Return a formatter of help with this number of columns and without colour."""
+    """Format help with this number of columns and without colour, inside the block."""
     before = {name: os.environ.get(name) for name in ("COLUMNS", "NO_COLOR")}
     os.environ.update(COLUMNS=str(columns), NO_COLOR="1")
     try:

@@ -60,7 +60,7 @@ def tolerance_list() -> tuple[Tolerance, ...]:
 
 
 def _assigned(node: ast.Assign) -> list[tuple[str, str]]:
-    """Yield each name of an assignment with its expression."""
+    """Return each name of an assignment with its expression."""
     target, value = node.targets[0], node.value
     if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
         pairs = zip(target.elts, value.elts, strict=True)

@@ -28,7 +28,7 @@ class TrimEntry:
     throttle: float
     power_w: float
     endurance_s: float | None
-    """How long 80 % of what it carries lasts."""
+    """Flight time on 80 % of the energy carried, s."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -46,14 +46,14 @@ class AircraftDetail:
 
     model_sha256: str
     level_speed_min_mps: float
-    """At sea level."""
+    """At sea level, m/s."""
     level_speed_max_mps: float
     trims: list[TrimEntry]
     modes: list[ModeEntry]
     lacking: list[str]
-    """What lacks in its folder for a flight."""
+    """Files that a flight needs and the folder of the aircraft does not have."""
     files: list[str]
-    """The pictures."""
+    """Pictures that were written."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -72,7 +72,7 @@ class AircraftEntry:
     stall_speed_mps: float
     max_bank_deg: float
     detail: AircraftDetail | None
-    """null in a list."""
+    """Null in a list of aircraft."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -175,9 +175,9 @@ class CampaignDocument:
     name: str
     seed: int
     target: float | None
-    """The probability that was asked for."""
+    """Requested probability."""
     answer: str
-    """reached, missed, undecided or none asked."""
+    """reached, missed, undecided, or none asked if no probability was requested."""
     flights: int
     flyable: int
     not_flyable: int
@@ -197,9 +197,9 @@ class CampaignDocument:
     worst: list[dict[str, Any]]
     spread: dict[str, Any]
     conditions: Conditions
-    """What each flight is drawn about."""
+    """Nominal conditions, which the draws of each flight vary."""
     made_of: str
-    """What the campaign was made of, as a hash."""
+    """Hash of the inputs of the campaign."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -219,7 +219,7 @@ class WindDirection:
     boundary_mps: float
     interval_mps: list[float]
     beyond: bool
-    """Whether it flies in every wind that was looked at."""
+    """True if the mission is flyable in every wind that was flown."""
     flown: list[WindFlights]
 
 
@@ -243,16 +243,16 @@ class WindsDocument:
     target: float
     confidence: float
     most: float
-    """The strongest wind that was looked at, m/s."""
+    """Strongest wind that was flown, m/s."""
     flights: int
     lost: list[int]
-    """Flights without an outcome, from 0 in the order in which they were asked for; they count as not flyable."""
+    """Flights without an outcome, numbered from 0 in the order of their requests; counted as not flyable."""
     directions: list[WindDirection]
     calm: CalmFlights | None
     """Failures in calm air, if the mission does not fly in it with the target probability."""
     spread: dict[str, Any]
     conditions: Conditions
-    """Without the wind, which is what is asked for."""
+    """Nominal conditions, except the wind, which is the result."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -273,11 +273,11 @@ class RunAnswer:
     scenario: str
     seed: int
     folder: str
-    """Where the files are."""
+    """Folder of the written files."""
     files: list[str]
-    """Their names in the folder."""
+    """Names of the written files in the folder."""
     rounds: list[RoundAnswer]
-    """With --refine: each round, the last one's results in the folder itself."""
+    """With --refine: each round; the results of the last round are in the folder itself."""
     verdict: VerdictDocument
 
 
@@ -290,9 +290,9 @@ class FlyAnswer:
     mission: str
     seed: int
     log: str | None
-    """The flight log, null where nothing was flown."""
+    """Flight log; null if nothing was flown."""
     autopilot_log: str | None
-    """The program's own."""
+    """Log that the autopilot program wrote; null if no program flew."""
     warnings: list[str]
     verdict: VerdictDocument
 
@@ -303,7 +303,7 @@ class ExportedFile:
 
     file: str
     content: str
-    """What it holds, in words."""
+    """Description of the contents."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -322,7 +322,7 @@ class TimelineEvent:
 
     time_s: float
     kind: str
-    """leg, turn, threat, ..."""
+    """Kind of the event: leg, turn, threat, ..."""
     text: str
 
 
@@ -334,9 +334,9 @@ class ReplayAnswer:
     exit_code: int
     log: str
     complete: bool
-    """Whether the log has its end."""
+    """True if the log is complete to its end."""
     end_s: float
-    """How long it goes."""
+    """Time of the last entry, s."""
     timeline: list[TimelineEvent]
 
 
@@ -347,7 +347,7 @@ class RecoverAnswer:
     schema: Literal["planfly.recover/1"] = "planfly.recover/1"
     exit_code: int
     log: str | None
-    """The new log, null where the old one is complete."""
+    """Path of the new log; null if the old log is complete."""
     rows: int | None
     end_s: float | None
 
@@ -456,9 +456,9 @@ class TerrainAnswer:
     columns: int
     tiles: list[str]
     absent: list[list[int]]
-    """South-west corners, degrees, of what the server has no tile of."""
+    """South-west corners, degrees, of the tiles that the server does not have."""
     empty_pixels: int
-    """Pixels without data."""
+    """Number of pixels without data."""
     fetched_bytes: int
 
 

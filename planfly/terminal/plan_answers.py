@@ -26,15 +26,15 @@ class PlanAnswer:
     feasible: bool
     waypoints: int
     length_ratio: float
-    """Length over that of the straight line."""
+    """Length of the path divided by the length of the straight line."""
     algorithm: str
     evaluations: int
     ended: str
-    """completed, budget or interrupted."""
+    """Reason for the end of the search: completed, budget or interrupted."""
     problems: list[str]
-    """What of the plan is not feasible."""
+    """Reasons why the plan is not feasible."""
     conditions: Conditions
-    """What it is for."""
+    """Conditions that the plan was made for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -44,11 +44,11 @@ class FrontEntry:
     file: str
     length_m: float
     exposure_s: float
-    """To radars: the density of detection over the time of flight."""
+    """Exposure to radars: the density of detection, integrated over the flight time."""
     clearance_m: float
-    """Least height above ground."""
+    """Lowest height above ground, m."""
     energy_wh: float | None
-    """Null where the aircraft's power is not known."""
+    """Energy, Wh; null if the power of the aircraft is not known."""
     time_s: float
 
 
@@ -62,14 +62,14 @@ class FrontAnswer:
     seed: int
     folder: str
     fourth: Literal["energy", "time"]
-    """What they are compared by beside length, exposure and clearance."""
+    """Fourth criterion, in addition to length, exposure and clearance."""
     asked: int
-    """How many plans were asked for; there may be fewer."""
+    """Requested number of plans; there may be fewer."""
     plans: list[FrontEntry]
     problems: list[str]
-    """Why there is no plan."""
+    """Reasons why there is no plan."""
     conditions: Conditions
-    """What they are for."""
+    """Conditions that the plans were made for."""
 
 
 # Answer of ``planfly plan``, without or with --front.

@@ -21,9 +21,9 @@ class CauseEntry:
 
     name: str
     does: str
-    """return, land, autoland, on, circle, glide, parachute, terminate, level, guided, landed or never."""
+    """Action: return, land, autoland, on, circle, glide, parachute, terminate, level, guided, landed or never."""
     parameter: str
-    """That decides it; empty where none does."""
+    """Parameter that decides the action; empty if there is none."""
     value: int
 
 
@@ -37,15 +37,15 @@ class ReturnEntry:
     kind: str
     """ground, threat, zone, lost, energy, unknown, unsure, low or safe."""
     target: str
-    """home, or a rally point by its number, or a landing sequence by its first item."""
+    """home, a rally point by its number, or a landing sequence by its first item."""
     reason: str
-    """Why there; empty where there is nothing to choose."""
+    """Reason for the choice of the target; empty if there is no choice."""
     worst_at_s: float
     clearance_m: float | None
     clearance_east_m: float | None
     clearance_north_m: float | None
     outside_m: float | None
-    """Least distance outside a missile's sphere; null where there is none."""
+    """Least distance outside the sphere of a missile, m; null if there is no missile."""
     threat: str | None
     zone: str | None
     energy_wh: float | None
@@ -68,11 +68,11 @@ class ReturnSuggestion:
 
     parameters: dict[str, float]
     rally: list[RallyEntry] | None
-    """In place of the mission's rally points; null leaves those."""
+    """Rally points that replace those of the mission; null keeps the mission's rally points."""
     safe: int
     unsafe: int
     headline: str
-    """What the returns come to with it."""
+    """Outcome of the returns with this remedy, in one line."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -83,7 +83,7 @@ class MeasuredReturn:
     target: str
     clearance_m: float | None
     outside_m: float | None
-    """Least distance outside a missile's sphere; null where there is none."""
+    """Least distance outside the sphere of a missile, m; null if there is no missile."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -95,13 +95,13 @@ class ProgramReturnEntry:
     north_m: float
     law: MeasuredReturn
     program: MeasuredReturn | None
-    """Null where it could not be flown."""
+    """Outcome of the flight by the program; null if it could not be flown."""
     agrees: bool
-    """Whether both go to the same place and come to the same."""
+    """True if both returns have the same target and the same outcome."""
     worse: bool
-    """Whether the program's is worse, and counts."""
+    """True if the outcome by the program is worse; it then replaces the simulated outcome."""
     reason: str
-    """Why it could not be flown; empty where it was."""
+    """Reason why the program could not fly it; empty if it flew."""
     log: str | None
 
 
@@ -110,7 +110,7 @@ class ByProgram:
     """The worst returns flown by the ArduPlane program, the worst first."""
 
     version: str
-    """Empty where it flew none."""
+    """Version of the program; empty if it flew no return."""
     returns: list[ProgramReturnEntry]
 
 
@@ -122,22 +122,22 @@ class GlideEntry:
     last_s: float
     count: int
     reach: str
-    """home, site, flat, nothing or unknown."""
+    """Place that can be reached: home, site, flat, nothing or unknown."""
     site: int | None
-    """Which of the sites; null for none."""
+    """Number of the site that can be reached; null for none."""
     least_at_s: float
     left_m: float | None
-    """Height left over, negative where it is missing; null where no way leads anywhere."""
+    """Height left at the place, m; negative if the glide falls short; null if no glide path leads to a place."""
     flat_east_m: float | None
-    """Flat ground that can be reached; null for none."""
+    """Flat ground that can be reached, m east; null for none."""
     flat_north_m: float | None
     own: str
-    """What ArduPlane's own return comes to: arrives, low, ground, threat, unknown or not flown."""
+    """Outcome of the return that ArduPlane itself would fly: arrives, low, ground, threat, unknown or not flown."""
     own_target: str
     own_over_m: float | None
-    """Height over the ground at its target; null where it does not arrive."""
+    """Height above ground of that return at its target, m; null if it does not arrive."""
     own_short_m: float | None
-    """From where it comes down to its target; null where it does not."""
+    """Distance of its touchdown from its target, m; null if it does not come down."""
     text: str
 
 
@@ -146,9 +146,9 @@ class GlideSiteEntry:
     """A place to glide to."""
 
     kind: str
-    """home, rally or landing."""
+    """Kind of the place: home, rally or landing."""
     number: int
-    """Of the rally point, or the mission item."""
+    """Number of the rally point or of the mission item."""
     east_m: float
     north_m: float
 
@@ -159,20 +159,20 @@ class GlidesEntry:
 
     headline: str
     not_judged: str
-    """terrain or far; empty where it is judged."""
+    """Reason why glides are not judged: terrain or far; empty if they are judged."""
     airspeed_mps: float
-    """Equivalent, that glides are flown at."""
+    """Equivalent airspeed of the glides, m/s."""
     margin_m: float
     cell_m: float | None
     sites: list[GlideSiteEntry]
     home: int
-    """From how many places home can be reached; the next four are of those from which it cannot."""
+    """Number of places from which home can be reached; the next four fields count the places from which it cannot."""
     site: int
     flat: int
     nothing: int
     unknown: int
     own_arrives: int
-    """From how many ArduPlane's own return arrives."""
+    """Number of places from which the return that ArduPlane itself flies arrives."""
     ranges: list[GlideEntry]
 
 
@@ -190,22 +190,23 @@ class ReturnsAnswer:
     least_clearance_m: float
     causes: list[CauseEntry]
     rtl_autoland: int | None
-    """ArduPlane's parameter; null if another autopilot flies."""
+    """ArduPlane's parameter RTL_AUTOLAND; null if another autopilot flies."""
     not_judged: list[str]
-    """What leaves the returns open: terrain, law, autoland, return path or landing; empty where nothing does."""
+    """Reasons that leave the returns undecided: terrain, law, autoland, return path or landing."""
     ranges: list[ReturnEntry]
     by_program: ByProgram | None
-    """Of --sitl; what is worse there is counted in headline and ranges."""
+    """Returns flown with --sitl; worse outcomes are counted in headline and ranges."""
     left_out: int
-    """How many more there would be on the ground, or too low in a take-off or a landing to return."""
+    """Number of places that were left out: on the ground, or too low in a take-off or a landing to return."""
     no_return: str
-    """By energy: never, later (than no_return_s), at once; or why it is not known: battery, used or arrives."""
+    """Point of no return by energy: never, later (than no_return_s) or at once; or why it is not known: battery, used or
+    arrives."""
     no_return_s: float | None
     engine_out: GlidesEntry
     suggestions: list[ReturnSuggestion]
-    """Of --suggest."""
+    """Remedies found with --suggest."""
     files: list[str]
-    """What --out wrote: pictures, map and log."""
+    """Files written with --out: pictures, map and log."""
     notes: list[str]
 
 

@@ -22,13 +22,13 @@ class PhotoLineEntry:
     length_m: float | None
     usable: float | None
     away: float | None
-    """Not flown along, or too far beside the line; of the rest, banked too much; then too far off its height over
+    """Share not flown, or flown too far off the line; of the rest, banked too much; then with a wrong height above
     ground; then with the camera off."""
     banked: float | None
     high: float | None
     dark: float | None
     lost_m: list[tuple[float, float]]
-    """Stretches that cannot be used, from its begin."""
+    """Segments that cannot be used, m from the begin of the line."""
     photos: int | None
     missed: int | None
 
@@ -38,18 +38,18 @@ class SurveyRemedyEntry:
     """A change with which the survey was flown so that all lines can be used."""
 
     kind: str
-    """side, turn-around, every, course, parameter or airspeed."""
+    """Kind of the change: side, turn-around, every, course, parameter or airspeed."""
     name: str
-    """Of the parameter."""
+    """Name of the parameter."""
     current: float
     value: float
     unit: str
     turn_around_m: float | None
-    """Of another layout."""
+    """Turn-around distance of another layout, m."""
     lead_in_m: float
-    """Before its first line, where that is more."""
+    """Lead-in before the first line, m, if it is longer than the turn-around distance."""
     length_m: float
-    """Of the way."""
+    """Length of the whole path, m."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -57,12 +57,12 @@ class OverlapEntry:
     """The least overlap of the usable photos of a survey, as shares of a photo; null if unknown."""
 
     front: float | None
-    """Of a photo and the next on its line."""
+    """Overlap of a photo and the next photo on its line."""
     front_asked: float | None
     front_line: int | None
-    """The line's number, from 1."""
+    """Number of the line, from 1."""
     side: float | None
-    """Of photos of neighbouring lines."""
+    """Overlap of photos on neighbouring lines."""
     side_asked: float | None
     side_lines: tuple[int, int] | None
 
@@ -75,7 +75,7 @@ class NearMissEntry:
     usable: int
     lines: int
     headline: str
-    """Of the verdict on its flight."""
+    """Headline of the verdict on the flight of this trial."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -90,11 +90,11 @@ class SurveyAnswer:
     conditions: Conditions
     surveys: list[list[PhotoLineEntry]]
     overlaps: list[OverlapEntry | None]
-    """Of each survey; null where its camera is not known."""
+    """Overlaps of each survey; null if its camera is not known."""
     remedies: list[SurveyRemedyEntry]
-    """Of --suggest."""
+    """Remedies found with --suggest."""
     nearest: NearMissEntry | None
-    """Where it found none."""
+    """Trial that came closest, if no remedy was found."""
     files: list[str]
 
 

@@ -19,7 +19,7 @@ class VerdictsDocument:
     exit_code: int
     mission: str
     verdicts: dict[str, VerdictDocument]
-    """By the name of the simulated autopilot."""
+    """Verdicts by the name of the simulated autopilot."""
 
 
 # Answer of ``planfly check``, without or with --for.
