@@ -103,7 +103,7 @@ def _sheet_options(parser: CommandParser) -> None:
     sheet.add_argument("--prop", metavar="DxP", help="propeller, inches, such as 12x6")
     sheet.add_argument("--layout", choices=("tail", "wing", "vtail"), help="(default: tail)")
     sheet.add_argument(
-        "--params", metavar="FILE", help="ArduPlane's parameters: what they say of the aircraft is taken"
+        "--params", metavar="FILE", help="a parameter file of ArduPlane; facts about the aircraft are taken from it"
     )
 
 

@@ -46,7 +46,7 @@ def campaign_options(line: LineParser) -> None:
         "--confidence",
         metavar="C",
         type=number("confidence"),
-        help="confidence of each bound (default: 0.95; with --resume what it was)",
+        help="confidence of each bound (default: 0.95, or with --resume the previous value)",
     )
     parser.add_argument(
         "--refly", metavar="K", type=number("index"), help="fly flight K of the campaign in --out again, with a log"
@@ -108,7 +108,7 @@ def _shared_options(parser: CommandParser) -> None:
         "--seed", metavar="N", type=number("seed"), help="seed of plan and draws (default: the scenario's, or 1)"
     )
     parser.add_argument(
-        "--workers", metavar="N", type=number("workers"), help="processes on this machine (default: one a core)"
+        "--workers", metavar="N", type=number("workers"), help="processes on this machine (default: one per core)"
     )
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="fly on a running dask cluster: tls://HOST:PORT; needs planfly[cluster]"

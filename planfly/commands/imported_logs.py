@@ -75,7 +75,7 @@ def refly_options(line: LineParser) -> None:
     completed(parser.add_argument("log", metavar="FLIGHT.mcap", help="a flight log that import wrote"), files("mcap"))
     completed(
         parser.add_argument(
-            "--aircraft", metavar="AIRCRAFT", help="the aircraft that flies it again (default: the log's)"
+            "--aircraft", metavar="AIRCRAFT", help="aircraft that flies it again (default: the aircraft of the log)"
         ),
         aircraft_words,
     )

@@ -20,18 +20,18 @@ def new_options(line: LineParser) -> None:
         "planfly new ./site --from 46.52,8.01 --to 46.60,8.12 --terrain dem.tif",
         "planfly new ./site --from 46.52,8.01 --to 46.60,8.12 --aircraft x8 --height 100",
     )
-    parser.add_argument("folder", metavar="FOLDER", help="where FOLDER/NAME.toml is written, NAME as the folder's")
+    parser.add_argument("folder", metavar="FOLDER", help="folder for the scenario file, which gets the folder's name")
     way = parser.group("the way")
     for option, keyword in (("--from", "start"), ("--to", "destination")):
         way.add_argument(
-            option, dest=keyword, metavar="LAT,LON", type=place, required=True, help="degrees north and east"
+            option, dest=keyword, metavar="LAT,LON", type=place, required=True, help="latitude and longitude, degrees"
         )
     way.add_argument(
         "--height",
         metavar="M",
         type=number("height"),
         default=120.0,
-        help="of both ends above ground, m (default: 120)",
+        help="height of both ends above ground, m (default: 120)",
     )
     terrain_option(parser.group("where it flies"))
     flown = parser.group("aircraft and autopilot")

@@ -28,14 +28,20 @@ def paper_options(line: LineParser) -> None:
         default=CHOICES["problems"],
         help="numbers of threats (default: 7,15,30,60)",
     )
-    parser.add_argument("--runs", metavar="N", type=number("runs"), default=15, help="seeds 1..N of each (default: 15)")
+    parser.add_argument(
+        "--runs",
+        metavar="N",
+        type=number("runs"),
+        default=15,
+        help="runs of each problem, with seeds 1 to N (default: 15)",
+    )
     parser.add_argument(
         "--algorithm",
         metavar="A",
         default="umda",
-        help="the algorithm beside the two baselines (default: umda, the paper's)",
+        help="algorithm to compare with the two baselines (default: umda, the paper's)",
     )
-    parser.add_argument("--jobs", metavar="N", type=number("jobs"), help="processes (default: one a core)")
+    parser.add_argument("--jobs", metavar="N", type=number("jobs"), help="processes (default: one per core)")
     result_options(parser, "where tables and figures go (default: runs/paper, replaced)")
 
 

@@ -60,17 +60,19 @@ def plan_options(line: LineParser) -> None:
     )
     again = parser.group("planning again in flight")
     completed(
-        again.add_argument("--from", dest="old", metavar="PLAN.json", help="the plan that is being flown"),
+        again.add_argument("--from", dest="old", metavar="PLAN.json", help="plan that is being flown"),
         files("json"),
     )
-    again.add_argument("--at-leg", metavar="K", type=number("at_leg"), help="legs before K have been flown and stay")
+    again.add_argument(
+        "--at-leg", metavar="K", type=number("at_leg"), help="keep the legs before leg K, which have been flown"
+    )
     again.add_argument(
         "--add-threat",
         dest="threats",
         metavar="EAST,NORTH,KILL,DETECTION",
         type=threat,
         action="append",
-        help="a threat that has popped up, in m; repeatable",
+        help="a threat that has appeared, in m; repeatable",
     )
     flown_by_options(parser)
     pilot_options(parser)
@@ -187,7 +189,7 @@ def _check_replanning(args: argparse.Namespace) -> None:
     if args.old is None:
         for name in ("at_leg", "threats"):
             if (value := getattr(args, name)) is not None:
-                allowed = "only with `old` PLAN.json, the plan that is being flown"
+                allowed = "only with `old` PLAN.json, plan that is being flown"
                 raise ScenarioError.of_argument(name, value, allowed, shown="")
     elif args.at_leg is None:
         allowed = "`at_leg` K is missing: the leg that is about to be flown"

@@ -52,7 +52,9 @@ def replay_options(line: LineParser) -> None:
     parser.alias("end", "--to")
     log_argument(parser)
     part = parser.group("which part, how fast")
-    part.add_argument("--from", dest="start", metavar="S", type=number("start"), help="from this time of the flight, s")
+    part.add_argument(
+        "--from", dest="start", metavar="S", type=number("start"), help="start at this time of the flight, s"
+    )
     part.add_argument(
         "--to",
         metavar="S|IP:PORT,...",
@@ -66,12 +68,12 @@ def replay_options(line: LineParser) -> None:
         type=number("speed"),
         help="at X times real time (default: 1 on a terminal and to Foxglove; a film of 20 s; otherwise at once)",
     )
-    part.add_argument("--at-once", action="store_true", help="the timeline at once, on a terminal too")
+    part.add_argument("--at-once", action="store_true", help="print the timeline at once, also on a terminal")
     other = parser.group("other ways to see it")
     other.add_argument(
         "--movie",
         metavar="FILE|DIR",
-        help="draw it: FILE.gif, FILE.mp4 (by ffmpeg, or the extra planfly[films]), or DIR for PNG frames",
+        help="draw the flight as FILE.gif, FILE.mp4 (by ffmpeg, or the extra planfly[films]), or DIR for PNG frames",
     )
     other.add_argument(
         "--foxglove",
@@ -80,10 +82,14 @@ def replay_options(line: LineParser) -> None:
         " speaks foxglove.sdk.v1 (Foxglove since 2025, Lichtblick after 1.21)",
     )
     other.add_argument(
-        "--port", metavar="N", type=number("port"), default=8765, help="of --foxglove (default: 8765; 0: any)"
+        "--port",
+        metavar="N",
+        type=number("port"),
+        default=8765,
+        help="port of --foxglove (default: 8765; 0: any free port)",
     )
     other.add_argument(
-        "--allow-origin", metavar="URL,URL", help="web pages that --foxglove lets in beside Foxglove's (https://HOST)"
+        "--allow-origin", metavar="URL,URL", help="further web pages that may connect to --foxglove (https://HOST)"
     )
     other.add_argument(
         "--wait",

@@ -28,7 +28,7 @@ def report_options(line: LineParser) -> None:
     )
     completed(parser.add_argument("log", metavar="LOG.mcap", nargs="?", help="a flight log"), files("mcap"))
     parser.add_argument("--svg", action="store_true", help="also write the figures as SVG")
-    parser.add_argument("--layout", metavar="FILE", help="write the layout file for Foxglove there, and nothing else")
+    parser.add_argument("--layout", metavar="FILE", help="write only the layout file for Foxglove")
     result_options(parser, "where the files go (default: <log>-report beside the log, replaced)")
 
 

@@ -58,7 +58,10 @@ def returns_options(line: LineParser) -> None:
         " built for software in the loop (extra planfly[live])",
     )
     group.add_argument(
-        "--points", metavar="N", type=number("points"), help="how many of the worst it flies, far apart (default: 3)"
+        "--points",
+        metavar="N",
+        type=number("points"),
+        help="number of the worst returns that the program flies, far apart (default: 3)",
     )
     imported_log_options(parser)
     world_options(parser)

@@ -43,7 +43,7 @@ def run_options(line: LineParser) -> None:
         metavar="N",
         type=number("refine"),
         default=0,
-        help="if it does not fly, tighten the limits and try again, up to N times (default: 0)",
+        help="if the plan is not flyable, tighten the limits and plan again, up to N times (default: 0)",
     )
     terrain_option(planning)
     flight_options(parser)

@@ -42,7 +42,7 @@ def serve_options(line: LineParser) -> None:
         "--to",
         metavar="IP:PORT,...",
         default="127.0.0.1:14550",
-        help="where ground stations listen (default: 127.0.0.1:14550)",
+        help="address at which ground stations listen (default: 127.0.0.1:14550)",
     )
     own_link_options(parser, bind="127.0.0.1:14580")
     parser.add_argument(

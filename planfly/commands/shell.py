@@ -52,7 +52,7 @@ def show_help_options(line: LineParser) -> None:
         parser.add_argument("topic", metavar="COMMAND", nargs="?", help="a command (default: all of them)"),
         lambda prefix, **_: [name for name in line.commands if name.startswith(prefix)],
     )
-    parser.add_argument("--schema", action="store_true", help="the JSON schema of what the command's --json writes")
+    parser.add_argument("--schema", action="store_true", help="print the JSON schema of the command's --json output")
 
 
 def show_help(args: argparse.Namespace) -> int:

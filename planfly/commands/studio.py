@@ -45,16 +45,23 @@ def studio_options(line: LineParser) -> None:
         files("toml", "mcap", *MISSIONS, *IMPORTED_LOGS),
     )
     parser.add_argument(
-        "--port", metavar="PORT", type=number("port"), help="where it listens (default: 8790, or any free one)"
+        "--port", metavar="PORT", type=number("port"), help="port of the studio (default: 8790, or any free port)"
     )
     parser.add_argument(
-        "--no-browser", dest="browser", action="store_const", const=False, help="print the address, and open nothing"
+        "--no-browser",
+        dest="browser",
+        action="store_const",
+        const=False,
+        help="print the address without opening a browser",
     )
     parser.add_argument(
-        "--seed", metavar="N", type=number("seed"), help="of planner and turbulence (default: the scenario's, or 1)"
+        "--seed",
+        metavar="N",
+        type=number("seed"),
+        help="seed of planner and turbulence (default: the scenario's, or 1)",
     )
     parser.add_argument(
-        "--keep", metavar="DIR", help="folder in which what was done is kept for the next start (default: runs/studio)"
+        "--keep", metavar="DIR", help="folder of the session that the next start restores (default: runs/studio)"
     )
     world_options(parser)
     flown_by_options(parser)

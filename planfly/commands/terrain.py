@@ -28,9 +28,9 @@ def terrain_options(line: LineParser) -> None:
         where.add_argument("--around", metavar="MISSION", help=".waypoints or .plan: all of its places"),
         files(*MISSIONS),
     )
-    where.add_argument("--box", metavar="S,W,N,E", type=area, help="its edges, degrees")
+    where.add_argument("--box", metavar="S,W,N,E", type=area, help="edges of the area, degrees")
     where.add_argument(
-        "--margin", metavar="KM", type=number("margin"), default=3.0, help="ground beside them, km (default: 3)"
+        "--margin", metavar="KM", type=number("margin"), default=3.0, help="margin around the area, km (default: 3)"
     )
     tiles = parser.group("the tiles")
     tiles.add_argument(

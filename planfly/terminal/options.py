@@ -60,7 +60,7 @@ def result_options(
         json_option(group, parser.prog.split()[-1])
     if junit:
         group.add_argument(
-            "--junit", metavar="FILE", help="also write the verdict as JUnit XML, which shows in continuous integration"
+            "--junit", metavar="FILE", help="also write the verdict as JUnit XML, for continuous integration"
         )
 
 
@@ -120,8 +120,8 @@ def time_option(group: OptionTaker) -> None:
     group.add_argument(
         "--at",
         metavar="TIME",
-        help="when it is flown, START or START/END by ISO 8601, as in 2026-05-01T10:00+02:00: "
-        "zones that are not active then are left out (default: all count)",
+        help="time of the flight, START or START/END by ISO 8601, as in 2026-05-01T10:00+02:00: "
+        "zones that are not active then are left out (default: all zones are active)",
     )
 
 
@@ -223,14 +223,14 @@ def flight_options(parser: CommandParser) -> None:
         metavar="H",
         type=number("max_hours"),
         default=6.0,
-        help="stop after so many simulated hours (default: 6)",
+        help="stop after this many simulated hours (default: 6)",
     )
     limits.add_argument(
         "--max-log",
         metavar="MB",
         type=number("max_log"),
         default=256.0,
-        help="stop when the log has so many MB (default: 256; it grows by about 20 an hour)",
+        help="stop when the log reaches this size, MB (default: 256; it grows by about 20 MB per hour)",
     )
 
 
@@ -242,7 +242,7 @@ def log_rate_option(group: OptionTaker) -> None:
         type=int,
         choices=CHOICES["log_hz"],
         default=60,
-        help="rows a second in the log: 60 (default), 30, 20 or 10; the verdict is on these rows",
+        help="rows per second in the log: 60 (default), 30, 20 or 10; the verdict is on these rows",
     )
 
 
@@ -250,14 +250,17 @@ def imported_log_options(parser: CommandParser) -> None:
     """Add the options for facts that a log of another program does not state."""
     group = parser.group("an autopilot's log")
     found = group.add_argument(
-        "--plan", metavar="MISSION", help="the mission that was to be flown, in place of the log's own"
+        "--plan", metavar="MISSION", help="mission that was to be flown (default: the mission in the log)"
     )
     completed(found, files(*MISSIONS))
     group.add_argument(
-        "--flight", metavar="N", type=number("flight"), help="which of the log's flights (default: the longest in AUTO)"
+        "--flight",
+        metavar="N",
+        type=number("flight"),
+        help="number of the flight in the log (default: the longest in AUTO)",
     )
     group.add_argument(
-        "--datum", choices=CHOICES["datum"], help="what the log's heights are above, where it does not say"
+        "--datum", choices=CHOICES["datum"], help="reference of the altitudes in the log, if the log does not state it"
     )
 
 
@@ -281,7 +284,9 @@ def own_link_options(parser: CommandParser, *, bind: str) -> None:
     """Add the options for a vehicle's MAVLink connection."""
     group = parser.group("the link")
     group.add_argument("--bind", metavar="IP:PORT", default=bind, help=f"where the vehicle listens (default: {bind})")
-    group.add_argument("--allow", metavar="IP,IP", help="stations beyond this machine that may talk to the vehicle")
+    group.add_argument(
+        "--allow", metavar="IP,IP", help="addresses of stations on other machines that may talk to the vehicle"
+    )
     group.add_argument(
         "--sign-key", metavar="FILE", help="MAVLink signing key: 64 hex digits or a passphrase; mode 600"
     )

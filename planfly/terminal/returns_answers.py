@@ -199,8 +199,7 @@ class ReturnsAnswer:
     left_out: int
     """Number of places that were left out: on the ground, or too low in a take-off or a landing to return."""
     no_return: str
-    """Point of no return by energy: never, later (than no_return_s) or at once; or why it is not known: battery, used or
-    arrives."""
+    """Point of no return by energy: never, later (than no_return_s), at once; or why unknown: battery, used, arrives."""
     no_return_s: float | None
     engine_out: GlidesEntry
     suggestions: list[ReturnSuggestion]
