@@ -88,7 +88,7 @@ class PlanOptions(FlightOptions, total=False):
 class LogOptions(MissionOptions, total=False):
     """Facts that a log of another program does not state.
 
-    plan: mission that was to be flown (default: the mission in the log) mission.
+    plan: the mission that was to be flown; None for the mission in the log.
     flight: number of the flight in the log, from 1.  datum: datum of the log's altitudes.
     """
 

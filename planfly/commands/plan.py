@@ -189,7 +189,7 @@ def _check_replanning(args: argparse.Namespace) -> None:
     if args.old is None:
         for name in ("at_leg", "threats"):
             if (value := getattr(args, name)) is not None:
-                allowed = "only with `old` PLAN.json, plan that is being flown"
+                allowed = "only with `old` PLAN.json, the plan that is being flown"
                 raise ScenarioError.of_argument(name, value, allowed, shown="")
     elif args.at_leg is None:
         allowed = "`at_leg` K is missing: the leg that is about to be flown"

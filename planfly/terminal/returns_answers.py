@@ -199,7 +199,7 @@ class ReturnsAnswer:
     left_out: int
     """Number of places that were left out: on the ground, or too low in a take-off or a landing to return."""
     no_return: str
-    """Point of no return by energy: never, later (than no_return_s), at once; or why unknown: battery, used, arrives."""
+    """Point of no return by energy: never, at once or later (no_return_s); or why unknown: battery, used or arrives."""
     no_return_s: float | None
     engine_out: GlidesEntry
     suggestions: list[ReturnSuggestion]
