@@ -126,7 +126,7 @@ def test_arduplane_returns_as_its_law_does(tmp_path: Path, monkeypatch: pytest.M
     (tmp_path / "hill.toml").write_text(SCENARIO, encoding="utf-8")
     (tmp_path / "hill.waypoints").write_text(mission_text(), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    found = planfly.returns("hill.waypoints", scenario="hill.toml", every=10, autopilot=need_arduplane(), points=2)
+    found = planfly.returns("hill.waypoints", scenario="hill.toml", every=10, sitl=need_arduplane(), points=2)
     assert found.by_program is not None
     assert found.by_program.each[0].law.kind == "ground"
     assert all(one.agrees for one in found.by_program.each), found.lines_of_program

@@ -56,7 +56,7 @@ def test_a_wind_is_a_speed_and_where_it_blows_from() -> None:
 
 @pytest.mark.parametrize("line", ["fly m.waypoints --sitl bin/arduplane", "run tight --sitl bin/arduplane"])
 def test_a_real_autopilot_flies_for_the_commands_that_fly(line: str) -> None:
-    assert build_parser().parse_args(line.split()).autopilot == "bin/arduplane"
+    assert build_parser().parse_args(line.split()).sitl == "bin/arduplane"
 
 
 @pytest.mark.parametrize("line", ["check m.plan --sitl a", "plan tight --sitl a", "serve --sitl a"])
