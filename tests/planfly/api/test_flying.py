@@ -148,7 +148,7 @@ def test_a_file_that_is_not_there_is_one_line(verb: object, tmp_path: Path) -> N
 
 def test_a_program_that_is_none_is_refused_before_anything_flies(mission: Path) -> None:
     with pytest.raises(planfly.FlightError, match="no such file"):
-        planfly.fly(mission, autopilot=mission.parent / "arduplane")
+        planfly.fly(mission, sitl=mission.parent / "arduplane")
 
 
 def test_a_scenario_made_in_python_is_planned_and_flown() -> None:
