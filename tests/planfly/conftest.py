@@ -7,15 +7,17 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from logs.views import drawing, figures
 from planfly.cli import main
+from planfly.planning import pareto_plans
 from tests.logs.blank_pictures import draw_nothing
 from tests.shared import made_once
-from tests.soak import at_most
+from tests.soak import SOAK, at_most
 from tests.stopwatch import Stopwatch, processes_of
 
 FIELD = """name = "field"
@@ -168,6 +170,13 @@ def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(figures, "draw", lambda _: None)
     monkeypatch.setattr(drawing, "png_bytes", lambda _: b"\x89PNG")
     monkeypatch.setattr(drawing, "svg_bytes", lambda _: b"<svg></svg>")
+
+
+@pytest.fixture
+def short_fronts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Search for fronts for 10 of their 400 generations, outside the soak."""
+    if not SOAK:
+        monkeypatch.setattr(pareto_plans, "plan_front", partial(pareto_plans.plan_front, generations=10))
 
 
 @pytest.fixture(scope="session")

@@ -2,22 +2,16 @@
 
 import csv
 import json
-from functools import partial
 from pathlib import Path
 
 import pytest
 
 from planfly.cli import main
-from planfly.planning import pareto_plans as choice_of_ways
 from planner.plan import read_plan
-from tests.soak import SOAK
 
 
-def test_a_front_is_a_folder_of_plans_with_their_table(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    if not SOAK:
-        monkeypatch.setattr(choice_of_ways, "plan_front", partial(choice_of_ways.plan_front, generations=20))
+@pytest.mark.usefixtures("short_fronts")
+def test_a_front_is_a_folder_of_plans_with_their_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder, answer = tmp_path / "front", tmp_path / "answer.json"
     assert main(["plan", "hard-07", "--front", "3", "--seed", "2", "--out", str(folder), "--json", str(answer)]) == 0
     text = capsys.readouterr().out
@@ -42,12 +36,9 @@ def test_a_front_is_a_folder_of_plans_with_their_table(
         assert float(row["length_m"]) == pytest.approx(((legs**2).sum(axis=1) ** 0.5).sum(), abs=0.06)
 
 
-def test_a_front_without_choices_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.mark.usefixtures("short_fronts")
+def test_a_front_without_choices_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Level ground without radars, between ends at 75 m: all there is to choose is how short it is."""
-    if not SOAK:
-        monkeypatch.setattr(choice_of_ways, "plan_front", partial(choice_of_ways.plan_front, generations=20))
     folder, answer = tmp_path / "front", tmp_path / "answer.json"
     assert main(["plan", "tight", "--front", "10", "--seed", "1", "--out", str(folder), "--json", str(answer)]) == 0
     text = capsys.readouterr().out

@@ -4,6 +4,7 @@ import json
 import shutil
 import signal
 import sqlite3
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -14,12 +15,14 @@ import pytest
 from aircraft.data_sheet import DataSheet
 from aircraft.uncertainty import draws_text, read_draws
 from planfly.api import campaigns
+from planfly.campaigns import report
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_winds import WindsGoal
 from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, WindsStore
 from planfly.cli import main
 from planfly.workflow.data_sheets import make_data_sheet_folder
 from tests.planfly.campaigns.made_campaigns import made_flight, table, write_short
+from tests.planfly.campaigns.made_searches import flying_here
 from tests.planfly.terminal.answers.checked_answers import answered
 from world.interruption import Interrupted
 
@@ -32,6 +35,21 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return ["winds", str(mission), "--scenario", str(scenario), "--workers", "1", "--directions", "4"]
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the charts' pictures empty: tests/planfly/campaigns/test_report.py has them drawn."""
+    monkeypatch.setattr(report, "png_bytes", lambda _: b"")
+    monkeypatch.setattr(report, "page_svg", lambda *_: "")
+
+
+@pytest.fixture
+def flown_here() -> Iterator[None]:
+    """Fly in this process: that processes fly the same is tested in tests/planfly/campaigns."""
+    with flying_here():
+        yield
+
+
+@pytest.mark.usefixtures("flown_here", "undrawn")
 def test_a_short_mission_has_its_chart_stopped_or_not(
     line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -50,8 +68,7 @@ def test_a_short_mission_has_its_chart_stopped_or_not(
     shutil.copy(out / WINDS_DATABASE, again)
     with closing(sqlite3.connect(again / WINDS_DATABASE)) as connection, connection:
         connection.execute("DELETE FROM flights WHERE flight IN (1, 4) OR flight > 5")
-    assert main([*line, "--flights", "8", "--out", str(again), "--resume"]) == 0
-    assert (again / "winds.json").read_bytes() == (out / "winds.json").read_bytes()
+    assert answered(capsys, 0, *line, "--flights", "8", "--out", str(again), "--resume") == answer
     assert table(again / WINDS_DATABASE) == table(out / WINDS_DATABASE)
 
 
@@ -116,6 +133,7 @@ def test_one_line_and_nothing_lost(
     assert Path("campaign", "campaign.sqlite").read_bytes() == b"another one's"
 
 
+@pytest.mark.usefixtures("flown_here", "undrawn")
 def test_winds_fly_the_draws_of_an_aircraft(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -313,6 +313,7 @@ def test_plans_beside_one_that_leads_above_a_missile_keep_above_it_too() -> None
     assert limits_of_others(make_plan(beside, airframe, SEED), airframe).reserve_height > 30.0
 
 
+@pytest.mark.usefixtures("short_fronts")
 def test_every_command_keeps_it_and_a_front_is_not_left_with_one() -> None:
     radar = {"name": "radar", "east_m": 4000.0, "north_m": 500.0, "amsl_m": GROUND}
     reach = {"detection_radius_m": 1500.0, "detection_scale_m": 800.0}

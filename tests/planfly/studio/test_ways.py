@@ -13,6 +13,7 @@ from planfly.studio.worker_tasks import plan
 from world.errors import PlanflyError
 
 
+@pytest.mark.usefixtures("short_fronts")
 def test_other_ways_are_of_one_search_and_none_is_better_than_another(monkeypatch: pytest.MonkeyPatch) -> None:
     # Kernels may have to be compiled first.
     monkeypatch.setattr("planfly.studio.worker_tasks.SECONDS_FOR_SEVERAL", 600.0)
