@@ -232,7 +232,9 @@ class Fake:
             level = side * math.atan((v_north**2 + v_east**2) / (9.80665 * radius))
         turn = math.remainder(wanted - math.atan2(v_east, v_north), math.tau)
         bank = max(-0.5, min(0.5, level + 1.5 * turn))
-        climb = max(-3.0, min(3.0, (0.9 if lands else 0.3) * (down - to_down))) - sink
+        # One that dives home takes seconds, where 3 m/s would take it minutes in its circle.
+        most_sink = 8.0 if home and self.fault == "dives-home" else 3.0
+        climb = max(-most_sink, min(3.0, (0.9 if lands else 0.3) * (down - to_down))) - sink
         aim = 0.06 + 0.05 * (climb + v_down)
         aileron = 0.6 * (bank - roll) - 0.1 * p
         if self.items[1].command == mavlink.MAV_CMD_NAV_TAKEOFF:
