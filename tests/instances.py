@@ -7,6 +7,7 @@ chosen by any planner's results.  Draws that the grid search cannot pass are ski
 import math
 import sys
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -84,6 +85,26 @@ def make_instance(seed: int, threats: int) -> Instance:
         draw += 1
 
 
+def places_across(pitch: float) -> Floats:
+    """Return the places of a stage across the straight line (n,), m, the middle one on it."""
+    half = int(math.dist(START[:2], DESTINATION[:2]) / 2.0 / pitch)
+    return np.arange(-half, half + 1) * pitch
+
+
+@cache
+def highest_ground(stage: int, pitch: float) -> Floats:
+    """Return the highest ground within a pitch of each place of a stage, m: most of what a grid search takes."""
+    c, s = (DESTINATION[:2] - START[:2]) / math.dist(START[:2], DESTINATION[:2])
+    across = places_across(pitch)
+    east, north = START[0] + c * stage * pitch - s * across, START[1] + s * stage * pitch + c * across
+    low = np.full(across.size, -np.inf)
+    for i in np.linspace(-1.0, 1.0, 5):
+        for j in np.linspace(-1.0, 1.0, 5):
+            shift_e, shift_n = pitch * (c * i - s * j), pitch * (s * i + c * j)
+            low = np.maximum(low, ground(east + shift_e, north + shift_n))
+    return low
+
+
 def passable(positions: Floats, radii: Floats, pitch: float = 65.0, layer: float = 11.0) -> bool:
     """Whether a grid way exists: monotone along, within slopes, 45 degree turns, terrain, missiles, ceiling and map.
 
@@ -96,8 +117,8 @@ def passable(positions: Floats, radii: Floats, pitch: float = 65.0, layer: float
     stages = math.ceil(length / pitch)
     pitch = length / stages
     c, s = span / length
-    half = int(length / 2.0 / pitch)
-    across = np.arange(-half, half + 1) * pitch
+    across = places_across(pitch)
+    half = len(across) // 2
     up = START[2] + np.arange(-int(START[2] / layer), int((CEILING - START[2]) / layer) + 1) * layer
     rises = (
         int(pitch * math.tan(math.radians(CLIMB_DEG)) / layer),
@@ -108,11 +129,7 @@ def passable(positions: Floats, radii: Floats, pitch: float = 65.0, layer: float
 
     def open_cells(stage: int) -> Flags:
         east, north = START[0] + c * stage * pitch - s * across, START[1] + s * stage * pitch + c * across
-        low = np.full(across.size, -np.inf)
-        for i in np.linspace(-1.0, 1.0, 5):
-            for j in np.linspace(-1.0, 1.0, 5):
-                shift_e, shift_n = pitch * (c * i - s * j), pitch * (s * i + c * j)
-                low = np.maximum(low, ground(east + shift_e, north + shift_n))
+        low = highest_ground(stage, pitch)
         cells = up[None, :] >= low[:, None] + 15.0
         cells &= ((east >= 0) & (east <= MAP) & (north >= 0) & (north <= MAP))[:, None]
         for place, radius in zip(positions, grown, strict=True):
