@@ -15,6 +15,7 @@ import pytest
 from logs.views import drawing, figures
 from planfly.cli import main
 from planfly.planning import pareto_plans
+from planner.search.plan_front import plan_front
 from tests.logs.blank_pictures import draw_nothing
 from tests.shared import made_once
 from tests.soak import SOAK, at_most
@@ -176,7 +177,7 @@ def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
 def short_fronts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Search for fronts for 10 of their 400 generations, outside the soak."""
     if not SOAK:
-        monkeypatch.setattr(pareto_plans, "plan_front", partial(pareto_plans.plan_front, generations=10))
+        monkeypatch.setattr(pareto_plans, "plan_front", partial(plan_front, generations=10))
 
 
 @pytest.fixture(scope="session")
