@@ -81,6 +81,8 @@ RANGES = {
     "motor": ("motor", "rpm a volt", 20.0, 5000.0, 1.0),
     "fuel": ("fuel", "kg", 0.05, 12.0, 1.0),
 }
+# Rounding of a conversion of units, as a ratio.
+_EDGE_ROUNDING = 1e-12
 # Range of the ratio of stall speed to cruise speed.
 STALL_SHARE = (0.35, 0.87)
 # Range of the ratio of top speed to cruise speed.
@@ -238,6 +240,15 @@ _ENGINE_DIAMETER_RATIO = 0.18
 _FRICTION_RATIO = 0.08
 
 
+def _is_within(value: float, low: float, high: float) -> bool:
+    """Return True for a value within a range, whose edges may be off by the rounding of a conversion of units.
+
+    >>> _is_within(math.radians(15.0) / (math.pi / 180.0), 15.0, 60.0), _is_within(14.9, 15.0, 60.0)
+    (True, False)
+    """
+    return low * (1.0 - _EDGE_ROUNDING) <= value <= high * (1.0 + _EDGE_ROUNDING)
+
+
 def check_sheet(sheet: DataSheet) -> DataSheet:
     """Return a sheet if it describes a small aircraft.
 
@@ -253,30 +264,30 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
         value = getattr(sheet, field) / factor
         if field not in ("mass", "span", "cruise", "stall") and value == 0.0:
             continue
-        if not low <= value <= high:
+        if not _is_within(value, low, high):
             raise _refused(option, value, f"allowed {low:g}..{high:g} {unit}", unit)
     low, high = (share * sheet.cruise for share in STALL_SHARE)
-    if not low <= sheet.stall <= high:
+    if not _is_within(sheet.stall, low, high):
         raise _refused("stall", sheet.stall, f"allowed {_of_cruise(low, high, sheet)}", "m/s")
     low, high = (share * sheet.cruise for share in TOP_SHARE)
-    if sheet.top and not low <= sheet.top <= high:
+    if sheet.top and not _is_within(sheet.top, low, high):
         raise _refused("top", sheet.top, f"allowed {_of_cruise(low, high, sheet)}", "m/s")
     area = _area(sheet)
     lift = _weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * area)
     low, high = (_weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * one) for one in reversed(LIFT_RANGE))
-    if not LIFT_RANGE[0] <= lift <= LIFT_RANGE[1]:
+    if not _is_within(lift, *LIFT_RANGE):
         allowed = f"allowed {low:.3g}..{high:.3g} m2 for {sheet.mass:g} kg that stall at {sheet.stall:g} m/s"
         raise _refused("area", area, allowed, "m2")
     aspect = sheet.span**2 / area
-    if not ASPECT_RANGE[0] <= aspect <= ASPECT_RANGE[1]:
+    if not _is_within(aspect, *ASPECT_RANGE):
         low, high = (math.sqrt(one * area) for one in ASPECT_RANGE)
         allowed = f"allowed {low:.2f}..{high:.2f} m with a wing of {area:.3g} m2 ({_area_source(sheet)})"
         raise _refused("span", sheet.span, allowed, "m")
     if sheet.fuelled and (sheet.motor or sheet.volts):
         raise _refused("fuel", sheet.fuel, "goes without --battery and --motor", "kg")
-    if sheet.fuel > 0.6 * sheet.mass:
+    if not _is_within(sheet.fuel, 0.0, 0.6 * sheet.mass):
         raise _refused("fuel", sheet.fuel, f"allowed up to 60 % of the mass, {0.6 * sheet.mass:g} kg", "kg")
-    if not sheet.fuelled and sheet.energy > MAX_BATTERY * sheet.mass:
+    if not sheet.fuelled and not _is_within(sheet.energy, 0.0, MAX_BATTERY * sheet.mass):
         most = MAX_BATTERY / 3600.0
         allowed = f"allowed up to {most * sheet.mass:g} Wh with a mass of {sheet.mass:g} kg, {most:g} Wh/kg"
         raise _refused("battery", sheet.energy / 3600.0, allowed, "Wh")

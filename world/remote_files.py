@@ -8,10 +8,13 @@ GDAL can read such files itself (``/vsicurl``), but cannot replace this module: 
 command, does not report that a file has changed, and does not stop on Ctrl-C while a server is silent.
 """
 
+import contextlib
 import http.client
 import json
 import os
+import socket
 import tempfile
+import threading
 import time
 import urllib.error
 import urllib.parse
@@ -27,6 +30,9 @@ from world.files import write_whole
 
 # Timeout for an answer, s.
 _ANSWER_TIMEOUT_S = 30.0
+# Least speed of an answer, bytes a second, and the time after which it is measured, s.
+_MIN_BYTES_PER_S = 10_000.0
+_SLOW_AFTER_S = 10.0
 # Number of attempts of a request.
 _MAX_ATTEMPTS = 3
 # Pause before the second attempt, s; it doubles with each further one.
@@ -106,18 +112,23 @@ class RemoteFile:
                 raise _IncompleteAnswer(f"the server answers with {answer.headers.get('Content-Range')!r}")
             with self.copy.open("r+b") as file:
                 file.seek(begin)
-                at, digest = begin, sha256()
-                while at < end and (part := answer.read(min(_CHUNK_BYTES, end - at))):
+                at, digest, since, slow = begin, sha256(), time.monotonic(), False
+                # read1 returns what has come: a server that drips would hold up read for hours.
+                while at < end and not slow and (part := answer.read1(min(_CHUNK_BYTES, end - at))):
                     file.write(part)
                     digest.update(part)
                     at += len(part)
                     fetched(len(part))
+                    taken = time.monotonic() - since
+                    slow = taken > _SLOW_AFTER_S and at - begin < _MIN_BYTES_PER_S * taken
                 file.flush()
                 # The bytes are on the disk before the notes list them, even if the power fails.
                 os.fsync(file.fileno())
             if at > begin:
                 self.held[begin, at] = digest.hexdigest()
                 write_whole(_notes(self.copy), json.dumps([[*part, text] for part, text in self.held.items()]))
+            if slow and at < end:
+                raise _IncompleteAnswer(f"the server sends fewer than {_MIN_BYTES_PER_S:,.0f} bytes a second")
             if at < end:
                 raise _IncompleteAnswer(f"{at - begin:,} of {end - begin:,} bytes came")
 
@@ -169,6 +180,50 @@ def _open(url: str, headers: dict[str, str], method: str = "GET") -> http.client
     return _make_opener().open(request, timeout=_ANSWER_TIMEOUT_S)
 
 
+class _TimedHead(http.client.HTTPConnection):
+    """Connection whose answer must begin in time, head included: a timeout of the socket begins again at each byte."""
+
+    def getresponse(self) -> http.client.HTTPResponse:
+        """Return the answer once its head has come.  Raises OSError if it does not come in time."""
+        late = threading.Event()
+
+        def cut() -> None:
+            late.set()
+            with contextlib.suppress(OSError):
+                self.sock.shutdown(socket.SHUT_RDWR)
+
+        timer = threading.Timer(_ANSWER_TIMEOUT_S, cut)
+        timer.daemon = True
+        timer.start()
+        try:
+            answer = super().getresponse()
+        except (OSError, http.client.HTTPException) as error:
+            if late.is_set():
+                raise TimeoutError("timed out") from error
+            raise
+        finally:
+            timer.cancel()
+        # A head that is cut looks like a shorter one.
+        if late.is_set():
+            answer.close()
+            raise TimeoutError("timed out")
+        return answer
+
+
+class _TimedHeadOverTls(_TimedHead, http.client.HTTPSConnection):
+    """The same over TLS."""
+
+
+class _HttpHandler(urllib.request.HTTPHandler):
+    def http_open(self, req: urllib.request.Request) -> http.client.HTTPResponse:
+        return self.do_open(_TimedHead, req)
+
+
+class _HttpsHandler(urllib.request.HTTPSHandler):
+    def https_open(self, req: urllib.request.Request) -> http.client.HTTPResponse:
+        return self.do_open(_TimedHeadOverTls, req)
+
+
 @cache
 def _make_opener() -> urllib.request.OpenerDirector:
     """Return an opener for http and https only, redirects included."""
@@ -176,8 +231,8 @@ def _make_opener() -> urllib.request.OpenerDirector:
     for handler in (
         urllib.request.ProxyHandler,
         urllib.request.UnknownHandler,
-        urllib.request.HTTPHandler,
-        urllib.request.HTTPSHandler,
+        _HttpHandler,
+        _HttpsHandler,
         urllib.request.HTTPRedirectHandler,
         urllib.request.HTTPDefaultErrorHandler,
         urllib.request.HTTPErrorProcessor,

@@ -55,6 +55,8 @@ def _ranges(numbers: list[int]) -> str:
 MAX_ITEMS = 20_000
 # Largest mission file, bytes.
 MAX_BYTES = 16 * 2**20
+# Smallest distance between photos, m: a line of 100 km has 1,000,000 of them.
+MIN_PHOTO_DISTANCE_M = 0.1
 
 # Largest number that MAVLink can carry in a parameter, a float32.
 _MAX_FLOAT32 = 3.4028234663852886e38
@@ -385,6 +387,9 @@ def _count_problem(item: MissionItem) -> ItemProblem | None:
             return ItemProblem("p2", p2, "a jump's count is a whole number, or -1 for without end")
     if item.command in (Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME) and p1 < 0:
         return ItemProblem("p1", p1, "turns and seconds to loiter cannot be negative")
+    if item.command == Command.DO_SET_CAM_TRIGG_DIST and 0.0 < p1 < MIN_PHOTO_DISTANCE_M:
+        allowed = f"a distance between photos is 0 for off, or at least {MIN_PHOTO_DISTANCE_M:g} m"
+        return ItemProblem("p1", p1, allowed)
     if item.command in (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION):
         if not (p1 >= 3 and p1 == int(p1)):
             return ItemProblem("p1", p1, "a fence polygon has a whole number of corners, at least 3")

@@ -15,6 +15,7 @@ from flight.dynamics.envelope_tables import load_envelope
 from planfly.flight_options import takes_options
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
+from planfly.workflow.airframe import check_level_flight
 from planfly.workflow.output_paths import expand_path_pattern, prepare_folder, refuse_folder
 from world.errors import PlanflyError
 from world.files import whole_path, write_whole
@@ -161,6 +162,7 @@ def describe_aircraft(
     # Everything is computed before anything is written.
     with stage(f"trimming {chosen.name}", "trimming"):
         envelope = load_envelope(chosen, motor_braking=motor_braking)
+        check_level_flight(chosen, envelope)
         trims = trim_table(chosen)
         modes = {row.trim.airspeed: modes_at(chosen, row.trim.airspeed) for row in trims}
         cruise, steps = modes_at(chosen, chosen.airspeed), step_responses(chosen)

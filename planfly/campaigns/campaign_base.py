@@ -22,7 +22,15 @@ from logs.verdict.conditions import Conditions, setup_conditions
 from planfly.campaigns.dispersions import DEFAULT, DRAWN, Dispersions, Draw, SpreadError
 from planfly.flight_options import MissionOptions, named_scenario
 from planfly.named_fences import NamedFences, read_named_fences
-from planfly.workflow.airframe import Airframe, airframe_of, bank_limit, choose_seed, load_airframe, with_tracking
+from planfly.workflow.airframe import (
+    Airframe,
+    airframe_of,
+    bank_limit,
+    check_level_flight,
+    choose_seed,
+    load_airframe,
+    with_tracking,
+)
 from planfly.workflow.make_plan import Advance, make_plan
 from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
 from planfly.workflow.pipeline import OffNominal
@@ -153,12 +161,16 @@ def _of_setup(setup: FlightSetup, dispersions: Dispersions, source: str) -> Camp
 
 
 def check_middle(base: CampaignBase) -> None:
-    """Raise SpreadError if the aircraft cannot hold level flight at the medians of the dispersions."""
+    """Raise SpreadError if the aircraft cannot hold level flight at the medians of the dispersions.
+
+    Raise FlightError if it cannot hold level flight at all.
+    """
     medians = {one.quantity.name: one.value(0.5) for one in base.dispersions.varying}
     variation = Variation(
         mass=medians.get("mass", 1.0), drag=medians.get("drag", 1.0), control=medians.get("control_power", 1.0)
     )
     aircraft = base.airframe.aircraft
+    check_level_flight(aircraft, base.airframe.limits.envelope)
     _check_draws(base)
     model = Fdm(aircraft, motor_braking=base.scenario.flight.motor_braking, variation=variation)
     amsl = float(base.scenario.start[2])

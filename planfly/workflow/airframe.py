@@ -4,7 +4,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from aircraft.catalog import Aircraft, find_again, find_aircraft, model_hash
+from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.catalog import load_autopilot
@@ -161,3 +164,11 @@ def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:
     old = airframe.limits
     limits = make_limits(scenario, old.envelope, old.airspeed, bank_limit(scenario, airframe.autopilot))
     return replace(airframe, limits=replace(limits, tracking=old.tracking))
+
+
+def check_level_flight(aircraft: Aircraft, envelope: Envelope) -> None:
+    """Raise FlightError for an aircraft that holds level flight at no airspeed and no altitude of its envelope."""
+    if not np.isfinite(envelope.level_speed_max - envelope.level_speed_min).any():
+        amsl = f"{envelope.amsl[0]:.0f} to {envelope.amsl[-1]:.0f} m above sea level"
+        message = f"{aircraft.name} holds no level flight at any airspeed, from {amsl}"
+        raise FlightError(message, file=aircraft.name, field="airspeed")

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from aircraft.data_sheet import DataSheet, check_sheet, elliptic_slope, size_aircraft
+from aircraft.data_sheet import RANGES, STALL_SHARE, DataSheet, check_sheet, elliptic_slope, size_aircraft
 from aircraft.propulsion import ElectricMotor, FuelEngine
 from world.errors import FlightError
 
@@ -145,3 +145,29 @@ def test_what_is_no_small_aircraft_is_refused(changed: dict[str, float], told: s
     assert told in str(caught.value)
     assert "\n" not in str(caught.value)
     assert caught.value.field
+
+
+def refusal(sheet: DataSheet) -> str:
+    """Return the message that refuses a sheet, or "" for one that is accepted."""
+    try:
+        check_sheet(sheet)
+    except FlightError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("field", RANGES)
+@pytest.mark.parametrize("edge", [2, 3])
+def test_both_edges_of_a_range_are_allowed(field: str, edge: int) -> None:
+    _, unit, low, high, factor = RANGES[field]
+    value = (low, high)[edge - 2]
+    # Another number of the sheet may not go with it.
+    assert f"allowed {low:g}..{high:g} {unit}" not in refusal(replace(FOAM, **{field: value * factor}))
+
+
+def test_edges_that_depend_on_the_cruise_speed_are_allowed_as_printed() -> None:
+    for cruise in range(9, 40):
+        for share in STALL_SHARE:
+            stall = float(f"{share * cruise:.6g}")
+            # The wing may not carry the mass at that speed, and `stall` alone has a range of its own.
+            assert f"at a cruise speed of {cruise} m/s" not in refusal(DataSheet(2.1, 1.6, float(cruise), stall))

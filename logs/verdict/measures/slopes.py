@@ -250,8 +250,12 @@ def _saturation(requirements: RouteRequirements, aligned: AlignedTrack, leg: int
     steady = _speed_in_mean_wind(requirements, aligned, rows) - commanded
     width = max(1, round(SATURATED_TIME_S / tick))
     lifted = lifted_speed(aligned.track.time, aligned.track.airspeed, aligned.track.wind[:, 2], rows.stop)[rows]
-    slow = _largest_mean_within(full, np.minimum(-error, -steady) - np.maximum(0.0, -lifted), width)
-    fast = _largest_mean_within(idle, np.minimum(error, steady) - np.maximum(0.0, lifted), width)
+    slower = np.minimum(-error, -steady) - np.maximum(0.0, -lifted)
+    faster = np.minimum(error, steady) - np.maximum(0.0, lifted)
+    # A log may lack the airspeed at some rows.
+    known = np.isfinite(slower) & np.isfinite(faster)
+    slow = _largest_mean_within(full & known, np.where(known, slower, 0.0), width)
+    fast = _largest_mean_within(idle & known, np.where(known, faster, 0.0), width)
     return float(full.sum() * tick), float(idle.sum() * tick), slow, fast
 
 
@@ -285,11 +289,13 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     low, high = straight_span(requirements, leg, 0.0)
     use = _rows_after(full if sign > 0.0 else idle, round(ABILITY_SETTLING_S / aligned.tick))
     use &= (along >= low) & (along <= high)
+    velocity = track.velocity[rows].astype(np.float64)
+    air = velocity - track.wind[rows]
+    # A log may lack the wind at some rows.
+    use &= np.isfinite(air).all(axis=1)
     seconds = float(use.sum() * aligned.tick)
     if seconds < ABILITY_WINDOW_S:
         return None
-    velocity = track.velocity[rows].astype(np.float64)
-    air = velocity - track.wind[rows]
     push = np.gradient(velocity, track.time[rows], axis=0)
     rate = (air[:, 2] + (air * push).sum(axis=1) / GRAVITY)[use]
     commanded, up = float(requirements.route.airspeed[leg]), track.position[rows, 2][use]
@@ -345,6 +351,8 @@ def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) ->
     for k in range(1, stop):
         step = time[k] - time[k - 1]
         gain = GRAVITY * rising[k] / max(MIN_AIRBORNE_AIRSPEED_MPS, airspeed[k])
+        # A log may lack the airspeed or the wind at some rows.
+        gain = gain if math.isfinite(gain) else 0.0
         out[k] = (out[k - 1] + gain * step) / (1.0 + step / SPEED_MEMORY_S)
     return out
 

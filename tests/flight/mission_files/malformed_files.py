@@ -36,6 +36,7 @@ BAD_WPL = {
     ),
     "empty-column": (wpl("1", "0", "3", "16", "", "0", "0", "0", "36.5", "-84.2", "300", "1"), ":3: 11 columns"),
     "nan-latitude": (wpl(at={8: "nan"}), ":3: latitude 'nan'"),
+    "photos-everywhere": (wpl(at={3: "206", 4: "1e-6"}), ":3: p1 1e-06: a distance between photos is 0 for off, or at"),
     "nan-parameter": (wpl(at={4: "NaN"}), ":3: p1 'NaN'"),
     "inf-altitude": (wpl(at={10: "inf"}), ":3: altitude 'inf'"),
     "overflow": (wpl(at={10: "1e999"}), ":3: altitude '1e999'"),

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import planfly
 from aircraft.catalog import load_aircraft
+from flight.dynamics.envelope_tables import load_envelope
 from logs.recording.reader import read_log
 from logs.views import aircraft as drawn
 from planfly.cli import main
@@ -247,3 +249,18 @@ def test_a_bad_data_sheet_is_one_line(argv: tuple[str, ...], told: str, capsys: 
 def test_a_data_sheet_needs_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft", *SIX]) == 2
     assert "--mass: goes with --new FOLDER" in capsys.readouterr().err
+
+
+def test_an_aircraft_that_holds_no_level_flight_is_refused(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    whole = load_envelope(load_aircraft("aerosonde"))
+    none = np.full(whole.amsl.shape, np.nan)
+    monkeypatch.setattr(
+        "planfly.api.aircraft.load_envelope",
+        lambda *_, **__: replace(whole, level_speed_min=none, level_speed_max=none),
+    )
+    assert main(["aircraft", "aerosonde", "--out", str(tmp_path / "a")]) == 2
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert line == "planfly: aerosonde holds no level flight at any airspeed, from 0 to 9000 m above sea level"
+    assert not (tmp_path / "a").exists()

@@ -268,6 +268,43 @@ def test_an_aircraft_that_has_nearly_stopped_gains_as_one_at_ten_metres_a_second
     assert gained[-1] == pytest.approx(GRAVITY * 0.19 / 10.0, rel=0.02)
 
 
+# ----------------------------------------------------------------------
+# Logs that lack the airspeed or the wind at some rows.
+
+# Middle of the rows with the throttle at full.
+MISSING_M = THERE + 150.0
+
+
+@pytest.mark.parametrize("column", ["wind", "airspeed"])
+def test_an_ability_is_measured_where_a_quantity_is_missing_at_some_rows(column: str) -> None:
+    setup = make_setup(LEVEL)
+    track = fly_path(
+        setup,
+        throttle=lambda s: 0.4 * ((s > THERE) & (s < THERE + 300.0)),
+        airspeed=lambda s: np.clip((s - THERE) / 150.0 - 1.0, -1.0, 1.0),
+    )
+    whole = measure_ability(*laid(setup, track), 1)
+    values = np.array(getattr(track, column))
+    values[int(np.argmin(np.abs(track.position[:, 1] - MISSING_M)))] = math.nan
+    holed = measure_ability(*laid(setup, edited(track, **{column: values})), 1)
+    assert whole is not None
+    assert holed is not None
+    assert holed.slope == pytest.approx(whole.slope, abs=1e-3)
+
+
+@pytest.mark.parametrize("column", ["wind", "airspeed"])
+def test_a_speed_that_is_lost_is_seen_although_a_quantity_was_missing_before(column: str) -> None:
+    setup = make_setup(LEVEL)
+    track = fly_path(
+        setup,
+        throttle=lambda s: 0.4 * ((s > THERE) & (s < THERE + 300.0)),
+        airspeed=lambda s: 0.0 * s - 2.0,
+    )
+    values = np.array(getattr(track, column))
+    values[int(np.argmin(np.abs(track.position[:, 1] - (THERE - 200.0))))] = math.nan
+    assert measure_slope(*laid(setup, edited(track, **{column: values})), 1).slow == pytest.approx(2.0, abs=0.05)
+
+
 @pytest.mark.parametrize(("from_deg", "ground"), [(180.0, 33.0), (0.0, 17.0)])
 def test_an_ability_is_that_of_flight_relative_to_the_air(from_deg: float, ground: float) -> None:
     """From 24 to 26 m/s within 200 m of a level leg: the rate v a / g, of the airspeed, at 25 m/s in the wind's slope.
