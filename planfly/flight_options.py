@@ -258,7 +258,9 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
     wind = options.get("wind")
     speed, from_deg = (None, None) if wind is None else _two_numbers(wind)
     if from_deg is not None and not is_wind(0.0, from_deg):
-        raise ArgumentError.of_argument("wind", wind, "degrees from north that it blows from, -360..360, are expected")
+        raise ArgumentError.of_argument(
+            "wind", wind, "expected the direction that the wind blows from, degrees from north, -360..360"
+        )
     from_course = None if from_deg is None else math.radians(from_deg)
     flown = with_flight(at_time(scenario, options.get("at")), **flight_entries(options, program))
     return with_wind(with_file_autopilot(flown), speed, from_course, options.get("turbulence"))
@@ -300,5 +302,7 @@ def _two_numbers(wind: Wind) -> Wind:
             raise TypeError
         return float(speed), float(from_deg)
     except (TypeError, ValueError):
-        allowed = "a speed, m/s, and the degrees from north that it blows from are expected, as (8, 270)"
+        allowed = (
+            "expected a speed, m/s, and the direction that the wind blows from, degrees from north, such as (8, 270)"
+        )
         raise ArgumentError.of_argument("wind", wind, allowed, shown=repr(wind)) from None

@@ -150,7 +150,7 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
         raise
     except MemoryError:
         raise TerrainError(
-            f"{name}: elevation: claims more than fits into memory", file=name, field="elevation"
+            f"{name}: elevation: its stated size does not fit into memory", file=name, field="elevation"
         ) from None
     except (*_UNZIP_ERRORS, OSError, ValueError, TypeError, EOFError, RuntimeError) as error:
         raise TerrainError(f"{name}: not a readable .npz elevation file: {one_line(error)}", file=name) from error

@@ -95,7 +95,7 @@ def open_log(path: Path) -> "RawLog":
     except AddressSpaceError:
         raise
     except MemoryError:
-        raise LogError(f"{path}: claims more than fits into memory", file=path) from None
+        raise LogError(f"{path}: its stated size does not fit into memory", file=path) from None
 
 
 def log_format(path: Path, head: bytes) -> LogFormat:

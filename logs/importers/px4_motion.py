@@ -216,7 +216,7 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
         elif kind in _MIXED:
             raise _refusal(topics, f"CA_SV_CS{k}_TYPE", kind, f"{_MIXED[kind]}: its mix is not modelled")
         elif kind in _FLAPS and moves:
-            message = f"{_FLAPS[kind]} moves in flight, and no model of it is estimated"
+            message = f"{_FLAPS[kind]} moves in flight, and no model is estimated for that"
             raise _refusal(topics, f"CA_SV_CS{k}_TYPE", kind, message)
     for axis, row in zip(("elevator", "aileron"), scales, strict=False):
         if not row.any():
@@ -254,7 +254,7 @@ def _refuse_flaperon(topics: Topics, parameters: Mapping[str, float], surface: i
         share = parameters.get(f"CA_SV_CS{surface}_{name}", 0.0)
         setpoints = _samples(topics, topic, ("normalized_setpoint",)).values
         if len(setpoints) and abs(share) * float(np.ptp(setpoints)) > _FLAP_MOVE_TOLERANCE:
-            message = f"of a surface that {title} move in flight, and no model of it is estimated"
+            message = f"of a surface that {title} move in flight, and no model is estimated for that"
             raise _refusal(topics, f"CA_SV_CS{surface}_{name}", share, message)
 
 

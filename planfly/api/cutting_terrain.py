@@ -51,7 +51,7 @@ def terrain(
     """
     check_arguments(margin=margin)
     if (around is None) == (box is None):
-        raise PlanflyError("`around`, `box`: one of them is expected", field="around, box")
+        raise PlanflyError("`around`, `box`: expected one of them", field="around, box")
     target = Path(out)
     if target.suffix.lower() not in (".tif", ".tiff"):
         raise PlanflyError(f"{target}: a name that ends with .tif is expected", file=target)
@@ -96,7 +96,7 @@ def _around(file: Path) -> Box:
     if mission.home is not None:
         places.append((mission.home.lat_deg, mission.home.lon_deg))
     if not places:
-        raise PlanflyError(f"{file}: no place in it", file=file)
+        raise PlanflyError(f"{file}: contains no coordinates", file=file)
     first = places[0][1]
     lats = [lat for lat, _ in places]
     lons = [first + (lon - first + 180.0) % 360.0 - 180.0 for _, lon in places]

@@ -32,9 +32,17 @@ def campaign_options(line: LineParser) -> None:
     parser.alias("index", "--refly")
     _shared_options(parser)
     goal = parser.add_mutually_exclusive_group()
-    goal.add_argument("--prove", metavar="P", type=number("prove"), help="fly until P is reached or missed")
     goal.add_argument(
-        "--at-least", metavar="P", type=number("at_least"), help="decide after all flights whether P is reached"
+        "--prove",
+        metavar="P",
+        type=number("prove"),
+        help="fly until the probability is shown to be at least P, or less",
+    )
+    goal.add_argument(
+        "--at-least",
+        metavar="P",
+        type=number("at_least"),
+        help="decide after all flights whether the probability is at least P",
     )
     parser.add_argument(
         "--flights",

@@ -34,7 +34,9 @@ def fly_options(line: LineParser) -> None:
         "--seed", metavar="N", type=number("seed"), help="seed of the turbulence (default: the plan's, or 1)"
     )
     log.add_argument(
-        "--log", metavar="FILE", help="the flight log (default: runs/<mission>-seed<N>/flight.mcap, replaced)"
+        "--log",
+        metavar="FILE",
+        help="file for the flight log (default: runs/<mission>-seed<N>/flight.mcap, overwritten)",
     )
     log_rate_option(log)
     result_options(parser, junit=True)

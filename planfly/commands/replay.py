@@ -59,8 +59,8 @@ def replay_options(line: LineParser) -> None:
         "--to",
         metavar="S|IP:PORT,...",
         type=time_or_stations,
-        help="to this time of the flight, s; or play the log to the ground stations that listen there (extra"
-        " planfly[live])",
+        help="end at this time of the flight, s; or play the log to ground stations at this address (extra "
+        "planfly[live])",
     )
     part.add_argument(
         "--speed",
@@ -106,7 +106,7 @@ def replay(args: argparse.Namespace) -> int:
     stations = isinstance(args.to, str)
     if bool(args.foxglove) + bool(args.movie) + stations > 1:
         options = "--foxglove, --movie, --to IP:PORT"
-        raise PlanflyError(f"{options}: one of them is expected", field=options, allowed="one of them is expected")
+        raise PlanflyError(f"{options}: expected only one of them", field=options, allowed="expected only one of them")
     log = planfly.read_log(Path(args.log))
     if not stations:
         args.end = args.to

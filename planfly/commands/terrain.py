@@ -42,8 +42,8 @@ def terrain_options(line: LineParser) -> None:
     tiles.add_argument(
         "--sea",
         action="store_true",
-        help="degrees of which the server has no tile are sea, at 0 m (default: no data there, for some countries' "
-        "tiles are not published)",
+        help="treat missing 1-degree tiles as sea at 0 m (default: no data, because some countries' tiles are not "
+        "published)",
     )
     result_options(parser, "the file to write (default: dem.tif)", "FILE")
 

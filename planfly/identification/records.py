@@ -188,7 +188,7 @@ def _refuse(log: MotionLog) -> None:
             lowest, highest = _range(log, number)
             if highest - lowest > 20.0:
                 message = f"output {number} (SERVO{number}_FUNCTION {kind}, {_FLAPS[kind]}) moves in flight"
-                raise LogError(f"{log.source}: {message}, and no model of it is estimated", file=log.source)
+                raise LogError(f"{log.source}: {message}, and no model is estimated for that", file=log.source)
 
 
 def slowest_rows(log: MotionLog) -> float:

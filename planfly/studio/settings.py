@@ -74,7 +74,7 @@ def changed_world(scenario: Scenario, asked: Settings) -> Scenario:
     spec["limits"] = {name: value for name, value in limits.items() if value is not None}
     if asked.ceiling is not None:
         if scenario.external:
-            raise PlanflyError("ceiling: a mission without a scenario has no area with a ceiling", field="ceiling")
+            raise PlanflyError("ceiling: only a scenario has an area with a ceiling", field="ceiling")
         spec["area"]["ceiling_amsl_m"] = asked.ceiling
     return from_spec(spec, changed.name, ground=changed.terrain, external=changed.external)
 

@@ -85,7 +85,9 @@ def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] 
             block = _Block(number, rest.upper())
         elif word in _COMMANDS:
             if block is None:
-                raise ScenarioError(f"{source}: line {number}: {word}: no AC before it begins an airspace", file=source)
+                raise ScenarioError(
+                    f"{source}: line {number}: {word}: no airspace has begun: an AC is missing before it", file=source
+                )
             try:
                 _COMMANDS[word](block, rest)
             except ValueError as error:

@@ -361,12 +361,12 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
             free[entries] += 1
             continue
         if len(read.zones) >= most:
-            message = f"{source}: more zones than may be: at most {MAX_ZONES:,} in all files"
+            message = f"{source}: too many zones: at most {MAX_ZONES:,} in all files"
             raise ScenarioError(message, file=source, field="zones", allowed=f"at most {MAX_ZONES:,}")
         corners += sum(map(len, entries.get("rings_deg", ())))
         if corners > MAX_FILE_CORNERS:
             allowed = f"at most {MAX_FILE_CORNERS:,}"
-            raise ScenarioError(f"{source}: more corners than may be: {allowed}", file=source, allowed=allowed)
+            raise ScenarioError(f"{source}: too many corners: {allowed}", file=source, allowed=allowed)
         done, repaired = _mend(entries, MAX_CROSSINGS - crossings, f"{source}: {where}")
         crossings += repaired
         for one in done:

@@ -160,8 +160,8 @@ def _planned(requirements: RouteRequirements, survey: Survey, line: PhotoLine, n
     if not ok:
         faults.append(
             message(
-                f"{name}: the turns at its ends leave {100.0 * share:.0f} % of its {length:.0f} m straight",
-                f" ({cut_in:.0f} m at its begin, {cut_out:.0f} m at its end)",
+                f"{name}: the turns at its ends leave only {100.0 * share:.0f} % of its {length:.0f} m straight",
+                f" (they take {cut_in:.0f} m at the start and {cut_out:.0f} m at the end)",
             )
         )
     return _finding(requirements, line, ok, faults, facts, share, geometric=True)

@@ -117,7 +117,7 @@ def test_ailerons_that_flaps_move_as_well_are_refused_where_they_do(
     topics[topic] = (time, {"normalized_setpoint": np.linspace(0.0, 1.0, len(time))})
     with pytest.raises(LogError) as refused:
         changed(tmp_path, topics, {f"CA_SV_CS1_{name}": 0.5})
-    said = f"CA_SV_CS1_{name} 0.5 is of a surface that {title} move in flight, and no model of it is estimated"
+    said = f"CA_SV_CS1_{name} 0.5 is of a surface that {title} move in flight, and no model is estimated for that"
     assert str(refused.value).endswith(said)
     # Neither where they stay in, nor where nothing of them reaches a surface.
     changed(tmp_path, topics, {f"CA_SV_CS1_{name}": 0.0})

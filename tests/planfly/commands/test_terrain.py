@@ -377,8 +377,8 @@ def test_around_a_mission_is_home_and_all_its_places(here: Path) -> None:
 @pytest.mark.parametrize(
     ("argv", "said"),
     [
-        ([], "planfly: --around, --box: one of them is expected"),
-        (["--box", "46,8,47,9", "--around", "m.waypoints"], "one of them is expected"),
+        ([], "planfly: --around, --box: expected one of them"),
+        (["--box", "46,8,47,9", "--around", "m.waypoints"], "expected one of them"),
         (["--box", "46,8,47"], "argument --box: '46,8,47': S,W,N,E is expected"),
         (["--box", "47,8,46,9"], "--box (47.0, 8.0, 46.0, 9.0): south, west, north, east are expected"),
         (["--box", "46,8,nan,9"], "south, west, north, east are expected"),

@@ -109,7 +109,7 @@ def test_a_file_has_a_limited_number_of_corners(name: str, tmp_path: Path, monke
     monkeypatch.setattr(zone_files, "MAX_FILE_CORNERS", corners)
     read(tmp_path / name, FORMATS[name](star(3, 1)))
     monkeypatch.setattr(zone_files, "MAX_FILE_CORNERS", corners - 1)
-    with pytest.raises(ScenarioError, match=f"more corners than may be: at most {corners - 1}$"):
+    with pytest.raises(ScenarioError, match=f"too many corners: at most {corners - 1}$"):
         read(tmp_path / name, FORMATS[name](star(3, 1)))
 
 

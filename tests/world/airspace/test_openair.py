@@ -116,7 +116,7 @@ def test_a_text_file_is_openair_by_its_first_command(encoding: str, tmp_path: Pa
     assert len(read_zone_file(path, "zones.txt").zones) == 1
     path.write_text(f"AN LAKE\nAC R\n{SQUARE}", encoding=encoding)
     assert is_zone_file(path)
-    with pytest.raises(ScenarioError, match="line 1: AN: no AC before it begins an airspace"):
+    with pytest.raises(ScenarioError, match="line 1: AN: no airspace has begun: an AC is missing before it"):
         read_zone_file(path, "zones.txt")
 
 
@@ -225,7 +225,7 @@ def test_the_record_of_the_page_is_read_as_it_says() -> None:
 
 
 FAULTS = {
-    "AN LAKE": "line 1: AN: no AC before it begins an airspace",
+    "AN LAKE": "line 1: AN: no airspace has begun: an AC is missing before it",
     HEAD + "AH FL95\n": "line 5: AH 'FL95': an airspace has one lower limit (AL) and one upper limit (AH)",
     HEAD + "DP 46:00:00N\n": "line 5: DP '46:00:00N': a place is expected",
     HEAD + "DP 91:00:00N 008:00:00E\n": "line 5: DP '91:00:00N 008:00:00E': allowed 0..90 degrees",
