@@ -334,8 +334,8 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
     ring = points if points[0] == points[-1] else points[1:]
     if len(ring) < 4 or ring[0] != ring[-1]:
         raise MissionError(
-            f"{source}: {len(points)} points: expected a return point and a closed ring of three or more corners, with the"
-            " first corner repeated at the end",
+            f"{source}: {len(points)} points: expected a return point and a closed ring of three or more corners,"
+            " with the first corner repeated at the end",
             file=source,
         )
     none = (float(len(ring) - 1), 0.0, 0.0, 0.0)

@@ -44,7 +44,7 @@ def wind(text: str) -> tuple[float, float]:
         speed, source = math.nan, 0.0
     if not is_wind(speed, source):
         raise argparse.ArgumentTypeError(
-            f"{text!r}: expected SPEED,FROM: 0 to 40 m/s, and the direction that the wind blows from, degrees (-360..360)"
+            f"{text!r}: expected SPEED,FROM: 0 to 40 m/s, and the degrees that the wind blows from (-360..360)"
         )
     return speed, source
 
