@@ -50,7 +50,7 @@ def test_a_ring_without_a_return_point_is_taken_whole() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (text_of([RETURN, *CORNERS]), "a.fence: 5 points: a return point and a ring"),
+        (text_of([RETURN, *CORNERS]), "a.fence: 5 points: expected a return point and a closed ring"),
         (text_of([RETURN, *CORNERS[:2], CORNERS[0]]), "a.fence: 4 points"),
         (text_of([*CORNERS[:2], CORNERS[0]]), "a.fence: 3 points"),
         ("36.5 -84.2\n36.5\n", "a.fence:2: '36.5': a latitude and a longitude"),
