@@ -11,8 +11,10 @@ import pytest
 from hypothesis import settings
 
 from flight.dynamics import model_check
+from planfly.runtime import first_start
 from planfly.runtime.process_setup import prepare_process
 from planfly.terminal import output
+from tests.kernels import note_of_compiled
 from tests.shared import remove_made
 from tests.soak import CORE_SECONDS, SECONDS, SOAK, begin_file, end_file, note, passed_files, scaled
 
@@ -55,6 +57,18 @@ def _no_estimates_of_other_runs(tmp_path_factory: pytest.TempPathFactory) -> Ite
         patch.setattr(output, "_times_file", lambda: tmp_path_factory.getbasetemp() / "none" / "durations.json")
         patch.setattr(output, "_keep_time", lambda *_: None)
         patch.setattr(output, "_LOOKS_EVERY", 86_400.0)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _units_are_compiled_once() -> Iterator[None]:
+    """Have no command compile all of its units for the one kernel that is missing, where `tests.kernels` did before.
+
+    Two processes would read all that is in the cache.  What they do is tried in tests/planfly/runtime.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        if note_of_compiled().exists():
+            patch.setattr(first_start, "compile_units", lambda *_: None)
         yield
 
 

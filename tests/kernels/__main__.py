@@ -7,20 +7,18 @@ that they were compiled for: with the same sources nothing is done a second time
 parts, that no command has, they compile themselves: such files come first (conftest.py).
 """
 
-import hashlib
 import os
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-from planfly.campaigns.flight_requests import code_hash
 from planfly.kernel_units.ready_kernels import MISSION
 from planfly.kernel_units.unit_kernels import BOTH, GLIDING
 from planfly.runtime.first_start import compile_units
 from planfly.runtime.process_setup import prepare_process, with_large_stack
 from planner.search.kernel_calls import FRONT
-from world.kernel_cache import PACKAGES
+from tests.kernels import note_of_compiled
 from world.kernels import cache_folder
 
 # Over which the climb and the corner of MISSION lead.
@@ -92,7 +90,7 @@ def main() -> int:
     """Run them; 1 where a command fails otherwise than by its verdict."""
     if len(sys.argv) > 1:
         return _run(PROCESSES[int(sys.argv[1])])
-    done = cache_folder() / f"compiled-for-tests-{_of_this_checkout()}"
+    done = note_of_compiled()
     if done.exists():
         return 0
     with tempfile.TemporaryDirectory(prefix="planfly-kernels-") as name:
@@ -110,12 +108,6 @@ def main() -> int:
     if not failed:
         done.touch()
     return failed
-
-
-def _of_this_checkout() -> str:
-    """A digest of planfly's sources, their paths and their times: numba keeps its kernels by all three."""
-    stamps = [(str(file), file.stat().st_mtime_ns) for name in PACKAGES for file in (ROOT / name).rglob("*.py")]
-    return hashlib.sha256(f"{code_hash()} {sorted(stamps)}".encode()).hexdigest()[:16]
 
 
 def _run(commands: tuple[tuple[str, ...], ...]) -> int:

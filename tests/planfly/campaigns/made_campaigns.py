@@ -108,13 +108,6 @@ def slow_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -
     return made_flight(base, index, wind)
 
 
-def deadly_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
-    """Flight 5 ends its worker's process, as a model that makes JSBSim abort does."""
-    if index == 5:
-        os.abort()
-    return made_flight(base, index, wind)
-
-
 def deadly_in_the_east(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
     """Flight 9 in wind from the east, of 5 m/s where it is among the second six, ends its worker's process."""
     if index == 9 and wind is not None and wind.from_deg == 90.0:

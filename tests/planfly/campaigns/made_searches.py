@@ -32,15 +32,16 @@ class HerePilots:
 
 
 @contextmanager
+def hire_here(_workers: Workers, base: CampaignBase, fly: FlyOne) -> Iterator[HerePilots]:
+    """Make a pool in this process, in place of `planfly.campaigns.worker_pool.worker_pool`."""
+    yield HerePilots(base, fly)
+
+
+@contextmanager
 def flying_here() -> Iterator[None]:
     """Fly without workers; outside the soak, fewer points stand for all that may be drawn, and rounds are of more."""
-
-    @contextmanager
-    def hired(_workers: Workers, base: CampaignBase, fly: FlyOne) -> Iterator[HerePilots]:
-        yield HerePilots(base, fly)
-
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(find_winds_module, "worker_pool", hired)
+        patch.setattr(find_winds_module, "worker_pool", hire_here)
         if not SOAK:
             patch.setattr(find_winds_module, "_POPULATION", 512)
             patch.setattr(find_winds_module, "_MAX_EACH", 12)

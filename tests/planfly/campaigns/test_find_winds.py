@@ -240,7 +240,7 @@ def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, m
     assert all(done < whole for done, whole, _ in told)
 
 
-@pytest.mark.skipif(not SOAK, reason="workers die at a small count in a campaign's tests: in make soak")
+@pytest.mark.skipif(not SOAK, reason="workers die at a small count in test_local_pool.py: in make soak")
 def test_a_deadly_flight_is_named_and_counts_against(wind_base: CampaignBase, tmp_path: Path) -> None:
     """By workers: all others come out as without them, and the one counts as not flyable."""
     # Six of each direction in 10 m/s, in which none flies, and six in 5 m/s, in which all others fly.

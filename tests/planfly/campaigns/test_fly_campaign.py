@@ -15,8 +15,9 @@ from typing import Any, cast
 
 import pytest
 
-from planfly.campaigns.campaign_base import CampaignBase
-from planfly.campaigns.flight_requests import FlightRequest, FlyOne
+from planfly.campaigns import fly_campaign as fly_campaign_module
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind
+from planfly.campaigns.flight_requests import LOST, FlightRequest, FlyOne
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.fly_campaign import _Book, _fly_rest, _Pace, fly_campaign, open_store, resumed_goal
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally, lower_bound
@@ -26,12 +27,12 @@ from planfly.campaigns.worker_pool import WorkerPool, Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, start_client, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
     all_fly,
-    deadly_flight,
     made_flight,
     short_base,
     slow_flight,
     table,
 )
+from tests.planfly.campaigns.made_searches import hire_here
 from tests.soak import SOAK, note, scaled
 
 pytestmark = pytest.mark.filterwarnings("default")
@@ -166,13 +167,22 @@ def test_real_flights_are_the_same_on_any_workers(base: CampaignBase, tmp_path: 
     note("campaign: real flights on 1, 2 and 4 workers", flights=20, other=0)
 
 
-def test_a_deadly_flight_is_named_and_counts_against(base: CampaignBase, tmp_path: Path) -> None:
+def lost_fifth(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
+    """Make a flight; flight 5 is one that a pool has given up."""
+    return lost_row(base, 5, LOST) if index == 5 else made_flight(base, index, wind)
+
+
+def test_a_deadly_flight_is_named_and_counts_against(
+    base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A flight that its pool gives up: which it gives up is tested in test_local_pool.py and test_dask_pool.py."""
+    monkeypatch.setattr(fly_campaign_module, "worker_pool", hire_here)
     goal, count = Goal(None, False, 12), 12
-    found = flown(base, goal, tmp_path, Workers(2), deadly_flight)
+    found = flown(base, goal, tmp_path, Workers(2), lost_fifth)
     others = [row for row in expected(base, tmp_path / "one", count) if row[0] != 5]
     assert [row for row in table(tmp_path / DATABASE) if row[0] != 5] == others
     with open_store(base, goal, tmp_path, resume=True) as store:
-        assert store.flight(5) == lost_row(base, 5, "lost: its workers died")
+        assert store.flight(5) == lost_row(base, 5, LOST)
         assert summarise(base, goal, found, store).lost == (5,)
     flyable = found.tally.flyable
     assert found.tally == Tally(flyable, 11 - flyable, 1)
@@ -227,7 +237,7 @@ def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
 
 
 def test_a_killed_worker_loses_no_flight(base: CampaignBase, tmp_path: Path) -> None:
-    kills, count = scaled(20, 2), scaled(1200, 70)
+    kills, count = scaled(20, 1), scaled(1200, 40)
     # A process takes some seconds to start, and the other one flies on.
     pause = (0.3, 1.2) if SOAK else (0.1, 0.4)
     begun, goal = threading.Event(), Goal(None, False, count)

@@ -19,7 +19,8 @@ from planfly.campaigns.flight_row import FlightRow, lost_row
 from planfly.campaigns.local_pool import MAX_FAILED_STARTS, LocalPool
 from planfly.campaigns.tables import same_flight
 from tests.planfly.campaigns.kills import spawned_processes, start_client
-from tests.planfly.campaigns.made_campaigns import deadly_flight, made_flight, slow_flight
+from tests.planfly.campaigns.made_campaigns import made_flight, slow_flight
+from tests.soak import some
 from world.errors import MissionError
 
 
@@ -77,32 +78,29 @@ def listeners() -> list[object]:
     return found
 
 
-def test_a_flight_that_kills_its_process_is_lost_after_three_and_no_other_is(base: CampaignBase) -> None:
-    with pool(2, base, deadly_flight) as made:
-        rows = {one.request.index: one.row for one in made.fly(requests(12))}
-    assert rows.pop(5) == lost_row(base, 5, LOST)
-    assert sorted(rows) == [k for k in range(12) if k != 5]
-    assert all(same_flight(row, made_flight(base, k)) for k, row in rows.items())
+# How often a flight kills its process.
+KILLS = {3: 2, 4: 9}
 
 
-def fly_once_killed(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
-    """Flights 3 and 4 kill their process the first and the first two times."""
-    for number in range(index - 2):
+def fly_killed(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
+    """Make a flight, but kill the process of those of `KILLS` the first so many times."""
+    for number in range(KILLS.get(index, 0)):
         flag = Path(os.environ["PLANFLY_TEST_FLAGS"]) / f"{index}-{number}"
-        if index in (3, 4) and not flag.exists():
+        if not flag.exists():
             flag.touch()
             os.kill(os.getpid(), signal.SIGKILL)
     return made_flight(base, index, wind)
 
 
-def test_a_flight_whose_process_was_killed_once_or_twice_is_flown_again(
+def test_a_flight_that_kills_its_process_is_flown_twice_again_and_then_lost_and_no_other_is(
     base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PLANFLY_TEST_FLAGS", str(tmp_path))
-    with pool(2, base, fly_once_killed) as made:
-        rows = {one.request.index: one.row for one in made.fly(requests(6))}
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["3-0", "4-0", "4-1"]
-    assert sorted(rows) == list(range(6))
+    with pool(2, base, fly_killed) as made:
+        rows = {one.request.index: one.row for one in made.fly(requests(8))}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["3-0", "3-1", "4-0", "4-1", "4-2"]
+    assert rows.pop(4) == lost_row(base, 4, LOST)
+    assert sorted(rows) == [0, 1, 2, 3, 5, 6, 7]
     assert all(same_flight(row, made_flight(base, k)) for k, row in rows.items())
 
 
@@ -153,30 +151,30 @@ def sleeping_flight(base: CampaignBase, index: int, wind: GivenWind | None = Non
     return made_flight(base, index, wind)
 
 
+def hears_ctrl_c(process: int) -> bool:
+    """Return True if a process does not block SIGINT."""
+    status = Path(f"/proc/{process}/status").read_text(encoding="ascii")
+    blocked = next(int(line.split()[1], 16) for line in status.splitlines() if line.startswith("SigBlk"))
+    return not blocked >> (signal.SIGINT - 1) & 1
+
+
 def test_flights_that_nobody_waits_for_end_with_their_processes_and_others_take_their_place(
     base: CampaignBase,
 ) -> None:
+    """And no process hears Ctrl-C."""
     with pool(2, base, sleeping_flight) as made:
         flying = made.fly(requests(9))
         assert next(flying).request.index == 0
+        if sys.platform == "linux":
+            assert not any(hears_ctrl_c(worker) for worker in spawned_processes())
         began = time.monotonic()
         flying.close()  # type: ignore[attr-defined]  # A generator, which is what it is typed to be used as.
         assert time.monotonic() - began < 5.0
         assert [one.request.index for one in made.fly(requests(1))] == [0]
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="the mask of signals is read from /proc")
-def test_workers_never_hear_ctrl_c(base: CampaignBase) -> None:
-    with pool(1, base, sleeping_flight) as made:
-        flying = made.fly(requests(2))
-        next(flying)
-        (worker,) = spawned_processes()
-        status = Path(f"/proc/{worker}/status").read_text(encoding="ascii")
-        blocked = next(int(line.split()[1], 16) for line in status.splitlines() if line.startswith("SigBlk"))
-        assert blocked >> (signal.SIGINT - 1) & 1
-
-
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+# Ctrl-C of a whole campaign, after which no process is left: tests/planfly/misuse/test_interruptions.py.
+@pytest.mark.parametrize("number", some([signal.SIGKILL, signal.SIGINT], 2))
 def test_workers_end_with_the_process_that_leads_them(number: signal.Signals, tmp_path: Path) -> None:
     client = start_client("campaign", tmp_path, 100_000)
     assert client.stdout is not None
