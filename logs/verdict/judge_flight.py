@@ -19,6 +19,7 @@ from logs.verdict.judge_geometry import (
     judge_geometry,
     judge_plan_only,
     judge_unflown,
+    with_passing_suggestions,
     with_suggestions,
 )
 from logs.verdict.measures.flown_phases import flown_phases, leg_ends
@@ -76,6 +77,7 @@ def judge_flight(
     unjudged = undecided_text(findings)
     flyable = complete and not unjudged and not any(item.ok is False for item in findings)
     findings = with_suggestions(in_air, aligned, findings)
+    findings = with_passing_suggestions(findings, None if reference is None else reference.tried)
     levels = _levels(whole, findings, flyable, reference)
     deciding = None if reference is None or flyable else reference.deciding
     conditions = setup_conditions(setup)

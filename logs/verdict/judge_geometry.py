@@ -19,7 +19,7 @@ from logs.verdict.findings import (
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName
+from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName, TriedSuggestions
 from logs.verdict.rule import Judge, Rule
 from logs.verdict.rules.registry import RULES
 from logs.verdict.summary import headline, summary_lines, undecided_text
@@ -182,6 +182,31 @@ def with_suggestions(
             item = replace(item, suggestions=suggest(requirements, aligned, item))
         out.append(item)
     return tuple(out)
+
+
+def with_passing_suggestions(
+    findings: tuple[Finding, ...], tried: Sequence[TriedSuggestions] | None
+) -> tuple[Finding, ...]:
+    """Replace the suggestions of failed findings by those that passed their trials; keep all if ``tried`` is None.
+
+    >>> from logs.verdict.places import Change, Place
+    >>> higher = ((Change("height", Place("leg", 2), None, 12.0, "m"),),)
+    >>> low = [
+    ...     replace(make_finding("clearance", Place("leg", k), ok=False, reason=""), suggestions=higher) for k in (1, 2)
+    ... ]
+    >>> passing = with_passing_suggestions(tuple(low), [TriedSuggestions("clearance", Place("leg", 2), higher)])
+    >>> [bool(item.suggestions) for item in passing]
+    [False, True]
+    """
+    if tried is None:
+        return tuple(findings)
+    if tried is None:
+        return findings
+    passed = {(one.rule, one.place): one.suggestions for one in tried}
+    return tuple(
+        replace(item, suggestions=passed.get((item.rule, item.place), ())) if item.ok is False else item
+        for item in findings
+    )
 
 
 # ----------------------------------------------------------------------

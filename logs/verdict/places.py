@@ -125,7 +125,7 @@ class LevelAnswer:
 
 
 @dataclass(frozen=True, slots=True)
-class AirframeAnswer:
+class AirframeAnswer(DocumentConfig):
     """Result of the reference flight by planfly's guidance, as stored in the log of the judged flight.
 
     failed: rule and place of each finding that failed.
@@ -137,7 +137,7 @@ class AirframeAnswer:
 
 
 @dataclass(frozen=True, slots=True)
-class DecidingParameter:
+class DecidingParameter(DocumentConfig):
     """Autopilot parameter that decides: with another value of it alone the flight passes.
 
     name: the autopilot's own name.
@@ -156,12 +156,23 @@ class DecidingParameter:
 
 
 @dataclass(frozen=True, slots=True)
-class ReferenceFlights:
+class TriedSuggestions(DocumentConfig):
+    """Suggestions of a failed finding with which a trial passed."""
+
+    rule: str
+    place: Place
+    suggestions: tuple[Suggestion, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceFlights(DocumentConfig):
     """Results of reference flights for the judged flight; they are stored, not flown again to judge a log.
 
     airframe: None if it was not flown.
     deciding: None if no parameter decides, or none was looked for.
+    tried: suggestions that passed their trials; None if none was tried.
     """
 
     airframe: AirframeAnswer | None = None
     deciding: DecidingParameter | None = None
+    tried: tuple[TriedSuggestions, ...] | None = None

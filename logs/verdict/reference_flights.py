@@ -4,66 +4,32 @@ A log's verdict is computed again from its rows.  Reference flights are not in t
 """
 
 import json
-from dataclasses import asdict
-from typing import Annotated
+from dataclasses import asdict, dataclass
+from typing import Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
-from logs.verdict.places import AirframeAnswer, DecidingParameter, Place, PlaceKind, ReferenceFlights
+from logs.verdict.places import AirframeAnswer, DecidingParameter, ReferenceFlights, TriedSuggestions
 from logs.verdict.rule_words import RULE_WORDS
 from world.errors import LogError
+from world.json_schema import DocumentConfig
 from world.scenario_file import first_fault
 
 # The name that logs have stored since the attachment was called "beside".
-REFERENCE_SCHEMA = "planfly.beside/1"
-
-_Number = Annotated[float, Field(allow_inf_nan=False)]
+REFERENCE_SCHEMA: Final = "planfly.beside/1"
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+@dataclass(frozen=True, slots=True)
+class _ReferenceFile(DocumentConfig):
+    """Content of the attachment."""
+
+    airframe: AirframeAnswer | None
+    deciding: DecidingParameter | None
+    tried: tuple[TriedSuggestions, ...] | None = None
+    schema: Literal["planfly.beside/1"] = REFERENCE_SCHEMA
 
 
-class _Place(_Table):
-    kind: PlaceKind
-    index: int | None
-    item: int | None
-    name: str
-    to_item: int | None = None
-    number: int | None = None
-
-    def place(self) -> Place:
-        return Place(self.kind, self.index, self.item, self.name, self.to_item, self.number)
-
-
-class _Airframe(_Table):
-    flyable: bool
-    headline: str
-    failed: list[tuple[str, _Place]]
-
-    def answer(self) -> AirframeAnswer:
-        failed = tuple((rule, place.place()) for rule, place in self.failed)
-        return AirframeAnswer(self.flyable, self.headline, failed)
-
-
-class _Deciding(_Table):
-    name: str
-    current: _Number
-    passing: _Number
-    unit: str
-    rule: str
-    place: _Place
-    off: _Number | None
-
-    def parameter(self) -> DecidingParameter:
-        place = self.place.place()
-        return DecidingParameter(self.name, self.current, self.passing, self.unit, self.rule, place, self.off)
-
-
-class _ReferenceFlights(_Table):
-    file_schema: Annotated[str, Field(alias="schema", pattern=f"^{REFERENCE_SCHEMA}$")] = REFERENCE_SCHEMA
-    airframe: _Airframe | None
-    deciding: _Deciding | None
+_FILE = TypeAdapter(_ReferenceFile)
 
 
 def reference_flights_json(reference: ReferenceFlights) -> str:
@@ -80,18 +46,15 @@ def parse_reference_flights(text: str | bytes, source: str) -> ReferenceFlights:
     """Read the answers from a text.  Raises LogError, in one line, for an invalid text; source names it.
 
     >>> parse_reference_flights('{"schema": "planfly.beside/1", "airframe": null, "deciding": null}', "a.mcap")
-    ReferenceFlights(airframe=None, deciding=None)
+    ReferenceFlights(airframe=None, deciding=None, tried=None)
     """
     try:
-        file = _ReferenceFlights.model_validate_json(text)
+        file = _FILE.validate_json(text)
     except ValidationError as error:
         raise LogError(**first_fault(error).at(source)) from error
-    airframe, deciding = file.airframe, file.deciding
-    rules = [rule for rule, _ in airframe.failed] if airframe is not None else []
-    unknown = [rule for rule in (*rules, *([deciding.rule] if deciding else [])) if rule not in RULE_WORDS]
+    rules = [rule for rule, _ in file.airframe.failed] if file.airframe is not None else []
+    rules += [one.rule for one in (file.deciding, *(file.tried or ())) if one is not None]
+    unknown = [rule for rule in rules if rule not in RULE_WORDS]
     if unknown:
         raise LogError(f"{source}: {unknown[0]!r} is no rule", file=source, field="rule", value=unknown[0])
-    return ReferenceFlights(
-        None if airframe is None else airframe.answer(),
-        None if deciding is None else deciding.parameter(),
-    )
+    return ReferenceFlights(file.airframe, file.deciding, file.tried)

@@ -12,7 +12,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, LogEvent, read_log
-from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log, judge_log, loss_text
@@ -38,6 +38,7 @@ from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_te
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import file_target, refuse_existing
 from planfly.workflow.pipeline import PlanThenFly, autopilot_log, fly_and_judge
+from planfly.workflow.suggestion_trials import judge_mission
 from planner.plan import Plan
 from world.errors import ArgumentError, ScenarioError
 from world.extras import need_extra
@@ -303,7 +304,7 @@ def judge(
         flown = fly(what, **mission)
         return Judged(flown.setup, flown.verdict, track=flown.track if len(flown.track) else None)
     setup = open_flight(what, mission)
-    return Judged(setup, judge_geometry(setup))
+    return Judged(setup, judge_mission(setup))
 
 
 @takes_options

@@ -8,7 +8,6 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.foxglove_scene import layout_text
 from logs.recording.reader import FlightLog, LogEvent, read_log
-from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.verdict import Verdict
 from logs.views.report.compare import Comparison, compare_logs, write_comparison
 from planfly.api.flying import FlownMission
@@ -18,6 +17,7 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import COMPARE_FILES, LOG_FIGURES, clean_folder, refuse_existing
+from planfly.workflow.suggestion_trials import judge_mission
 from planner.plan import Plan
 from world.files import write_whole
 from world.html_table import html_table
@@ -170,7 +170,7 @@ def compare(
 def _shown(source: Source) -> _Shown:
     if isinstance(source, Plan):
         setup = open_flight(source, {})
-        return _Shown(setup, judge_geometry(setup))
+        return _Shown(setup, judge_mission(setup))
     if isinstance(source, FlownMission):
         return _Shown(source.setup, source.verdict, source.track, source.ended, source.events)
     log = source if isinstance(source, FlightLog) else read_log(source)

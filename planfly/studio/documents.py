@@ -20,9 +20,10 @@ from logs.views.exports.map_files import kml_text, map_zones, plan_line
 from planfly.api.imported import read_imported
 from planfly.flight_logs import MCAP_MAGIC, is_log
 from planfly.flight_options import LogOptions, MissionOptions, apply_options, named_scenario
-from planfly.studio.edit_context import EditContext, Judged
+from planfly.studio.edit_context import EditContext
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
 from planfly.workflow.imported_flights import ImportedFlight
+from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
 from planner.evaluation.certify import certify
 from planner.evaluation.paper_scores import paper_scores
@@ -198,7 +199,7 @@ class Saved:
     losses: tuple[str, ...] = ()
 
 
-def save_document(document: Document, desk: EditContext, judged: Judged, kind: str) -> Saved:
+def save_document(document: Document, desk: EditContext, judged: JudgedMission, kind: str) -> Saved:
     """Return the mission under edit in one of `KINDS`.  Raises PlanflyError if the format cannot hold it.
 
     An unchanged mission in its original format is saved as the original bytes.
@@ -269,7 +270,7 @@ def _saved_parameters(name: str, desk: EditContext) -> Saved:
     return Saved(name, desk.parameters.text(f"set in planfly studio for {desk.airframe.autopilot.title}").encode())
 
 
-def _saved_plan(name: str, desk: EditContext, judged: Judged) -> Saved:
+def _saved_plan(name: str, desk: EditContext, judged: JudgedMission) -> Saved:
     """Return the mission as a plan of its scenario, with the present certificate of its path."""
     plan = judged.setup.plan
     if plan is not None:
@@ -295,7 +296,7 @@ def _require_plain_waypoints(mission: Mission) -> None:
             raise MissionError(f"{mission.source}: {why}", file=mission.source, field=f"item {item.seq}")
 
 
-def certified_plan(desk: EditContext, judged: Judged) -> Plan:
+def certified_plan(desk: EditContext, judged: JudgedMission) -> Plan:
     """Make a plan of the waypoints of the route, scored and certified like plans of the planner.
 
     Raises MissionError for a mission that no plan can hold: without a scenario, or with more than plain waypoints.

@@ -10,20 +10,22 @@ from pathlib import Path
 
 import numpy as np
 
+from flight.mission import edits
 from flight.mission.items import LANDINGS, Mission
 from planfly.flight_options import MissionOptions
 from planfly.named_fences import read_named_fences
-from planfly.studio import edits
-from planfly.studio.apply_suggestion import apply_suggestion
 from planfly.studio.autosave import kept_beside, kept_text, read_kept
 from planfly.studio.documents import Document, Saved, open_document, planned_mission, save_document
-from planfly.studio.edit_context import EditContext, Judged
+from planfly.studio.edit_context import EditContext
 from planfly.studio.history import History
 from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, Raise, Settings
 from planfly.studio.pilot import INTERNAL
 from planfly.studio.settings import changed_parameters, changed_world, settings_json
 from planfly.studio.view_model import Json, sheet_json, window_json, world_json
+from planfly.workflow.apply_suggestion import apply_suggestion
+from planfly.workflow.mission_context import JudgedMission
+from planfly.workflow.suggestion_trials import SuggestionTrials
 from planner.plan import Plan
 from world.errors import MissionError, PlanflyError
 from world.files import write_whole
@@ -56,7 +58,7 @@ class Session:
     options: MissionOptions
     desk: EditContext
     history: History
-    judged: Judged
+    judged: JudgedMission
     rev: int = 1
     world_rev: int = 1
     plans: tuple[list[Plan], tuple[int, int] | None] = field(default_factory=lambda: ([], None))
@@ -268,7 +270,17 @@ class Session:
         if not message.finding < len(findings):
             raise MissionError(f"{self.document.name}: that finding is not there any more", field="finding")
         item = findings[message.finding]
-        mission = apply_suggestion(self.desk, self.judged, item, message.which)
+        if not message.which < len(item.suggestions):
+            raise MissionError(f"{self.document.name}: that suggestion is not there any more", field="suggestion")
+        passed = SuggestionTrials(self.desk, self.judged).try_suggestion(item, message.which)
+        if passed is None:
+            # A suggestion that moves no item has a reason of its own.
+            apply_suggestion(self.desk, self.judged, item, item.suggestions[message.which])
+            raise MissionError(
+                f"{self.document.name}: applied, this suggestion would leave its finding, or more findings than now",
+                field="suggestion",
+            )
+        mission = replace(passed.setup.mission, autopilot=self.mission.autopilot)
         return mission, f"apply a suggestion of {item.rule}"
 
     def _with_part_replaced(self, plan: Plan, first: int, last: int) -> Mission:

@@ -8,15 +8,10 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.violated_legs import violated_legs
 from logs.verdict.rule_words import RULE_WORDS
-from logs.verdict.tolerances import ROUNDING_M
-from world.arrays import Floats
-from world.threats import Threats
 
 # For a rule whose margin has no scale, such as turns, near is the last tenth before the limit.
 _NEAR_FRACTION = 0.1
@@ -120,37 +115,3 @@ def _closeness(item: Finding) -> float:
 def _value_text(item: Finding) -> str:
     value, limit = item.compared_texts()
     return f"{_word(item)} {value}" + (f" ({limit})" if limit else "")
-
-
-# ----------------------------------------------------------------------
-# Legs that violate a threat, a zone or the area: the findings themselves name only the violated object.
-
-
-def violated_legs(requirements: RouteRequirements, item: Finding) -> tuple[int, ...]:
-    """Return the legs of the planned path on which a failed finding of a threat, zone or area applies."""
-    path, place = requirements.path, item.place
-    scenario = requirements.setup.scenario
-    if place.kind in ("missile", "radar") and place.index is not None:
-        near = sphere_segments(path.points, scenario.threats, place.index, missile=place.kind == "missile")
-        return tuple(np.unique(path.legs[near]).tolist())
-    facts = {fact.what: fact.value for fact in item.facts}
-    if "entry leg" in facts and "exit leg" in facts:
-        return tuple(range(int(facts["entry leg"]), int(facts["exit leg"]) + 1))
-    if item.rule == "bounds":
-        (west, east), (south, north) = scenario.bounds.tolist()
-        low, high = np.array([west, south, scenario.floor]), np.array([east, north, scenario.ceiling])
-        beyond = np.asarray(((path.points < low - ROUNDING_M) | (path.points > high + ROUNDING_M)).any(axis=1))
-        return tuple(np.unique(path.legs[beyond[:-1] | beyond[1:]]).tolist())
-    return ()
-
-
-def sphere_segments(points: Floats, threats: Threats, number: int, *, missile: bool) -> NDArray[np.bool_]:
-    """Return whether each segment of a path enters the sphere of a threat, (n - 1,).  points: (n, 3) m."""
-    radius = float((threats.kill_radius if missile else threats.detection_radius)[number])
-    start, step = points[:-1] - threats.position[number], np.diff(points, axis=0)
-    length2 = (step**2).sum(axis=1)
-    share = np.clip(
-        np.divide(-(start * step).sum(axis=1), length2, out=np.zeros_like(length2), where=length2 > 0), 0, 1
-    )
-    nearest = start + share[:, None] * step
-    return np.asarray((nearest**2).sum(axis=1) <= radius**2)

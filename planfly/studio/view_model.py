@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.mission.edits import places
 from flight.mission.items import AMSL, OVER_HOME, Mission, command_name
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
@@ -19,11 +20,11 @@ from logs.views.failures import route_distance, route_samples
 from logs.views.map import map_extent
 from logs.views.profile import ground_under
 from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_cuts, zone_label
-from planfly.studio.apply_suggestion import can_apply
-from planfly.studio.edit_context import EditContext, Judged
-from planfly.studio.edits import places
+from planfly.studio.edit_context import EditContext
 from planfly.studio.incremental_verdict import Window
 from planfly.studio.states import PlaceStates, State, place_states
+from planfly.workflow.apply_suggestion import can_apply
+from planfly.workflow.mission_context import JudgedMission
 from world.airspace.zones_on_map import zone_rings
 from world.arrays import Floats
 from world.scenario import Scenario
@@ -117,7 +118,7 @@ def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> lis
 # The mission.
 
 
-def sheet_json(desk: EditContext, judged: Judged) -> Json:
+def sheet_json(desk: EditContext, judged: JudgedMission) -> Json:
     """Describe a mission with its whole geometric verdict: items, route, path, states, findings, profile."""
     verdict, setup = judged.verdict, judged.setup
     states = place_states(judged.requirements, verdict.findings)

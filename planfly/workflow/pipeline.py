@@ -21,8 +21,10 @@ from planfly.rtl.return_summary import ReturnSummary, return_summary
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
 from planfly.workflow.crash_safe_log import CrashSafeLog, FlightLimits
 from planfly.workflow.make_plan import Advance, make_plan, planned_for
+from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planfly.workflow.reference_flights import FlyReference, judge_with_reference_flights
+from planfly.workflow.suggestion_trials import with_tried_suggestions
 from planfly.workflow.trial_flight import reason_not_to_start
 from planner.plan import Plan
 from world.errors import FlightError, StartError
@@ -146,7 +148,7 @@ def fly_and_judge(
     requirements = route_requirements(setup)
     reason = reason_not_to_start(requirements)
     if reason:
-        return _unflown(requirements, log, reason)
+        return _unflown(requirements, log, reason, reference)
     try:
         if autopilot is not None:
             return _fly_program(task, setup, program_autopilot(autopilot).flying(setup.autopilot, autopilot))
@@ -154,7 +156,7 @@ def fly_and_judge(
         flight = Flight(setup, airframe.aircraft, how.variation, start_offset=how.start_offset)
         return _record_and_judge(task, requirements, flight)
     except StartError as error:
-        return _unflown(requirements, log, f"not started: {error.reason}")
+        return _unflown(requirements, log, f"not started: {error.reason}", reference)
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,12 +228,14 @@ def _fly(task: _Task, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[
     return track_of(blocks), ended
 
 
-def _unflown(requirements: RouteRequirements, log: Path | None, ended: str) -> JudgedFlight:
+def _unflown(requirements: RouteRequirements, log: Path | None, ended: str, reference: FlyReference) -> JudgedFlight:
     """Judge a flight without a row; the log of an earlier flight is removed."""
     if log is not None:
         log.unlink(missing_ok=True)
     setup, track = requirements.setup, join_tracks([])
     verdict = judge_flight(setup, track, ended, requirements=requirements)
+    if reference != "never":
+        verdict = with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))
     return JudgedFlight(setup, requirements, track, ended, verdict, ())
 
 

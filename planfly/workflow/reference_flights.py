@@ -1,8 +1,8 @@
 """Explain the flight of an autopilot by reference flights: planfly's guidance, and other parameters."""
 
-import contextlib
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
 
@@ -18,6 +18,8 @@ from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, Refer
 from logs.verdict.summary import first_failed
 from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
+from planfly.workflow.mission_context import JudgedMission, MissionContext
+from planfly.workflow.suggestion_trials import SuggestionTrials, tried_suggestions
 from planfly.workflow.trial_flight import Hurry, Trial, TrialAborted, no_hurry
 
 # ----------------------------------------------------------------------
@@ -177,24 +179,28 @@ def judge_with_reference_flights(
     fly: FlyReference = "failed",
     hurry: Hurry = no_hurry,
 ) -> tuple[Verdict, ReferenceFlights | None]:
-    """Judge a flight, with reference flights that explain the verdict but do not decide it.
+    """Judge a flight, with reference flights that explain the verdict but do not decide it, and tried suggestions.
 
     requirements: the route requirements of the setup that was flown.  track, ended: the flight and its end.
     fly: cases in which reference flights are flown: "failed" if a finding of the flight fails, "always" also if all
-    pass.  A flight of planfly's own guidance has no reference flight.
+    pass.  A flight of planfly's own guidance has no reference flight, but its suggestions are tried.
     hurry: called throughout the reference flights; once it returns True they are aborted, and the verdict holds their
     results up to then.
     """
     setup = requirements.setup
     verdict = judge_flight(setup, track, ended, requirements=requirements)
-    if setup.autopilot.level == "airframe" or fly == "never" or (fly == "failed" and not verdict.failed):
+    if fly == "never" or (fly == "failed" and not verdict.failed):
         return verdict, None
-    try:
-        airframe = airframe_answer(setup, aircraft, hurry)
-    except TrialAborted:
-        return verdict, None
-    reference = ReferenceFlights(airframe)
-    if airframe.flyable:
-        with contextlib.suppress(TrialAborted):
+    reference = ReferenceFlights(tried=() if verdict.failed else None)
+    with suppress(TrialAborted):
+        if setup.autopilot.level != "airframe":
+            reference = replace(reference, airframe=airframe_answer(setup, aircraft, hurry))
+        if reference.airframe is not None and reference.airframe.flyable:
             reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, hurry))
+        if verdict.failed:
+            judged = JudgedMission(setup.mission, setup, requirements, verdict)
+            passed = SuggestionTrials(MissionContext.around_setup(setup), judged, hurry).passing()
+            reference = replace(reference, tried=tried_suggestions(passed))
+    if reference == ReferenceFlights():
+        return verdict, None
     return judge_flight(setup, track, ended, reference=reference, requirements=requirements), reference

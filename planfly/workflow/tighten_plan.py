@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from logs.verdict.findings import Finding
-from logs.verdict.places import Change
-from logs.verdict.tolerances import ROUNDING_M
+from logs.verdict.tolerances import ROUNDING_M, SUGGESTION_LENGTH_MARGIN_M
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import threat_text
 from planner.evaluation.problem import CERTIFIED_ZONE_MARGIN
@@ -173,17 +172,14 @@ def _missiles(spec: Spec, failed: list[Finding]) -> list[Tightening]:
             # The plan itself enters the sphere: the planner found no path outside it, and a larger sphere leaves none
             # either.
             continue
-        for step in _distances(item):
-            threat = spec["threats"][item.place.index]
-            now = threat["kill_radius_m"]
-            threat["kill_radius_m"] = now + step.wanted + MISSILE_BUFFER
-            changes.append(Tightening("kill_radius_m", now, threat["kill_radius_m"], threat_text(item.place)))
+        depth = next((-fact.value for fact in item.facts if fact.what == "nearest"), None)
+        if depth is None:
+            continue
+        threat = spec["threats"][item.place.index]
+        now = threat["kill_radius_m"]
+        threat["kill_radius_m"] = now + round(depth + SUGGESTION_LENGTH_MARGIN_M) + MISSILE_BUFFER
+        changes.append(Tightening("kill_radius_m", now, threat["kill_radius_m"], threat_text(item.place)))
     return changes
-
-
-def _distances(item: Finding) -> list[Change]:
-    """Return the distances to a missile that a finding suggests."""
-    return [change for suggestion in item.suggestions for change in suggestion if change.what == "distance"]
 
 
 # Changes and results of each round.

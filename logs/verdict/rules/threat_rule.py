@@ -164,6 +164,7 @@ def _sphere_finding(place: Place, plan: _Visit, track: _Visit | None, radius: fl
         margin=-judged.inside,
         unit="s",
         method=_METHOD,
+        facts=[Fact("nearest", judged.closest - radius, "m")] if ok is False else (),
     )
 
 

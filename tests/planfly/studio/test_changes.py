@@ -2,7 +2,8 @@
 
 import re
 
-from planfly.studio import edits, messages
+from flight.mission import edits
+from planfly.studio import messages
 from planfly.studio.changes import Figures, changes, flight_figures
 from planfly.studio.session import Session
 from tests.planfly.studio.drafts import drawn_session

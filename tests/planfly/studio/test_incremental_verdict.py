@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from flight.mission import edits
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
 from logs.verdict.judge_geometry import place_findings
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from planfly.studio import edits
 from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.moved_route import moved_route
 from planfly.studio.session import Session

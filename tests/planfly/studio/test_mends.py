@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 import planfly
+from flight.mission import edits
 from flight.mission.items import Command, Frame, Mission, MissionItem
 from flight.mission_files.formats import mission_text
 from logs.recording.example_log import write_example_log
 from planfly.flight_options import MissionOptions
-from planfly.studio import documents, edits, messages
+from planfly.studio import documents, messages
 from planfly.studio.documents import open_document, open_dropped, straight_plan
 from planfly.studio.jobs import LONG, Jobs
 from planfly.studio.pilot import Answer, Work

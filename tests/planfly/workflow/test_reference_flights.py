@@ -19,7 +19,7 @@ from flight.live.telemetry import AUTO
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import read_log
 from logs.verdict.findings import Fact, Finding, make_finding
-from logs.verdict.places import Place
+from logs.verdict.places import Place, ReferenceFlights
 from logs.verdict.verdict import verdict_json
 from logs.verdict.wording import deciding_text
 from planfly.flight_logs import judge_log
@@ -241,7 +241,8 @@ def test_in_a_hurry_flights_beside_are_given_up_and_the_verdict_is_not(
     assert log.recorded_verdict is not None
     assert log.recorded_verdict["flyable"] is False
     assert judged.reference is not None
-    assert log.reference == (None if patience == 0 else replace(judged.reference, deciding=None))
+    airframe = None if patience == 0 else judged.reference.airframe
+    assert log.reference == ReferenceFlights(airframe, tried=())
 
 
 def test_its_log_repeats_the_verdict_byte_for_byte(flown: tuple[JudgedFlight, Path]) -> None:
@@ -273,7 +274,9 @@ def test_campaigns_fly_no_reference_flight_of_a_flight_that_fails(flown: tuple[J
     judged, _ = flown
     alone, none = judge_with_reference_flights(judged.requirements, AIRCRAFT, judged.track, judged.ended, fly="never")
     assert none is None
-    assert alone.findings == judged.verdict.findings
+    assert [(one.place, one.margin) for one in alone.failed] == [
+        (one.place, one.margin) for one in judged.verdict.failed
+    ]
 
 
 def test_planflys_guidance_has_no_flight_beside_it() -> None:

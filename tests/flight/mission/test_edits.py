@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
+from flight.mission import edits
 from flight.mission.items import Command, Frame, Mission, MissionItem
-from planfly.studio import edits
 from world.errors import MissionError
 
 

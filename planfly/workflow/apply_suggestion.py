@@ -6,46 +6,25 @@ that the finding requires.  Suggestions about the aircraft, such as a larger bat
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from flight.mission.edits import at_height, at_speed, moved, places
 from flight.mission.items import LANDINGS, Mission
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
+from logs.verdict.measures.violated_legs import violated_legs
 from logs.verdict.places import Change, Suggestion
-from planfly.studio.edit_context import EditContext, Judged
-from planfly.studio.edits import at_height, at_speed, moved, places
-from planfly.studio.states import violated_legs
+from logs.verdict.trials import first_that_passes
+from planfly.workflow.mission_context import JudgedMission, MissionContext
 from world.arrays import Floats
 from world.errors import MissionError
 from world.geometry import leg_courses, signed_turns
 
-_PATH_CHANGES = (
-    "length",
-    "rise",
-    "airspeed",
-    "turn",
-    "height",
-    "descent",
-    "inset",
-    "distance",
-    "north",
-    "east",
-    "south",
-    "west",
-)
+# Direction east and north of a change to a side.
 _SIDES = {"north": (0.0, 1.0), "east": (1.0, 0.0), "south": (0.0, -1.0), "west": (-1.0, 0.0)}
 # Steps in which a turn is made gentler, as fractions of the distance to the straight line.
 _TURN_STEPS = 40
-# Changes by a step, m, which are repeated while the finding fails.
-_STEPS = frozenset(("height", "descent", "inset", "distance", *_SIDES))
-# Greatest number of repetitions of a step.
-_MAX_REPETITIONS = 10
-# Factor on the suggested distance in a repetition.
-_REPETITION_FACTOR = 1.5
-# Added to the suggested distance in a repetition, m.
-_REPETITION_ADDITION_M = 2.0
 # Distance beyond a sphere's edge at which a step aims, m, as in the planner: the navigation error may be a third of it.
 _SPHERE_MARGIN_M = 15.0
 
@@ -59,60 +38,34 @@ def can_apply(suggestion: Suggestion) -> bool:
     >>> can_apply((Change("battery", FLIGHT, None, 1.2, "1"),))
     False
     """
-    return bool(suggestion) and all(change.what in _PATH_CHANGES for change in suggestion)
+    return bool(suggestion) and all(change.what in _CHANGES for change in suggestion)
 
 
-def apply_suggestion(desk: EditContext, judged: Judged, item: Finding, which: int) -> Mission:
-    """Apply a suggestion of a finding to the mission until the finding passes.
+def apply_suggestion(context: MissionContext, judged: JudgedMission, item: Finding, suggestion: Suggestion) -> Mission:
+    """Return the mission with all changes of a suggestion of a finding.
 
-    The suggested step is a minimum: if an item moves by it, the path moves by less.  The rest is done in further steps.
-    Raises MissionError if no item can be moved for it.
+    Raises MissionError if no item can be moved for it, or if it is no change of the mission's items.
     """
-    if not 0 <= which < len(item.suggestions) or not can_apply(item.suggestions[which]):
-        raise MissionError(f"{judged.mission.source}: this suggestion is no change of its items", field="suggestion")
-    suggestion = item.suggestions[which]
-    # Try to move a single waypoint first: each one that moves may fail elsewhere.
-    counts = (1, None) if any(change.what == "distance" for change in suggestion) else (None,)
-    made = [_apply_until_passed(desk, judged, item, suggestion, most) for most in counts]
-    return min(made, key=lambda one: len(one.verdict.failed)).mission
-
-
-def _apply_until_passed(
-    desk: EditContext, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None
-) -> Judged:
-    """Repeat a suggestion until its finding passes, and judge.  most: number of waypoints to move."""
-    kinds = [change.what for change in suggestion]
-    judged = desk.judge(_apply_once(desk, judged, item, suggestion, most))
-    for _ in range(_MAX_REPETITIONS if set(kinds) <= _STEPS else 0):
-        left = [one for one in judged.verdict.failed if (one.rule, one.place) == (item.rule, item.place)]
-        alike = [(one, more) for one in left for more in one.suggestions if [change.what for change in more] == kinds]
-        if not alike:
-            break
-        one, more = alike[0]
-        further = tuple(
-            replace(change, wanted=_REPETITION_FACTOR * change.wanted + _REPETITION_ADDITION_M) for change in more
-        )
-        judged = desk.judge(_apply_once(desk, judged, one, further, most))
-    return judged
-
-
-def _apply_once(desk: EditContext, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None) -> Mission:
-    """Make each change of a suggestion once.  Raises MissionError if no item moves."""
-    sheet = _MovableMission(desk, judged, most)
-    for change in suggestion:
-        _CHANGES[change.what](sheet, change, item)
-    if not sheet.changed:
-        raise MissionError(
-            f"{judged.mission.source}: no item of the mission lies there: move one by hand", field="suggestion"
-        )
-    return sheet.mission
+    source = judged.mission.source
+    if not can_apply(suggestion):
+        raise MissionError(f"{source}: this suggestion is no change of its items", field="suggestion")
+    made = []
+    # Away from a missile, try to move a single waypoint first: each one that moves may fail elsewhere.
+    for most in (1, None) if any(change.what == "distance" for change in suggestion) else (None,):
+        sheet = _MovableMission(context, judged, most)
+        for change in suggestion:
+            _CHANGES[change.what](sheet, change, item)
+        if not sheet.changed:
+            raise MissionError(f"{source}: no item of the mission lies there: move one by hand", field="suggestion")
+        made.append(sheet.mission)
+    return min(made, key=lambda mission: len(context.judge(mission).verdict.failed)) if len(made) > 1 else made[0]
 
 
 class _MovableMission:
     """Mission whose items are moved one after the other."""
 
-    def __init__(self, desk: EditContext, judged: Judged, most: int | None) -> None:
-        self.desk, self.mission, self.route = desk, judged.mission, judged.setup.route
+    def __init__(self, context: MissionContext, judged: JudgedMission, most: int | None) -> None:
+        self.context, self.mission, self.route = context, judged.mission, judged.setup.route
         self.requirements, self.most, self.changed = judged.requirements, most, False
 
     def index_of(self, waypoint: int) -> int | None:
@@ -130,12 +83,12 @@ class _MovableMission:
         for index in dict.fromkeys(self.index_of(one) for one in waypoints):
             if index is None or self.mission.items[index].command in LANDINGS:
                 continue
-            here = self.desk.points(self.mission)[places(self.mission).index(index)]
+            here = self.context.points(self.mission)[places(self.mission).index(index)]
             if by[0] or by[1]:
-                self.mission = moved(self.mission, index, *self.desk.geographic(*(here[:2] + by[:2]).tolist()))
+                self.mission = moved(self.mission, index, *self.context.geographic(*(here[:2] + by[:2]).tolist()))
             if by[2] and math.isfinite(here[2]):
                 self.mission = at_height(self.mission, index, float(here[2] + by[2]), float(here[2]))
-            self.mission, self.changed = self.desk.retuned(self.mission, index), True
+            self.mission, self.changed = self.context.retuned(self.mission, index), True
 
     def ends_of(self, legs: Sequence[int]) -> list[int]:
         """Return the waypoints at the ends of legs; the ends of the route only if there are no others."""
@@ -194,12 +147,14 @@ def _make_turn_gentler(sheet: _MovableMission, change: Change, _item: Finding) -
     way = after[:2] - before[:2]
     share = float(np.clip((here[:2] - before[:2]) @ way / max(float(way @ way), 1.0), 0.1, 0.9))
     foot = before[:2] + share * way
-    for step in range(1, _TURN_STEPS + 1):
-        bent = here[:2] + step / _TURN_STEPS * (foot - here[:2])
-        corner = np.array([before, [*bent, here[2]], after])
-        if math.degrees(abs(float(signed_turns(corner)[0]))) <= change.wanted - 0.1:
-            sheet.shift([i], np.array([*(bent - here[:2]), 0.0]))
-            return
+
+    def is_gentle(step: int) -> bool:
+        corner = np.array([before, [*(here[:2] + step / _TURN_STEPS * (foot - here[:2])), here[2]], after])
+        return math.degrees(abs(float(signed_turns(corner)[0]))) <= change.wanted - 0.1
+
+    step = first_that_passes(range(1, _TURN_STEPS + 1), is_gentle)
+    if step is not None:
+        sheet.shift([i], np.array([*(step / _TURN_STEPS * (foot - here[:2])), 0.0]))
 
 
 def _change_altitude(sheet: _MovableMission, change: Change, item: Finding) -> None:
@@ -214,7 +169,7 @@ def _change_altitude(sheet: _MovableMission, change: Change, item: Finding) -> N
 
 def _move_inside_area(sheet: _MovableMission, change: Change, _item: Finding) -> None:
     """Move waypoints inside that are too near to the edges, floor or ceiling of the area."""
-    scenario, points = sheet.desk.scenario, sheet.points()
+    scenario, points = sheet.context.scenario, sheet.points()
     (west, east), (south, north) = scenario.bounds.tolist()
     low = np.array([west, south, scenario.floor]) + change.wanted
     high = np.array([east, north, scenario.ceiling]) - change.wanted
@@ -226,7 +181,7 @@ def _move_inside_area(sheet: _MovableMission, change: Change, _item: Finding) ->
 
 def _move_away_from_missile(sheet: _MovableMission, change: Change, item: Finding) -> None:
     """Move the waypoints near the sphere of a missile away from it."""
-    centre = sheet.desk.scenario.threats.position[change.place.index or 0]
+    centre = sheet.context.scenario.threats.position[change.place.index or 0]
     legs, points = violated_legs(sheet.requirements, item), sheet.points()
     away = points[:, :2] - centre[:2]
     length = np.hypot(away[:, 0], away[:, 1])

@@ -1,0 +1,153 @@
+"""Context of a mission whose items change: their places, the setup of its flight, and its geometric verdict.
+
+Scenario and aircraft are loaded once.  An unchanged mission is judged as it was opened, a plan with its certificate;
+a changed mission is judged like a mission file.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flight.mission.edits import places
+from flight.mission.from_plan import acceptance_radii
+from flight.mission.items import AMSL, LANDINGS, OVER_HOME, Command, Mission, MissionItem
+from flight.mission.placing import PlacedMission, place_stops
+from flight.simulation.setup import FlightSetup
+from logs.verdict.judge_geometry import judge_geometry
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.verdict import Verdict
+from planfly.workflow.airframe import Airframe, airframe_of
+from planfly.workflow.open_flight import make_setup
+from world.arrays import Floats
+from world.frames import to_geo, to_map
+from world.scenario import Scenario
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedMission:
+    """Mission with its setup, its route requirements and its geometric verdict."""
+
+    mission: Mission
+    setup: FlightSetup
+    requirements: RouteRequirements
+    verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class MissionContext:
+    """Everything that a changed mission is judged with.
+
+    scenario: its world.  airframe: the aircraft loaded for it.  seed: seed of its flight.
+    opened: the setup as it was opened, with its plan if there is one.
+    planned: true if the acceptance radii were set by planfly, and follow the turns.
+    """
+
+    scenario: Scenario
+    airframe: Airframe
+    seed: int
+    opened: FlightSetup
+    planned: bool = False
+
+    @classmethod
+    def around_setup(cls, setup: FlightSetup) -> "MissionContext":
+        """Return the context of the mission of a setup; it is flown by the law of its autopilot.
+
+        Raises FlightError if the aircraft is missing.
+        """
+        airframe = airframe_of(setup)
+        airframe = replace(airframe, autopilot=setup.autopilot.law)
+        return cls(setup.scenario, airframe, setup.seed, setup, planned=setup.plan is not None)
+
+    # ------------------------------------------------------------------
+    # Places.
+
+    def placed(self, mission: Mission) -> PlacedMission:
+        """Return the stops of a mission on the map, with jumps unrolled."""
+        return place_stops(mission, self.scenario.origin, self.scenario.terrain, vertical_legs=True)
+
+    def points(self, mission: Mission, placed: PlacedMission | None = None) -> Floats:
+        """Return east, north and altitude AMSL of each place of `flight.mission.edits.places`, (n, 3) m.
+
+        The altitude of a landing is the altitude of its touchdown.  An item that no flight reaches has the altitude
+        that it states, NaN if not known.
+        """
+        placed = self.placed(mission) if placed is None else placed
+        heights = {stop.stop.item: float(stop.position[2]) for stop in reversed(placed.stops)}
+        items = [mission.items[k] for k in places(mission)]
+        east, north = to_map(self.scenario.origin, [one.lat_deg for one in items], [one.lon_deg for one in items])
+        up = [
+            self._stated_altitude(mission, one, x, y)
+            if one.command in LANDINGS or one.seq not in heights
+            else heights[one.seq]
+            for one, x, y in zip(items, np.asarray(east).tolist(), np.asarray(north).tolist(), strict=True)
+        ]
+        return np.stack([east, north, up], axis=1)
+
+    def _stated_altitude(self, mission: Mission, item: MissionItem, east: float, north: float) -> float:
+        """Return the altitude AMSL that an item states, m; NaN if it states none, or over unknown ground."""
+        if item.frame in AMSL:
+            return item.alt
+        terrain, home = self.scenario.terrain, mission.home
+        if item.frame in OVER_HOME and home is not None and math.isfinite(home.alt):
+            return home.alt + item.alt
+        if item.frame in OVER_HOME:
+            if home is None:
+                return math.nan
+            x, y = to_map(self.scenario.origin, home.lat_deg, home.lon_deg)
+            east, north = float(x), float(y)
+        return math.nan if terrain is None else float(terrain.height(east, north)) + item.alt
+
+    def flown(self, mission: Mission) -> frozenset[int]:
+        """Return the numbers of the items that a flight reaches."""
+        return frozenset(stop.stop.item for stop in self.placed(mission).stops)
+
+    def geographic(self, east: float, north: float) -> tuple[float, float]:
+        """Return latitude and longitude of a place on the map, degrees."""
+        lat, lon = to_geo(self.scenario.origin, east, north)
+        return float(lat), float(lon)
+
+    def retuned(self, mission: Mission, index: int) -> Mission:
+        """Adapt the acceptance radii of a planned mission to its turns near an item."""
+        if not self.planned:
+            return mission
+        own = places(mission)
+        at = int(np.searchsorted(own, index))
+        chain = own[max(0, at - 2) : at + 3]
+        points = self._planned_points(mission, chain)
+        frame = self.airframe
+        radii = acceptance_radii(self.scenario, points, frame.airspeed, frame.max_bank, frame.limits.tracking)
+        items = list(mission.items)
+        for k, radius in zip(chain, radii.tolist(), strict=True):
+            # The turn at an end of the chain is not known, unless it is an end of the mission, which has no turn.
+            inner = k not in (chain[0], chain[-1]) or k in (own[0], own[-1])
+            if inner and items[k].command == Command.NAV_WAYPOINT:
+                params = items[k].params
+                items[k] = replace(items[k], params=(params[0], radius, *params[2:]))
+        return replace(mission, items=tuple(items))
+
+    def _planned_points(self, mission: Mission, chosen: tuple[int, ...]) -> Floats:
+        """Return the places of a planned mission, AMSL; a landing has the altitude of the item before it."""
+        items = [mission.items[k] for k in chosen]
+        east, north = to_map(self.scenario.origin, [one.lat_deg for one in items], [one.lon_deg for one in items])
+        up = [one.alt for one in items]
+        for k, item in enumerate(items):
+            if item.command in LANDINGS and k:
+                up[k] = up[k - 1]
+        return np.stack([east, north, up], axis=1)
+
+    # ------------------------------------------------------------------
+    # Verdicts.
+
+    def setup(self, mission: Mission) -> FlightSetup:
+        """Make the flight setup of a mission.  Raises MissionError for one that cannot be laid out."""
+        # The mission of the setup names its autopilot; its items are the opened ones.
+        if mission.items is self.opened.mission.items and self.scenario is self.opened.scenario:
+            return self.opened
+        return make_setup(self.scenario, self.airframe, mission, self.seed, placed=self.placed(mission))
+
+    def judge(self, mission: Mission) -> JudgedMission:
+        """Judge the whole geometry of a mission."""
+        setup = self.setup(mission)
+        requirements = route_requirements(setup)
+        return JudgedMission(mission, setup, requirements, judge_geometry(setup, requirements))

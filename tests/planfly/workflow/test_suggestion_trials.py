@@ -1,0 +1,133 @@
+"""A suggestion is offered if its trial mends its finding and leaves no more findings than before."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+
+from flight.mission.edits import places, raised
+from flight.simulation.setup import FlightSetup
+from logs.verdict.findings import Finding, make_finding
+from logs.verdict.places import Change, Place, Suggestion
+from logs.verdict.verdict import Verdict
+from planfly.workflow import suggestion_trials
+from planfly.workflow.mission_context import MissionContext
+from planfly.workflow.suggestion_trials import (
+    MAX_TRIAL_FLIGHTS,
+    MAX_TRIED_FINDINGS,
+    SuggestionTrials,
+    leaves_no_more,
+    tried_suggestions,
+    with_tried_suggestions,
+)
+from tests.planfly.studio.drafts import drawn_session
+
+SESSION = drawn_session(5, 12)
+CONTEXT = MissionContext.around_setup(SESSION.judged.setup)
+
+
+def higher(leg: int, metres: float) -> Suggestion:
+    return (Change("height", Place("leg", leg), None, metres, "m"),)
+
+
+def low(leg: int, *suggestions: Suggestion, item: int | None = None) -> Finding:
+    place = Place("leg", leg, item)
+    return replace(make_finding("clearance", place, ok=False, reason="", margin=-leg), suggestions=suggestions)
+
+
+def verdict_of(*findings: Finding, level: str = "flown") -> Verdict:
+    return Verdict(findings, flyable=not findings, complete=True, lines=("",), level=level)
+
+
+def test_a_finding_that_is_gone_is_worth_no_other() -> None:
+    before = verdict_of(low(1), low(2))
+    assert leaves_no_more(before, verdict_of(low(2), low(3)), low(1))
+    assert not leaves_no_more(before, verdict_of(low(1)), low(1))
+    assert not leaves_no_more(before, verdict_of(low(2), low(3), low(4)), low(1))
+    # An item that was inserted shifts the numbers of those behind it.
+    assert not leaves_no_more(before, verdict_of(low(1, item=7)), low(1, item=6))
+
+
+@dataclass
+class Flights:
+    """Trials whose flight fails by a test's own rule; their geometry passes."""
+
+    fails: Callable[[float], list[Finding]]
+    count: int = 0
+
+    def __call__(self, setup: FlightSetup, *_: Any) -> Any:
+        flights = self
+        up = setup.route.waypoints[1, 2] - SESSION.judged.setup.route.waypoints[1, 2]
+
+        class Fake:
+            def __init__(self) -> None:
+                self.setup, self.requirements, self.geometric = setup, SESSION.judged.requirements, verdict_of()
+
+            def __getattr__(self, name: str) -> Verdict:
+                assert name == "flown"
+                flights.count += 1
+                self.flown = verdict_of(*flights.fails(round(float(up), 3)))
+                return self.flown
+
+        return Fake()
+
+
+def trials_of(
+    monkeypatch: pytest.MonkeyPatch, findings: list[Finding], fails: Callable[[float], list[Finding]]
+) -> tuple[SuggestionTrials, Flights]:
+    flights = Flights(fails)
+    monkeypatch.setattr(suggestion_trials, "Trial", flights)
+    judged = replace(SESSION.judged, verdict=verdict_of(*findings))
+    return SuggestionTrials(CONTEXT, judged), flights
+
+
+def test_a_step_that_is_too_small_in_flight_is_enlarged_by_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """12 m and once and a half of the 6 m that still lack, and 2 m."""
+    item = low(1, higher(1, 12.0))
+    trials, flights = trials_of(monkeypatch, [item], lambda up: [] if up > 20.0 else [low(1, higher(1, 6.0))])
+    [tried] = tried_suggestions(trials.passing())
+    assert tried.suggestions == (higher(1, 23.0),)
+    assert flights.count == 2
+
+
+def test_another_leg_that_then_fails_is_raised_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    item, other = low(1, higher(1, 12.0)), low(4, higher(4, 10.0))
+    state = iter([[other, low(5)], []])
+    trials, _ = trials_of(monkeypatch, [item], lambda up: next(state))
+    [tried] = tried_suggestions(trials.passing())
+    assert tried.suggestions == ((*higher(1, 12.0), *higher(4, 17.0)),)
+
+
+def test_what_helps_nothing_or_harms_elsewhere_is_not_offered(monkeypatch: pytest.MonkeyPatch) -> None:
+    item = low(1, higher(1, 12.0))
+    trials, _ = trials_of(monkeypatch, [item], lambda up: [low(1)])
+    assert trials.passing() == []
+    trials, _ = trials_of(monkeypatch, [item], lambda up: [low(2), low(3)])
+    assert trials.passing() == []
+
+
+def test_flights_are_few_and_shared(monkeypatch: pytest.MonkeyPatch) -> None:
+    items = [low(leg, higher(leg, 12.0), higher(leg, 14.0)) for leg in range(1, 9)]
+    trials, flights = trials_of(monkeypatch, items, lambda up: items)
+    assert trials.passing() == []
+    assert flights.count == MAX_TRIAL_FLIGHTS
+    # The same mission is flown once, and the first of each finding before the second of any.
+    same = [low(leg, higher(1, 12.0), higher(1, 14.0)) for leg in range(1, 9)]
+    trials, flights = trials_of(monkeypatch, same, lambda up: [])
+    assert len(trials.passing()) == 2 * MAX_TRIED_FINDINGS
+    assert flights.count == 2
+
+
+def test_by_geometry_every_suggestion_that_is_offered_mends() -> None:
+    """And one that leads beyond the ceiling is not offered."""
+    desk = SESSION.desk
+    judged = desk.judge(raised(SESSION.mission, places(SESSION.mission), -90.0))
+    [first, *_] = [item for item in judged.verdict.failed if item.rule == "clearance"]
+    wrong = replace(first, suggestions=(higher(first.place.index or 0, 9000.0), *first.suggestions))
+    findings = tuple(wrong if item is first else item for item in judged.verdict.findings)
+    offered = with_tried_suggestions(replace(judged, verdict=replace(judged.verdict, findings=findings)))
+    after = {(item.rule, item.place): item.suggestions for item in offered.failed}
+    assert after[first.rule, first.place] == first.suggestions[:1]
+    for one in SuggestionTrials(desk, judged).passing():
+        assert leaves_no_more(judged.verdict, desk.judge(one.setup.mission).verdict, one.item)
