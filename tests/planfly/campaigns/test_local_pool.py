@@ -19,7 +19,7 @@ from planfly.campaigns.flight_row import FlightRow, lost_row
 from planfly.campaigns.local_pool import MAX_FAILED_STARTS, LocalPool
 from planfly.campaigns.tables import same_flight
 from tests.planfly.campaigns.kills import spawned_processes, start_client
-from tests.planfly.campaigns.made_campaigns import made_flight, slow_flight
+from tests.planfly.campaigns.made_campaigns import made_flight
 from tests.soak import some
 from world.errors import MissionError
 
@@ -50,16 +50,23 @@ def fly_with_a_look_at_sockets(base: CampaignBase, index: int, wind: GivenWind |
     return made_flight(base, index, wind)
 
 
-def test_each_flight_comes_back_once_as_one_process_flies_it_and_nothing_listens(base: CampaignBase) -> None:
-    listening = listeners()
+@pytest.fixture(scope="module")
+def two(base: CampaignBase) -> Iterator[LocalPool]:
+    """A pool of two processes that several tests ask one after the other: each process takes seconds to start."""
     with pool(2, base, fly_with_a_look_at_sockets) as made:
-        flown = []
-        for one in made.fly(requests(12)):
-            flown.append(one)
-            assert listeners() == listening
-        # It can be asked again, and its processes are the same.
-        workers = {one.row.worker for one in flown}
-        assert {one.row.worker for one in made.fly(requests(4))} <= workers
+        yield made
+
+
+def test_each_flight_comes_back_once_as_one_process_flies_it_and_nothing_listens(
+    two: LocalPool, base: CampaignBase
+) -> None:
+    listening, flown = listeners(), []
+    for one in two.fly(requests(12)):
+        flown.append(one)
+        assert listeners() == listening
+    # It can be asked again, and its processes are the same.
+    workers = {one.row.worker for one in flown}
+    assert {one.row.worker for one in two.fly(requests(4))} <= workers
     assert sorted(one.request.index for one in flown) == list(range(12))
     assert all(same_flight(row, made_flight(base, request.index)) for request, row in flown)
     assert len(workers) == 2
@@ -78,8 +85,26 @@ def listeners() -> list[object]:
     return found
 
 
+def test_flights_are_asked_for_when_a_process_is_free_and_no_sooner(two: LocalPool) -> None:
+    asked = itertools.count()
+    seen = []
+    for number, _ in zip(range(6), two.fly(lambda: FlightRequest(next(asked))), strict=False):
+        seen.append(number)
+    # Two fly, and each that is done is followed by one.
+    assert next(asked) <= len(seen) + 2
+
+
+def test_a_process_that_was_killed_between_two_flights_is_replaced(two: LocalPool) -> None:
+    assert len(list(two.fly(requests(2)))) == 2
+    killed = spawned_processes()[0]
+    os.kill(killed, signal.SIGKILL)
+    psutil.wait_procs([psutil.Process(killed)] if psutil.pid_exists(killed) else [], 5.0)
+    assert sorted(one.request.index for one in two.fly(requests(4))) == [0, 1, 2, 3]
+    assert len(spawned_processes()) == 2
+
+
 # How often a flight kills its process.
-KILLS = {3: 2, 4: 9}
+KILLS = {3: 1, 4: 9}
 
 
 def fly_killed(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
@@ -96,21 +121,12 @@ def test_a_flight_that_kills_its_process_is_flown_twice_again_and_then_lost_and_
     base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PLANFLY_TEST_FLAGS", str(tmp_path))
-    with pool(2, base, fly_killed) as made:
+    with pool(1, base, fly_killed) as made:
         rows = {one.request.index: one.row for one in made.fly(requests(8))}
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["3-0", "3-1", "4-0", "4-1", "4-2"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["3-0", "4-0", "4-1", "4-2"]
     assert rows.pop(4) == lost_row(base, 4, LOST)
     assert sorted(rows) == [0, 1, 2, 3, 5, 6, 7]
     assert all(same_flight(row, made_flight(base, k)) for k, row in rows.items())
-
-
-def test_a_process_that_was_killed_between_two_flights_is_replaced(base: CampaignBase) -> None:
-    with pool(1, base, made_flight) as made:
-        assert len(list(made.fly(requests(1)))) == 1
-        (worker,) = spawned_processes()
-        os.kill(worker, signal.SIGKILL)
-        psutil.wait_procs([psutil.Process(worker)] if psutil.pid_exists(worker) else [], 5.0)
-        assert [one.request.index for one in made.fly(requests(2))] == [0, 1]
 
 
 def end_at_once(_copy: object) -> None:
@@ -186,13 +202,3 @@ def test_workers_end_with_the_process_that_leads_them(number: signal.Signals, tm
     client.wait(10.0)
     _, alive = psutil.wait_procs(children, 5.0)
     assert alive == []
-
-
-def test_flights_are_asked_for_when_a_process_is_free_and_no_sooner(base: CampaignBase) -> None:
-    asked = itertools.count()
-    with pool(2, base, slow_flight) as made:
-        seen = []
-        for number, _ in zip(range(6), made.fly(lambda: FlightRequest(next(asked))), strict=False):
-            seen.append(number)
-    # Two fly, and each that is done is followed by one.
-    assert next(asked) <= len(seen) + 2
