@@ -143,28 +143,40 @@ def _slope_text(slope: float) -> str:
     return _LEVEL_TEXT if shown == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {shown}"
 
 
-def _landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
-    """Note what is known of the ground at a landing for which the scenario states no strip."""
+def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[float, float] | None:
+    """Return the slopes of the ground along and across a landing for which the scenario states no strip, m per m.
+
+    NaN if the ground is not known; None without such a landing.
+    """
     last = int(route.items[-1])
     lands = any(item.seq == last and item.command == Command.NAV_LAND for item in mission.items)
     if scenario.landing is not None or not lands:
+        return None
+    if scenario.terrain is None:
+        return math.nan, math.nan
+    east, north = route.waypoints[-1, :2].tolist()
+    return strip_slopes(scenario.terrain, LandingStrip(east, north), float(leg_courses(route.waypoints)[-1]))
+
+
+def _landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
+    """Note what is known of the ground at a landing for which the scenario states no strip."""
+    last = int(route.items[-1])
+    slopes = landing_slopes(mission, route, scenario)
+    if slopes is None:
         return
-    course, (east, north) = float(leg_courses(route.waypoints)[-1]), route.waypoints[-1, :2].tolist()
+    course = float(leg_courses(route.waypoints)[-1])
     wind = ""
     if not math.isnan(route.landing_ground):
         tail = scenario.wind.along(course, route.landing_ground)[0]
         wind = f", with {tail:.1f} m/s of wind from behind" if tail > CALM else wind
         wind = f", against {-tail:.1f} m/s of wind" if tail < -CALM else wind
     ground = "the ground there is not known"
-    strip = LandingStrip(east, north)
-    slopes = (math.nan, math.nan)
-    if scenario.terrain is not None:
-        slopes = strip_slopes(scenario.terrain, strip, course)
+    length = LandingStrip(0.0, 0.0).length
     if not any(math.isnan(one) for one in slopes):
         along, across = (_slope_text(one) for one in slopes)
-        ground = f"over {strip.length:.0f} m about its point the ground {along} along it, and {across} to the right"
+        ground = f"over {length:.0f} m about its point the ground {along} along it, and {across} to the right"
         if along == across == _LEVEL_TEXT:
-            ground = f"over {strip.length:.0f} m about its point the ground {_LEVEL_TEXT}"
+            ground = f"over {length:.0f} m about its point the ground {_LEVEL_TEXT}"
         if max(abs(one) for one in slopes) > STEEPEST_STRIP:
             ground += f" ({STEEPEST_STRIP:.0%} is the most that a plan lands on)"
     unknown = "no [landing] states its strip: touch-down and way to rest are not judged"

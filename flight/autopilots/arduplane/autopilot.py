@@ -51,6 +51,18 @@ _LEG_FIELDS = (
 )
 
 
+# Neutral values of parameters that change the flight of a mission and are not simulated: an altitude offset,
+# soaring, lift motors, turns by rudder alone, a minimum ground speed, and flight without an airspeed sensor.
+_NEUTRAL = {
+    "ALT_OFFSET": 0.0,
+    "SOAR_ENABLE": 0.0,
+    "Q_ENABLE": 0.0,
+    "RUDDER_ONLY": 0.0,
+    "MIN_GROUNDSPEED": 0.0,
+    "ARSPD_USE": 1.0,
+}
+
+
 @dataclass(frozen=True)
 class ArduPlane(Autopilot):
     """ArduPlane's control law: L1 along the legs, TECS for altitude and airspeed.
@@ -144,11 +156,19 @@ class ArduPlane(Autopilot):
         return self.parameters.wp_radius
 
     def settings_not_flown(self, *, returns: bool) -> list[str]:
-        """Return ALT_OFFSET, SOAR_ENABLE, Q_ENABLE, RUDDER_ONLY, an own fence, and RTL over terrain."""
+        """Return settings of `_NEUTRAL` that are not neutral, zero rate gains, an own fence, and RTL over terrain."""
         made = self.parameters
-        switched = {"ALT_OFFSET": made.altitude_offset, "SOAR_ENABLE": made.soaring, "Q_ENABLE": made.quadplane}
-        switched["RUDDER_ONLY"] = made.rudder_only
-        left = [f"{name} {value:g} changes the flight and is not flown" for name, value in switched.items() if value]
+        found = {name: value for name, value, _ in made.values}
+        left = [
+            f"{name} {found[name]:g} changes the flight and is not flown"
+            for name, neutral in _NEUTRAL.items()
+            if found[name] != neutral
+        ]
+        left += [
+            f"{axis}_P 0 and {axis}_FF 0 leave the attitude uncontrolled, which is not flown"
+            for axis in ("RLL_RATE", "PTCH_RATE")
+            if found[f"{axis}_P"] == found[f"{axis}_FF"] == 0.0
+        ]
         if made.has_fence_of_its_own:
             left.append(f"the circle and the altitudes of FENCE_TYPE {made.fence_type:g} are not judged")
         if returns and made.follows_terrain_home:

@@ -117,6 +117,12 @@ DEFINITIONS = {
     "soaring": Definition("SOAR_ENABLE", 0.0, 0.0, 1.0),
     "quadplane": Definition("Q_ENABLE", 0.0, 0.0, 2.0),
     "rudder_only": Definition("RUDDER_ONLY", 0.0, 0.0, 1.0),
+    "ground_speed_min": Definition("MIN_GROUNDSPEED", 0.0, 0.0, 500.0, 1.0, ("MIN_GNDSPD_CM", _PER_CENTI)),
+    "airspeed_use": Definition("ARSPD_USE", 1.0, 0.0, 2.0),
+    "roll_rate_p": Definition("RLL_RATE_P", 0.08, 0.0, 100.0),
+    "roll_rate_ff": Definition("RLL_RATE_FF", 0.345, 0.0, 100.0),
+    "pitch_rate_p": Definition("PTCH_RATE_P", 0.04, 0.0, 100.0),
+    "pitch_rate_ff": Definition("PTCH_RATE_FF", 0.345, 0.0, 100.0),
 }
 # Bit of FLIGHT_OPTIONS: an RTL climbs to its altitude before it turns.
 CLIMB_BEFORE_TURN = 1 << 4

@@ -22,6 +22,9 @@ from world.kernels import Record
 from world.scenario_tables import NEWEST_PX4, FlightTable, Navigation, Px4Version
 from world.wind import Turbulence
 
+# Neutral values of parameters that change the flight of a mission and are not simulated: throttle and pitch without an
+# airspeed sensor, the airspeed in wind, and the airspeeds of another weight.
+_NEUTRAL = {"FW_USE_AIRSPD": 1.0, "FW_WIND_ARSP_SC": 0.0, "WEIGHT_BASE": -1.0, "WEIGHT_GROSS": -1.0}
 # By RTL_TYPE: the part of it that is not flown.
 _RTL_TYPES_NOT_FLOWN = {
     2: "RTL_TYPE 2, along the mission to its landing or back: flown as 1, to the nearest rally point or home",
@@ -120,11 +123,16 @@ class Px4(Autopilot):
         return self.turn_distance(math.pi, 0.0)
 
     def settings_not_flown(self, *, returns: bool) -> list[str]:
-        """Return GF_MAX_HOR_DIST and GF_MAX_VER_DIST if GF_ACTION acts, and COM_FLT_TIME_MAX."""
+        """Return limits that end a mission, and the settings of `_NEUTRAL` that are not neutral."""
         made, names = self.parameters, ["COM_FLT_TIME_MAX"]
         if made["GF_ACTION"] > 0.0:
             names += ["GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]
-        return [f"{name} {made[name]:g} ends a mission and is not judged" for name in names if made[name] > 0.0]
+        ending = [f"{name} {made[name]:g} ends a mission and is not judged" for name in names if made[name] > 0.0]
+        return ending + [
+            f"{name} {made[name]:g} changes the flight and is not flown"
+            for name, neutral in _NEUTRAL.items()
+            if made[name] != neutral
+        ]
 
     @property
     def reads_acceptance(self) -> bool:

@@ -30,6 +30,7 @@ from flight.mission.items import (
     MissionItem,
     command_name,
 )
+from flight.mission.preflight_notes import landing_slopes
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import NOT_FLOWN, Finding, Message, make_finding, message
 from logs.verdict.measures.mission_ends import missing_ends_text
@@ -44,6 +45,7 @@ from logs.verdict.tolerances import (
     PX4_TAKEOFF_BUFFER_M,
     PX4_WAYPOINT_SPACING_M,
 )
+from world.airfield import STEEPEST_STRIP
 from world.frames import GeoOrigin, to_map
 
 C = Command
@@ -167,6 +169,11 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
             for item in setup.mission.items
             if item.command == C.DO_SET_HOME
         ]
+    slopes = landing_slopes(setup.mission, setup.route, setup.scenario)
+    if setup.source is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP:
+        steepest = f"{max(map(abs, slopes)):.1%}, and at most {STEEPEST_STRIP:.0%} can be landed on"
+        why = f"NAV_LAND: the ground there slopes by {steepest}: the touchdown is not judged"
+        left.append((int(setup.route.items[-1]), why))
     returns = any(item.command == C.NAV_RETURN_TO_LAUNCH for item in setup.mission.items)
     settings = [(None, text) for text in setup.autopilot.settings_not_flown(returns=returns)]
     for seq, text in [*left, *settings]:

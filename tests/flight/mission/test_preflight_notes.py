@@ -10,6 +10,8 @@ import pytest
 from flight.mission.items import Mission
 from flight.mission.preflight_notes import field_notes
 from flight.mission.return_path import USUAL_RULES, ReturnRules
+from logs.verdict.findings import NOT_FLOWN
+from logs.verdict.rules.mission_rule import mission_findings
 from tests.mission_lines import ORIGIN, setup_of, wp
 from world.airfield import LandingStrip, Launch
 from world.frames import to_geo
@@ -81,6 +83,15 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
 def test_ground_that_no_plan_would_land_on_is_told(east: float, north: float, told: bool) -> None:
     (said,) = landed_on(sloped(east, north), Wind(0.0, 0.0))
     assert ("(10% is the most that a plan lands on)" in said) is told
+    # It leaves the verdict open, too.
+    setup = setup_of(*WAY, home="36.5 -84.2 100")
+    setup = replace(setup, scenario=replace(setup.scenario, terrain=sloped(east, north)))
+    left = [one.reason for one in mission_findings(setup) if one.check == NOT_FLOWN]
+    assert left == (
+        ["NAV_LAND: the ground there slopes by 10.1%, and at most 10% can be landed on: the touchdown is not judged"]
+        if told
+        else []
+    )
 
 
 @pytest.mark.parametrize(("from_deg", "tail"), [(89.0, 0.0), (181.0, 4.0), (180.0, 4.0), (359.0, 0.0)])

@@ -328,6 +328,10 @@ def test_a_take_off_inside_the_first_circle_is_no_fault() -> None:
         ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 3.0, "FENCE_ACTION": 0.0}, ()),
         ({"FENCE_TYPE": 3.0}, ()),
         ({"TERRAIN_FOLLOW": 16.0}, ("TERRAIN_FOLLOW 16",)),
+        ({"MIN_GROUNDSPEED": 30.0}, ("MIN_GROUNDSPEED 30",)),
+        ({"ARSPD_USE": 0.0}, ("ARSPD_USE 0",)),
+        ({"RLL_RATE_P": 0.0, "RLL_RATE_FF": 0.0}, ("RLL_RATE_P 0 and RLL_RATE_FF 0",)),
+        ({"PTCH_RATE_P": 0.0}, ()),
     ],
 )
 def test_settings_of_arduplane_that_no_flight_shows_leave_the_verdict_open(
@@ -350,6 +354,8 @@ def test_settings_of_arduplane_that_no_flight_shows_leave_the_verdict_open(
         ({"GF_MAX_HOR_DIST": 300.0, "GF_MAX_VER_DIST": 50.0}, ("GF_MAX_HOR_DIST 300", "GF_MAX_VER_DIST 50")),
         ({"GF_MAX_HOR_DIST": 300.0, "GF_ACTION": 0.0}, ()),
         ({"COM_FLT_TIME_MAX": 60.0}, ("COM_FLT_TIME_MAX 60",)),
+        ({"FW_USE_AIRSPD": 0.0}, ("FW_USE_AIRSPD 0",)),
+        ({"WEIGHT_BASE": 2.0, "WEIGHT_GROSS": 2.5}, ("WEIGHT_BASE 2", "WEIGHT_GROSS 2.5")),
     ],
 )
 def test_settings_of_px4_that_no_flight_shows_leave_the_verdict_open(
