@@ -175,7 +175,8 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
         why = f"NAV_LAND: the ground there slopes by {steepest}: the touchdown is not judged"
         left.append((int(setup.route.items[-1]), why))
     returns = any(item.command == C.NAV_RETURN_TO_LAUNCH for item in setup.mission.items)
-    settings = [(None, text) for text in setup.autopilot.settings_not_flown(returns=returns)]
+    # An imported flight was flown with its settings.
+    settings = [(None, text) for text in setup.autopilot.settings_not_flown(returns=returns) if setup.source is None]
     for seq, text in [*left, *settings]:
         yield make_finding(
             "mission",
