@@ -260,7 +260,7 @@ class _BestRefused:
         self.tried, self._margin, self.problem = 0, -math.inf, ""
 
     def add(self, found: Certificate | None) -> None:
-        """Include the certificate of a refused path, if any; if it names no problem, the path is in a missile's range."""
+        """Include the certificate, if any, of a refused path; a path without a problem is in a missile's range."""
         if found is None:
             return
         self.tried += 1
