@@ -125,7 +125,7 @@ def search_patterns(
 
 
 def merits(scores: Floats) -> Floats:
-    """Return the merits (n,) of scores (n, 8) by `planner.plan.Violation` and `Objective`; the search minimises them."""
+    """Return the merits (n,) of scores (n, 8) by `planner.plan.Violation` and `Objective`, for minimisation."""
     prices = np.array([TURN_PRICE, SLOPE_PRICE, TERRAIN_PRICE, BOUNDS_PRICE])
     count = len(prices)
     ratio, exposure = scores[:, count + Objective.LENGTH_RATIO], scores[:, count + Objective.KILL_EXPOSURE]

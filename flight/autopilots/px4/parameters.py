@@ -196,7 +196,7 @@ class Px4Parameters(ParameterSet):
         return values
 
     @classmethod
-    def _is_stated(cls, definition: Definition, value: float) -> bool:
+    def _counts_as_set(cls, definition: Definition, value: float) -> bool:
         """Return False for a parameter that is not flown and has PX4's own value: a station saves every parameter."""
         return definition.name not in NOT_FLOWN or value != definition.default
 
