@@ -197,7 +197,7 @@ class Px4Parameters(ParameterSet):
 
     @classmethod
     def _counts_as_set(cls, definition: Definition, value: float) -> bool:
-        """Return False for a parameter that is not flown and has its default, because a station saves every parameter."""
+        """Return False for a parameter that is not flown and has its default, because stations save every parameter."""
         return definition.name not in NOT_FLOWN or value != definition.default
 
     @property

@@ -195,7 +195,7 @@ class SitlFlight(ProgramFlight):
         super().__init__(setup, aircraft, load_gains(aircraft), gear=gear)
         self._release: Release | None = None
         self._rail = self._make_rail(setup)
-        self._disturb(setup)
+        self._start_disturbances(setup)
         self._mission = uploaded_mission(setup)
         if self._ways:
             self.max_ticks += int(GROUND_PATIENCE / self.dt)
@@ -277,9 +277,9 @@ class SitlFlight(ProgramFlight):
 
         For a take-off, return the rail of the launch.
         """
-        start, points = self._start(setup), setup.route.waypoints
+        start, points = self._find_start(setup), setup.route.waypoints
         if self._ways.take_off is not None:
-            self._trim(setup.mission.source, start)
+            self._start_trimmed(setup.mission.source, start)
             aircraft = self.fdm.aircraft
             self._release = find_release(setup, self.map, self._ground, aircraft, self._ways.take_off)
             return launch_rail(self._release, self._ways.take_off)
@@ -287,7 +287,7 @@ class SitlFlight(ProgramFlight):
         back = points[0, :2] - step / np.hypot(*step) * max(RUN_IN, RUN_IN_SECONDS * start.airspeed)
         lat, lon = (float(value) for value in to_geo(setup.scenario.origin, *back))
         begin = replace(start, lat_deg=lat, lon_deg=lon, slope=0.0, ground=min(0.0, start.amsl - 1000.0))
-        self._trim(setup.mission.source, begin)
+        self._start_trimmed(setup.mission.source, begin)
         return rail_end(self.fdm.read(), start.wind)
 
     def _hold_during(self, talk: Talk) -> None:
