@@ -158,7 +158,7 @@ class Simulator(Protocol):
         """Return the rates (8,) of the states (u, v, w, p, q, r, roll, pitch) with these commands."""
 
 
-def solve(
+def solve_trim(
     balance: Callable[[Floats], Floats],
     held: Mapping[TrimQuantity, float],
     limits: tuple[float, float, float],
@@ -228,7 +228,7 @@ def trim(
     """
     simulator.move_to(amsl)
     start = near.vector() if near else simulator.first_guess()
-    values = solve(simulator.balance, held, simulator.surface_limits(), start)
+    values = solve_trim(simulator.balance, held, simulator.surface_limits(), start)
     return None if values is None else from_vector(values, amsl)
 
 
