@@ -332,7 +332,7 @@ class ItemProblem(NamedTuple):
         return f"{self.field} {self.value:.10g}: {self.allowed}"
 
     def at(self, file: str, where: object) -> dict[str, Any]:
-        """Return the arguments of a `MissionError` for this problem.
+        """Return the arguments for a `MissionError` on this problem.
 
         file: file that holds the item.
         where: beginning of the message.

@@ -90,7 +90,7 @@ class LoiterRules:
     before_return: str = ""
 
     def end_note(self) -> str:
-        """Return a note for people on the loiter after the mission's end.
+        """Return a note for people on the loiter that follows the mission's end.
 
         >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
         'after the last waypoint it circles about that without end, with NAV_LOITER_RAD, 80 m: flown once'

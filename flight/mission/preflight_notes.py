@@ -144,7 +144,7 @@ def _slope_text(slope: float) -> str:
 
 
 def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
-    """Note what is known of the ground at a landing for which the scenario states no strip."""
+    """Note the known facts about the ground at a landing for which the scenario states no strip."""
     last = int(route.items[-1])
     lands = any(item.seq == last and item.command == Command.NAV_LAND for item in mission.items)
     if scenario.landing is not None or not lands:

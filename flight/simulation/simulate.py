@@ -330,4 +330,4 @@ class Flight(Airborne):
 
 
 def _discard(_value: float) -> None:
-    """Set nothing."""
+    """Ignore the value of an output that is not used."""

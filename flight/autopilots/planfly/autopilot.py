@@ -75,5 +75,5 @@ class PlanflyGuidance(Autopilot):
 
     @property
     def keeps_to_arcs(self) -> bool:
-        """False for the reference laws, which pass a waypoint at any distance."""
+        """False for the reference laws, which may pass a waypoint at any distance."""
         return self.guidance == "path"
