@@ -55,7 +55,7 @@ def field_notes(
         *_note_rally_points(places[1:], route, scenario, rules),
         *_note_low_return(places[:1], scenario, rules),
         *_note_forbidden_landing_sequence(mission, parameters),
-        *_note_landing_ground(mission, route, scenario),
+        *_landing_ground(mission, route, scenario),
     )
 
 
@@ -143,8 +143,8 @@ def _slope_text(slope: float) -> str:
     return _LEVEL_TEXT if shown == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {shown}"
 
 
-def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
-    """Note the known facts about the ground at a landing for which the scenario states no strip."""
+def _landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
+    """Note what is known of the ground at a landing for which the scenario states no strip."""
     last = int(route.items[-1])
     lands = any(item.seq == last and item.command == Command.NAV_LAND for item in mission.items)
     if scenario.landing is not None or not lands:
