@@ -1,4 +1,4 @@
-"""Departure of a plan from the ground and approach to the ground, and their form in a file.
+"""Represent a plan's departure from the ground and its approach to the ground, and convert both to JSON.
 
 A plan's path stays in the air between start and destination.  If its scenario has `[launch]` or `[landing]`, the
 departure leads from home to the path and the approach from the path to the landing strip;
@@ -38,7 +38,7 @@ class ClimbOut:
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
-        _lock(self, "home", "waypoints")
+        _lock_arrays(self, "home", "waypoints")
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,18 +62,18 @@ class Descent:
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
-        _lock(self, "waypoints", "line_up", "point")
+        _lock_arrays(self, "waypoints", "line_up", "point")
 
 
 @dataclass(frozen=True, slots=True)
 class GroundWays:
-    """Departure and approach of a plan; None if the scenario does not require it, or if none is free."""
+    """Departure and approach of a plan; each is None if the scenario does not require it or if it is blocked."""
 
     climb: ClimbOut | None = None
     descent: Descent | None = None
 
 
-def _lock(made: ClimbOut | Descent, *names: str) -> None:
+def _lock_arrays(made: ClimbOut | Descent, *names: str) -> None:
     for name in names:
         array = np.array(getattr(made, name), dtype=np.float64)
         array = array.reshape(-1, 3) if name in ("waypoints", "line_up") else array
@@ -137,7 +137,7 @@ class GroundWaysFile(_Table):
 
 
 def ground_ways_json(ways: GroundWays) -> dict[str, Any]:
-    """Return departure and approach as JSON data, which `GroundWaysFile` reads.
+    """Convert departure and approach to JSON data, which `GroundWaysFile` reads.
 
     >>> climb = ClimbOut(np.zeros(3), 0.5, 80.0, np.array([[0.0, 600.0, 90.0]]), 0.15)
     >>> data = ground_ways_json(GroundWays(climb))

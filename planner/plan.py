@@ -1,4 +1,4 @@
-"""A plan: the waypoints of a path, their scores and certificate, the scenario, and the settings of the search.
+"""Represent a plan by its waypoints, scores, certificate, scenario and search settings; read and write its file.
 
 The file format is ``plan.json`` (schema planfly.plan/1): `plan_json` writes it, `read_plan` and `parse_plan` read it
 and check every field. `Certificate` is filled by `planner.evaluation.certify`.
@@ -191,7 +191,7 @@ def _or_none(value: float) -> float | None:
 
 
 def _airspace_keys(certificate: Certificate) -> dict[str, float]:
-    """Return the certificate's entries for zones and maximum height; empty if the scenario has neither."""
+    """Return the certificate's entries for zones and maximum height, or no entries if the scenario has neither."""
     values = {"zone_distance_m": certificate.zone_distance, "headroom_m": certificate.headroom}
     return {key: float(value) for key, value in values.items() if np.isfinite(value)}
 

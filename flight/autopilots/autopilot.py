@@ -1,11 +1,12 @@
-"""Interface of an autopilot: everything that the rest of planfly asks of what controls a flight.
+"""Define the interface of an autopilot, through which the rest of planfly uses what controls a flight.
 
-An `Autopilot` carries its own settings.  A `FlightSetup` holds one; planning, flights, verdicts and recordings ask it,
-and never test which autopilot it is.  Each has a folder next to this file; `flight.autopilots.catalog.AUTOPILOTS` lists
-them.
+An `Autopilot` carries its own settings.  A `FlightSetup` contains an autopilot; planning, flights, verdicts and
+recordings call its methods, and never test which autopilot it is.  Each autopilot has a folder next to this file;
+`flight.autopilots.catalog.AUTOPILOTS` lists all of them.
 
 The base class describes an autopilot without parameters that flies the fly-by path as it was planned, at the commanded
-true airspeeds, and returns to launch as ArduPlane does by its defaults.  An autopilot overrides what it does otherwise.
+true airspeeds, and returns to launch as ArduPlane does by its defaults.  An autopilot overrides the methods in which it
+differs.
 """
 
 import math
@@ -57,9 +58,9 @@ _SOURCE_NAMES: dict[Origin, str] = {"file": "the file", "aircraft": "the aircraf
 
 
 def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
-    """Name the values of a file that contradict the order of two parameters.
+    """Describe the values of a file that contradict the order of two parameters.
 
-    orders: names of parameters whose values must not fall from one to the next.
+    orders: names of parameters whose values must not decrease from one parameter to the next.
 
     >>> made = [ParameterValue("THR_MIN", 74.0, "aircraft"), ParameterValue("TRIM_THROTTLE", 60.0, "file")]
     >>> find_misfits(made, [("THR_MIN", "TRIM_THROTTLE")])
@@ -80,10 +81,12 @@ def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, .
 class Parameters(Protocol):
     """An autopilot's parameters by its own names and in its own units.
 
-    values: every parameter that its law uses.  unused: names in the file that the law does not use.
-    source: the user's file, "" if there is no file.  not_flown: parameters that are read but not flown.
-    beyond: values of the file outside their documented ranges, which are flown all the same, with those ranges.
-    misfits: values of the file that contradict another parameter, in words; the autopilot flies with them all the same.
+    values: every parameter that its control law uses.
+    unused: names in the file that the control law does not use.
+    source: the user's file, "" if there is no file.
+    not_flown: parameters that are read but have no effect on the simulated flight.
+    beyond: values of the file outside their documented ranges, with those ranges; they are flown nevertheless.
+    misfits: values of the file that contradict another parameter, in words; they are flown nevertheless.
     """
 
     not_flown: ClassVar[tuple[str, ...]]
@@ -118,7 +121,7 @@ class Parameters(Protocol):
 class SpeedLimits(NamedTuple):
     """Airspeeds (m/s) that an autopilot accepts from a mission, and the parameters that set them.
 
-    nearest: True if it flies the nearer limit for a command outside; otherwise it ignores such a command.
+    nearest: True if it flies the nearest limit for a command outside the limits; otherwise it ignores such a command.
     """
 
     min: float
@@ -147,8 +150,8 @@ class LandingGlide(NamedTuple):
     """Glide to a landing point: straight to the start of the flare, and from there to the ground.
 
     slope: m of altitude per m of distance.
-    flare_height: of the start of the flare above the landing point, m; 0 if unknown.
-    flare_distance: of the start of the flare before the landing point, m.
+    flare_height: height of the start of the flare above the landing point, m; 0 if unknown.
+    flare_distance: distance of the start of the flare before the landing point, m.
     """
 
     slope: float
@@ -159,11 +162,11 @@ class LandingGlide(NamedTuple):
 class Candidate(NamedTuple):
     """A parameter that may cause a flight to fail.
 
-    name: the autopilot's name.
-    step: the increment in its parameter reference, or a few of them.
-    far: the farthest value to try, within the range of the reference.
-    unit: of both.
-    least: the lowest value that may be suggested, in steps from here if the present value is below it.
+    name: the autopilot's name for the parameter.
+    step: the increment in the autopilot's parameter reference, or a few increments.
+    far: the value furthest from the present value to try, within the range of the reference.
+    unit: unit of step and value.
+    least: the minimum value that may be suggested; steps begin here if the present value is lower.
     """
 
     name: str
@@ -200,8 +203,8 @@ class StoredParameters(NamedTuple):
 class StoredAutopilot(NamedTuple):
     """An autopilot's settings as a log stores them.
 
-    guidance: the law of planfly's guidance, "path" for every other autopilot.
-    version: of an autopilot whose releases have different laws, "" for any other.
+    guidance: the control law of planfly's guidance, "path" for every other autopilot.
+    version: release of an autopilot whose releases have different control laws, "" for any other autopilot.
     """
 
     guidance: Guidance = "path"
@@ -226,7 +229,7 @@ class Autopilot(ABC):
     cruise_parameter: parameter of its cruise airspeed; "" if it has no such parameter.
     equivalent_airspeeds: True if commanded airspeeds are equivalent airspeeds, which are lower than true ones at
         altitude; it then takes over in level flight.
-    acceptance_limit: largest acceptance radius that it reads from an item, m.
+    acceptance_limit: maximum acceptance radius that it reads from an item, m.
     refuses: True if it refuses missions that fail PX4's feasibility checks.
     refuses_as_arduplane: True if it refuses missions with a command that ArduPlane refuses.
     reads_as_px4: True if it reads only the value of a mission's change of speed, goes back to its own airspeed for any
@@ -259,7 +262,7 @@ class Autopilot(ABC):
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """Return the autopilot of a scenario's [flight] table, which `scenario` names in messages.
+        """Return the autopilot of a scenario's [flight] table; `scenario` is the scenario's name in messages.
 
         Raise ScenarioError for an entry that it does not accept, and ParameterError for a bad parameter file.
         """
@@ -284,7 +287,7 @@ class Autopilot(ABC):
     def of_flight_log(
         cls, program: str, parameters: Mapping[str, float], source: str
     ) -> tuple[Self, tuple[str, ...]] | None:
-        """Return the autopilot that wrote a log, and notes on its parameters; None for another's log.
+        """Return the autopilot that wrote a log, and notes on its parameters, or None for another autopilot's log.
 
         program: name of the flown program in the log.  parameters: by name.  source: the log's file.
         The notes name the parameters that could not be used.
@@ -298,7 +301,7 @@ class Autopilot(ABC):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return what an aircraft's folder lacks for this autopilot, in sentences.
+        """Describe the files that this autopilot needs and an aircraft's folder lacks, in sentences.
 
         Raise PlanflyError for a broken file.
         """
@@ -308,7 +311,7 @@ class Autopilot(ABC):
 
     @property
     def law(self) -> "Autopilot":
-        """Autopilot whose law flies when no program does: itself, unless it is a program."""
+        """Autopilot whose control law flies if no program does; it is the autopilot itself unless that is a program."""
         return self
 
     @property
@@ -317,23 +320,25 @@ class Autopilot(ABC):
         """Compiled function for one tick of its law."""
 
     def begin(self, memory: Record, own: Record) -> None:
-        """Set what its law needs before the first tick.
+        """Initialise the records of its control law before the first tick.
 
-        memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.  own: of the type `own`, or None if that is None.
+        memory: a `flight.guidance.inner_loops.GUIDANCE_MEMORY` record.
+        own: a record of the type `own`, or None if that type is None.
         """
         return
 
     def from_ground(self, ways: GroundWays, aircraft: Aircraft, contacts: Sequence[Contact]) -> "GroundAutopilot":
-        """Return the autopilot that also flies this take-off and landing; only if it `flies_ground`.
+        """Return the autopilot that also flies this take-off and landing; only for an autopilot that `flies_ground`.
 
-        contacts: of the aircraft.
+        contacts: contact points of the aircraft.
         """
         raise ValueError(f"{self.title} flies no take-off and no landing")
 
     def take_over(self, before: Record, own: Record, here: Floats) -> None:
-        """Begin another route at the aircraft's position, and keep the law's state of the aircraft.
+        """Begin another route at the aircraft's position, and keep the control law's state of the aircraft.
 
-        before: the law's record on the previous route.  own: the record for this route, after `begin`.
+        before: record of the control law on the previous route.
+        own: record for this route, after `begin`.
         here: (3,) start of the route, m.
         """
         return
@@ -341,7 +346,7 @@ class Autopilot(ABC):
     # Properties for planning, missions and verdicts.
 
     def described(self, aircraft: str) -> str:
-        """Return a description of the autopilot with the settings that matter most in the flight."""
+        """Describe the autopilot with the settings that matter most in the flight."""
         return self.title
 
     @property
@@ -398,9 +403,9 @@ class Autopilot(ABC):
         return 1.0
 
     def landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
-        """Return the glide from the waypoint before the landing point: straight to the point, without a flare.
+        """Return the glide from the waypoint before the landing point, straight to the point and without a flare.
 
-        height, run: of that waypoint above the landing point and before it, m, both positive.
+        height, run: height of that waypoint above the landing point, and its distance before it, m, both positive.
         tail_wind: m/s, negative for a head wind.  amsl: altitude of the landing point, m.
 
         >>> from flight.autopilots.planfly.autopilot import PlanflyGuidance
@@ -421,22 +426,24 @@ class Autopilot(ABC):
     ) -> "Autopilot":
         """Return the autopilot with a scenario's RTL settings; unchanged if it has no such parameters.
 
-        rtl_altitude: over home, m.  rtl_autoland: in ArduPlane; None for either leaves the setting unchanged.
-        lands: True if the scenario's missions end with a landing sequence.  lower: of the field below home, m.
+        rtl_altitude: height above home, m.
+        rtl_autoland: ArduPlane's parameter; None for either leaves the setting unchanged.
+        lands: True if the scenario's missions end with a landing sequence.
+        lower: depth of the landing field below home, m.
         """
         return self
 
     def go_around_height(self, asked: float, takeoff: float) -> float | None:
-        """Return the altitude over home (m) of its climb before it goes around, or None if unknown.
+        """Return the height above home (m) to which it climbs before it goes around, or None if unknown.
 
-        asked: by the landing item, m, 0 if not stated.  takeoff: of the mission's take-off over home, m, 0 if there is
-        none.
+        asked: height that the landing item states, m; 0 if it states none.
+        takeoff: height of the mission's take-off above home, m; 0 without a take-off.
         """
         return None
 
     @property
     def launch_trigger(self) -> tuple[float, str] | None:
-        """Minimum launch acceleration that starts its motor, m/s^2, and the parameter; None if none is needed."""
+        """Minimum launch acceleration that starts its motor, m/s^2, and its parameter; None if no minimum applies."""
         return None
 
     @property
@@ -445,7 +452,7 @@ class Autopilot(ABC):
         return None
 
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
-        """Return the airspeeds (l,) that it flies on each leg for commanded ones (l,), m/s.
+        """Return the airspeed that it flies on each leg for the commanded airspeeds (l,), (l,) m/s.
 
         cruise: its airspeed until it accepts the first command.
         """
@@ -492,37 +499,38 @@ class Autopilot(ABC):
     def tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """Return its deviations from the legs, for which a plan leaves room; None if it holds its path.
+        """Return its deviations from the legs, for which a plan reserves a margin; None if it holds its path.
 
-        airspeed: commanded, m/s.  nav: accuracy of navigation.  fly_over: True if it flies on to each waypoint before
-        it turns.
-        turbulence: of the wind.
+        airspeed: commanded airspeed, m/s.
+        nav: accuracy of navigation.
+        fly_over: True if it flies on to each waypoint before it turns.
+        turbulence: turbulence of the wind.
         """
         return None
 
     def altitude_miss_probability(self, climb: float, sink: float, turbulence: Turbulence) -> float:
         """Return the probability (0..1) that gusts make it circle at a waypoint; 0 if it flies on.
 
-        climb, sink: spare rates of the aircraft against gusts, m/s.
+        climb, sink: climb and sink rates that the aircraft has in reserve against gusts, m/s.
         """
         return 0.0
 
     def gust_sink(self, climb: float, turbulence: Turbulence) -> float:
-        """Return the altitude loss (m) in a one-in-a-hundred downdraft; 0 if in its tracking error.
+        """Return the altitude loss (m) in a one-in-a-hundred downdraft; 0 if its tracking error includes the loss.
 
-        climb: spare climb rate of the aircraft, m/s.
+        climb: climb rate that the aircraft has in reserve, m/s.
         """
         return 0.0
 
     def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
         """Return the altitude gain (m) in a one-in-a-hundred updraft; 0 if it holds its altitude.
 
-        sink: spare sink rate of the aircraft, m/s.
+        sink: sink rate that the aircraft has in reserve, m/s.
         """
         return 0.0
 
     def with_parameters(self, **values: float) -> "Autopilot":
-        """Return the same law with other parameter values, by its own names and in its own units."""
+        """Return a copy with the given parameters changed, by the autopilot's names and in its units."""
         raise ValueError(f"{self.title} has no parameters")
 
 

@@ -1,4 +1,4 @@
-"""List of all autopilots that planfly knows; a new autopilot is added here."""
+"""List all autopilots that planfly knows; add a new autopilot here."""
 
 import math
 from collections.abc import Mapping
@@ -46,13 +46,15 @@ def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
         raise ScenarioError.at(scenario.name, "flight.autopilot", name, allowed, shown=repr(name))
     made, returns = _LAWS[name].load(scenario.flight, aircraft, scenario.name), scenario.returns
     set_by = (None, None) if returns is None else (returns.rtl_altitude, returns.rtl_autoland)
-    asked = made.with_scenario_rtl_settings(*set_by, lands=scenario.landing is not None, lower=_lower_field(scenario))
+    asked = made.with_scenario_rtl_settings(
+        *set_by, lands=scenario.landing is not None, lower=_field_depth_below_home(scenario)
+    )
     _refuse_conflict(scenario, made, asked)
     return asked
 
 
-def _lower_field(scenario: Scenario) -> float:
-    """Return the height of home above the ground at the landing, m; 0 if either is unknown."""
+def _field_depth_below_home(scenario: Scenario) -> float:
+    """Return the height of home above the ground at the landing point, m; 0 if either altitude is unknown."""
     landing, home = scenario.landing, scenario.home
     if landing is None or home is None or scenario.terrain is None:
         return 0.0
@@ -83,9 +85,9 @@ def program_autopilot(program: Path) -> type[ProgramAutopilot]:
 def autopilot_of_log(
     program: str, parameters: Mapping[str, float], source: str
 ) -> tuple[Autopilot, tuple[str, ...]] | None:
-    """Return the law of the autopilot that wrote a flight log, and notes on its parameters.
+    """Return the control law of the autopilot that wrote a flight log, and notes on its parameters.
 
-    None for an autopilot that planfly does not know.  The notes name the parameters that could not be used.
+    Return None for an autopilot that planfly does not know.  The notes name the parameters that could not be used.
     program: its name in the log.  source: the log's file.
     """
     return next(filter(None, (kind.of_flight_log(program, parameters, source) for kind in _LAWS.values())), None)
@@ -111,5 +113,5 @@ def stored_name(autopilot: Autopilot) -> str | None:
 
 
 def _implied_name(stored: StoredAutopilot) -> str:
-    """Return who flew by a log without a name: ArduPlane if it has parameters or a program, else planfly."""
+    """Return the autopilot of a log that names none: ArduPlane if it has parameters or a program, else planfly."""
     return (PlanflyGuidance if stored.parameters is None and stored.program is None else ArduPlane).name

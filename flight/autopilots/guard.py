@@ -1,4 +1,4 @@
-"""Guard of a flight's program: if planfly is killed, the program and its folder are removed too.
+"""Guard a flight's program, so that the program and its folder are removed if planfly is killed.
 
 The kernel kills a program whose parent is killed, but not that program's own children, such as the child of a wrapper
 script, and it removes no folder.  The guard is a small process that outlives planfly by the time that this takes.
@@ -46,7 +46,7 @@ for _ in range(100):
 
 
 class Guard:
-    """A guard; a context manager, which leaves nothing for it to do.
+    """A guard process as a context manager; on exit nothing is left to remove.
 
     >>> with Guard() as guard:
     ...     guard.keep_folder(Path("/nowhere/planfly-autopilot-1"))
@@ -71,7 +71,7 @@ class Guard:
         self._write_line(f"folder {folder}")
 
     def keep_file(self, file: Path) -> None:
-        """Guard a file that may be created, whose name has no line break."""
+        """Guard a file, which need not exist yet and whose name has no line break."""
         self._write_line(f"file {file}")
 
     def keep_group(self, group: int) -> None:

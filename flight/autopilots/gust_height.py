@@ -1,4 +1,4 @@
-"""Altitude gain or loss from gusts that exceed an aircraft's climb or sink rate."""
+"""Compute the altitude gain or loss from gusts that exceed an aircraft's climb or sink rate."""
 
 from world.wind import W20, Turbulence
 
@@ -27,7 +27,7 @@ def gust_deviation(turbulence: Turbulence) -> float:
 
 
 def height_in_gusts(rate: float, turbulence: Turbulence) -> float:
-    """Return the displacement (m) by a one-in-a-hundred gust, opposed by a climb or sink rate (m/s).
+    """Return the height (m) by which a one-in-a-hundred gust displaces an aircraft that opposes it at a rate (m/s).
 
     >>> round(height_in_gusts(2.0, "moderate"), 1), height_in_gusts(4.0, "moderate"), height_in_gusts(0.0, "none")
     (19.1, 0.0, 0.0)
@@ -36,7 +36,7 @@ def height_in_gusts(rate: float, turbulence: Turbulence) -> float:
 
 
 def height_in_updrafts(sink: float, turbulence: Turbulence) -> float:
-    """Return the altitude gain (m) in updrafts if the autopilot keeps airspeed, from the spare sink rate (m/s).
+    """Return the altitude gain (m) in updrafts of an autopilot that holds airspeed, from its reserve sink rate (m/s).
 
     >>> round(height_in_updrafts(2.0, "moderate"), 1), round(height_in_updrafts(0.5, "moderate"), 1)
     (19.1, 92.4)

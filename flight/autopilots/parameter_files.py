@@ -1,4 +1,4 @@
-"""Parameter files of an autopilot, in the formats of ground stations.
+"""Read and write an autopilot's parameter files in the formats of ground stations.
 
 QGroundControl writes five columns with tabs between: vehicle, component, name, value, type.  MAVProxy and ArduPilot's
 own default files have a name and a value with blanks between, Mission Planner has a comma.  In all formats a `#` begins
@@ -45,7 +45,7 @@ class Entry:
 
 
 def read_parameter_file(path: Path) -> dict[str, Entry]:
-    """Read a parameter file, by name in the order of the file.
+    """Read a parameter file, and return its entries by name in the order of the file.
 
     Raise ParameterError, in one line, for a file that cannot be read and as `parse_parameters` does.
     """

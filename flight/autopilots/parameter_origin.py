@@ -32,12 +32,12 @@ _VEHICLE = re.compile(r"^\s*#+\s*vehicle\s*:\s*(.+?)\s*$", re.IGNORECASE | re.MU
 _PROGRAM = re.compile(r"^\s*#.*\b(ArduPlane|ArduCopter|ArduRover|APMrover2|ArduSub|AntennaTracker)\b", re.I | re.M)
 
 
-def _pattern(names: str) -> re.Pattern[str]:
-    """Compile a pattern of names between blanks; one that ends with an underscore is the beginning of names."""
+def _compile_names(names: str) -> re.Pattern[str]:
+    """Compile a pattern from names between blanks; a name that ends with an underscore matches as a prefix."""
     return re.compile("|".join(f"{name}.*" if name.endswith("_") else name for name in names.split()))
 
 
-_PX4_NAMES = _pattern(
+_PX4_NAMES = _compile_names(
     "ASPD_ BAT[0-9]?_ CAL_ CA_ CBRK_ COM_ EKF2_ FD_ FW_ GF_ GND_L1_ GND_SPEED_ GND_THR_ IMU_ LNDFW_ LNDMC_ LPE_ MAN_ "
     "MAV_COMP_ID MAV_SYS_ID MAV_TYPE MAV_[0-9]_ MC_ MIS_DIST_ MIS_LTRMIN_ALT MIS_MNT_ MIS_TAKEOFF_ MIS_TKOFF_ MIS_TKO_ "
     "MIS_YAW MPC_ NAV_[A-BD-Z].* NPFG_ PWM_AUX_ PWM_MAIN_ PWM_MAX PWM_MIN RA_ RC_MAP_ RD_ RO_ "
@@ -45,7 +45,7 @@ _PX4_NAMES = _pattern(
     "SER_ SYS_ THR_MDL_FAC TRIG_ TRIM_PITCH TRIM_ROLL TRIM_YAW UUV_ VT_ WEIGHT_BASE WEIGHT_GROSS WV_"
 )
 # Names of ArduPilot's aeroplanes alone; ArduPlane's VTOL parameters begin with Q_.
-_ARDUPLANE_NAMES = _pattern(
+_ARDUPLANE_NAMES = _compile_names(
     "AIRSPEED_CRUISE AIRSPEED_MAX AIRSPEED_MIN ALT_CTRL_ALG ALT_HOLD_ ALT_OFFSET ARSPD_ CRUISE_ALT_FLOOR DSPOILER_ "
     "DSPOILR_ ELEVON_ FBW[AB]_ FLAP_ FS_LONG_ FS_SHORT_ GLIDE_SLOPE_ GROUND_STEER_ KFF_ LAND_FLARE_ LAND_PF_ "
     "LAND_PITCH_ LAND_WIND_COMP LEVEL_ROLL_LIMIT LIM_ MIXING_GAIN NAVL1_ PITCH_LIM_ PTCH2SRV_ PTCH_ Q_ "
@@ -55,7 +55,7 @@ _ARDUPLANE_NAMES = _pattern(
     "THR_FAILSAFE THR_MAX THR_MIN THR_PASS_ THR_SLEWRATE TKOFF_ TRIM_ARSPD_CM TRIM_PITCH_CD TRIM_THROTTLE "
     "USE_REV_THRUST WP_LOITER_RAD WP_MAX_RADIUS YAW2SRV_ YAW_RATE_"
 )
-_ARDUPILOT_NAMES = _pattern(
+_ARDUPILOT_NAMES = _compile_names(
     "ACRO_ AHRS_ ARMING_ AUTOTUNE_ BATT[0-9]?_ BRD_ CAM[0-9]?_ CAN_ COMPASS_ EK[23]_ FENCE_ FLIGHT_OPTIONS "
     "FLTMODE[0-9_].* FORMAT_VERSION FS_ GPS1_ GPS_TYPE.* GROUND_ INS_ LOG_ MIS_OPTIONS MIS_RESTART MIS_TOTAL "
     "NTF_ RALLY_ RCMAP_ RNGFND RNGFND[0-9]?_ RSSI_ SCHED_ SERIAL[0-9]_ SERVO[0-9_].* SR[0-9]_ STAT_ SYSID_ "
@@ -63,30 +63,30 @@ _ARDUPILOT_NAMES = _pattern(
 )
 # ArduPilot's other vehicles, by names of their own.
 _ARDUPILOT_VEHICLES: Mapping[str, re.Pattern[str]] = {
-    "a multicopter or helicopter": _pattern(
+    "a multicopter or helicopter": _compile_names(
         "ANGLE_MAX ATC_ACCEL_ ATC_ANG_ ATC_INPUT_TC ATC_RATE_ ATC_RAT_ ATC_THR_ CIRCLE_ FRAME FRAME_CLASS "
         "FRAME_TYPE FS_THR_ENABLE FS_THR_VALUE GND_EFFECT_COMP H_ IM_ LAND_ALT_LOW LAND_SPEED LAND_SPEED_HIGH "
         "LOIT_ MOT_ PHLD_ PILOT_ POS[XYZ]_ PSC_ RATE_PIT_ RATE_RLL_ RATE_YAW_ RTL_ALT RTL_ALT_FINAL "
         "RTL_LOIT_TIME RTL_SPEED SIMPLE STB_ SUPER_SIMPLE THROW_ THR_DZ THR_MID VEL[XYZ]_ WPNAV_ "
         "WP_YAW_BEHAVIOR"
     ),
-    "a rover or boat": _pattern(
+    "a rover or boat": _compile_names(
         "ATC_BAL_ ATC_BRAKE ATC_DECEL_MAX ATC_SAIL_ ATC_SPEED_ ATC_STOP_SPEED ATC_STR_ ATC_TURN_MAX_G "
         "CRASH_ANGLE CRUISE_SPEED CRUISE_THROTTLE LEARN_CH MODE[1-6] MODE_CH PIVOT_TURN_ SAIL_ "
         "SPEED_TURN_GAIN TURN_MAX_G TURN_RADIUS WP_OVERSHOOT WP_PIVOT_ WP_SPEED"
     ),
-    "a submarine": _pattern("FS_LEAK_ENABLE FS_TERRAIN_ENAB JS_ MOT_[0-9]+_DIRECTION SURFACE_DEPTH"),
+    "a submarine": _compile_names("FS_LEAK_ENABLE FS_TERRAIN_ENAB JS_ MOT_[0-9]+_DIRECTION SURFACE_DEPTH"),
 }
 # PX4's other vehicles, by names of their controllers.
-_PX4_PLANE = _pattern("FW_ LNDFW_ NPFG_ RWTO_")
+_PX4_PLANE = _compile_names("FW_ LNDFW_ NPFG_ RWTO_")
 _PX4_VEHICLES: Mapping[str, re.Pattern[str]] = {
-    "a multicopter or helicopter": _pattern("LNDMC_ MC_ MPC_"),
-    "a rover or boat": _pattern("GND_ RA_ RD_ RO_"),
-    "a submarine": _pattern("UUV_"),
+    "a multicopter or helicopter": _compile_names("LNDMC_ MC_ MPC_"),
+    "a rover or boat": _compile_names("GND_ RA_ RD_ RO_"),
+    "a submarine": _compile_names("UUV_"),
 }
 _VTOL = "a VTOL aircraft"
 # Names of a PX4 VTOL alone: PX4's navigator asks for VT_B_ in every vehicle.
-_PX4_VTOL = _pattern("VT_ARSP_ VT_FW_ VT_F_ VT_TRANS_ VT_TYPE")
+_PX4_VTOL = _compile_names("VT_ARSP_ VT_FW_ VT_F_ VT_TRANS_ VT_TYPE")
 # Words of a "# Vehicle:" header; the first match decides: vehicle names of QGroundControl and MAVLink.
 _VEHICLE_WORDS: tuple[tuple[str, str], ...] = (
     (r"vtol|tail-?sitter|tilt-?rotor", _VTOL),
@@ -120,8 +120,8 @@ class ParameterOrigin(NamedTuple):
     """Autopilot and vehicle that a parameter file was written for.
 
     autopilot: "ardupilot" or "px4"; "" if neither is clear.
-    vehicle: another kind than an aeroplane, in words; "" for an aeroplane, or if unknown.
-    evidence: the header or the names that show it.
+    vehicle: the vehicle in words if it is not an aeroplane; "" for an aeroplane, or if unknown.
+    evidence: the header or the names from which this follows.
     mixed: True for a file with names of both autopilots, in which neither has a clear majority.
     """
 
@@ -176,7 +176,7 @@ def _is_ardupilot(name: str) -> bool:
 
 
 def _header_vehicle(text: str) -> str | None:
-    """Return the vehicle that the head of a file states, "" for an aeroplane, or None if it states none."""
+    """Return the vehicle that a file's header states, "" for an aeroplane, or None if the header states no vehicle."""
     found = _VEHICLE.search(text)
     if found is not None:
         return next((kind for words, kind in _VEHICLE_WORDS if re.search(words, found[1], re.I)), None)
@@ -184,7 +184,7 @@ def _header_vehicle(text: str) -> str | None:
     return None if program is None else _PROGRAMS[program[1].lower()]
 
 
-def _voted_vehicle(
+def _vehicle_by_majority(
     text: str, entries: Mapping[str, Entry], plane: re.Pattern[str], others: Mapping[str, re.Pattern[str]]
 ) -> str:
     """Return the vehicle with the most names; in a tie, an aeroplane."""
@@ -202,11 +202,11 @@ def _px4_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
             return kind
     if _header_vehicle(text) == _VTOL or _matching(entries, _PX4_VTOL.fullmatch):
         return _VTOL
-    return _voted_vehicle(text, entries, _PX4_PLANE, _PX4_VEHICLES)
+    return _vehicle_by_majority(text, entries, _PX4_PLANE, _PX4_VEHICLES)
 
 
 def _ardupilot_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
-    return _voted_vehicle(text, entries, _ARDUPLANE_NAMES, _ARDUPILOT_VEHICLES)
+    return _vehicle_by_majority(text, entries, _ARDUPLANE_NAMES, _ARDUPILOT_VEHICLES)
 
 
 # ----------------------------------------------------------------------
@@ -218,16 +218,16 @@ def read_origin(path: Path) -> ParameterOrigin:
 
     Raise ParameterError for a file that cannot be read.
     """
-    text = _read(path)
+    text = _read_text(path)
     return parameter_origin(text, parse_parameters(text, str(path)))
 
 
 def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
-    """Read a parameter file with which an autopilot, by its name, is to fly.
+    """Read a parameter file for a flight with the autopilot of the given name.
 
     Raise ParameterError for a file that cannot be read, and for a file of another autopilot or another vehicle.
     """
-    text = _read(path)
+    text = _read_text(path)
     entries = parse_parameters(text, str(path))
     found = parameter_origin(text, entries)
     if found.autopilot not in ("", autopilot):
@@ -240,7 +240,7 @@ def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
 
 
 def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], known: Mapping[str, float]) -> None:
-    """Raise ParameterError if the law knows no name of a file that is not clearly for its autopilot."""
+    """Raise ParameterError if an autopilot knows no name in a file whose origin is unclear."""
     if known or parameter_origin("", entries).autopilot == autopilot:
         return
     names = ", ".join(list(entries)[:_SHOWN_NAMES])
@@ -250,13 +250,13 @@ def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], kno
 
 
 def other_autopilot(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:
-    """Return the error for a file that was written for another autopilot than the one that is to fly."""
+    """Return the error for a file that was written for a different autopilot."""
     because = f" ({evidence})" if evidence else ""
     allowed = f"{_MODELS[flying]} is to fly: --autopilot {written_for} simulates {_MODELS[written_for]} instead"
     message = f"{where}: written for {TITLES[written_for]}{because}, and {allowed}"
     return ParameterError(message, file=where, field="autopilot", value=written_for, allowed=allowed)
 
 
-def _read(path: Path) -> str:
+def _read_text(path: Path) -> str:
     data = read_small_file(path, MAX_BYTES, "parameter", ParameterError)
     return utf8_text(data, path, ParameterError)

@@ -1,4 +1,4 @@
-"""The parameters of an autopilot: one set of values, and how files, aircraft, logs and defaults make it.
+"""Build an autopilot's set of parameter values from files, aircraft, logs and defaults.
 
 A parameter is taken from the first source that states it: the user's file, the aircraft, the autopilot's default.
 `flight.autopilots.arduplane.parameters` and `flight.autopilots.px4.parameters` define which parameters an
@@ -28,9 +28,9 @@ Stated = tuple[Origin, Mapping[str, float]]
 class Definition(NamedTuple):
     """One parameter.
 
-    name: the autopilot's.
-    default: the autopilot's, in its unit.
-    low, high: range of the values that are accepted, in that unit.
+    name: the autopilot's name for the parameter.
+    default: the autopilot's default, in its unit.
+    low, high: range of accepted values, in that unit.
     to_si: factor to SI and radians.
     old: an older name, and the factor from its unit to the unit of the present name.
     documented: range of the autopilot's reference, if that is narrower.
@@ -49,9 +49,9 @@ class ParameterTable:
     """The parameters that an autopilot's law reads.
 
     autopilot: the autopilot's name in a scenario.  title: its name in texts.
-    definitions: by the field of the law's record, in the order of the values.
+    definitions: definitions by the field of the control law's record, in the order of the values.
     pairs: a minimum and a maximum; the minimum must be lower.
-    orders: names of parameters whose values should not fall from one to the next.
+    orders: names of parameters whose values should not decrease from one parameter to the next.
     log_digits: significant digits of the values in a log.
     """
 
@@ -75,7 +75,7 @@ class ParameterTable:
         }
 
     def read(self, entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Return values by present name and in present units, and the names that the law does not read.
+        """Return the values by present name and in present units, and the names that the control law does not read.
 
         Raises ParameterError for a value that is not accepted, and for two values of one parameter.
         """
@@ -89,14 +89,17 @@ class ParameterTable:
             value = entry.value * factor
             if not definition.low <= value <= definition.high:
                 allowed = f"allowed {definition.low / factor:g}..{definition.high / factor:g}"
-                raise _refused(entry.where, name, entry.value, allowed)
+                raise _value_error(entry.where, name, entry.value, allowed)
             if values.setdefault(definition.name, value) != value:
                 allowed = "the same parameter has another value under its other name"
-                raise _refused(entry.where, name, entry.value, allowed)
+                raise _value_error(entry.where, name, entry.value, allowed)
         return values, tuple(unused)
 
     def read_log(self, logged: Mapping[str, float]) -> tuple[dict[str, float], list[str]]:
-        """Return the values of a log that are accepted, and a sentence for each value that is not.  logged: by name."""
+        """Return the accepted values of a log, and a sentence on each rejected value.
+
+        logged: values by name.
+        """
         values: dict[str, float] = {}
         notes = []
         for name, definition in self.by_name.items():
@@ -139,14 +142,17 @@ class ParameterSet:
 
     @classmethod
     def defaults(cls, *fields: Any) -> Self:
-        """Return the autopilot's own values.  fields: further ones of the subclass, as PX4's version."""
+        """Return the autopilot's default values.
+
+        fields: additional fields of the subclass, such as PX4's version.
+        """
         return cls._build([], "", (), *fields)
 
     @classmethod
     def load(cls, aircraft: Aircraft, path: Path | str | None = None, *fields: Any) -> Self:
-        """Return the parameters that an aircraft is flown with: of a file, of the aircraft, and defaults.
+        """Return an aircraft's parameters from a file, from the aircraft's own file, and from the defaults.
 
-        Raises ParameterError, in one line, for a file that cannot be read or states what is not allowed.
+        Raises ParameterError, in one line, for a file that cannot be read or contains a value that is not allowed.
         """
         stated: list[Stated] = []
         unused: tuple[str, ...] = ()
@@ -162,7 +168,7 @@ class ParameterSet:
 
     @classmethod
     def of_text(cls, text: str, source: str, *fields: Any) -> Self:
-        """Return the parameters of a file's text, with defaults for the others.  Raises ParameterError."""
+        """Return the parameters in a file's text, completed with defaults.  Raises ParameterError."""
         values, unused = cls.table.read(parse_parameters(text, source))
         return cls._build([("file", values)], source, unused, *fields)
 
@@ -177,7 +183,7 @@ class ParameterSet:
             if definition := cls.table.by_name.get(name):
                 if not definition.low <= value <= definition.high:
                     allowed = f"allowed {definition.low:g}..{definition.high:g}"
-                    raise _refused(stored.source, name, value, allowed)
+                    raise _value_error(stored.source, name, value, allowed)
                 origins[origin][name] = value
         return cls._build(list(origins.items()), stored.source, stored.unused, *fields)
 
@@ -196,12 +202,12 @@ class ParameterSet:
 
     @classmethod
     def _of_aircraft(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
-        """Return the values of the aircraft's file that the law reads."""
+        """Return the values in the aircraft's file that the control law reads."""
         return cls.table.read(entries)[0]
 
     @classmethod
-    def _is_stated(cls, definition: Definition, value: float) -> bool:
-        """Return True if the file is taken to state a value that it contains."""
+    def _counts_as_set(cls, definition: Definition, value: float) -> bool:
+        """Return True if a value in the file counts as set explicitly; subclasses may exclude unchanged defaults."""
         return True
 
     @classmethod
@@ -211,7 +217,7 @@ class ParameterSet:
         def find(definition: Definition) -> ParameterValue:
             for origin, values in stated:
                 value = values.get(definition.name)
-                if value is not None and cls._is_stated(definition, value):
+                if value is not None and cls._counts_as_set(definition, value):
                     return ParameterValue(definition.name, value, origin)
             return ParameterValue(definition.name, definition.default, "default")
 
@@ -240,7 +246,7 @@ class ParameterSet:
         return replace(self, values=made)
 
     def by_origin(self, origin: Origin) -> dict[str, float]:
-        """Return the values that one source states, by name and in the autopilot's units."""
+        """Return the values from one source, by name and in the autopilot's units."""
         return {name: value for name, value, stated in self.values if stated == origin}
 
     @property
@@ -259,10 +265,10 @@ class ParameterSet:
         return find_misfits(self.values, self.table.orders)
 
 
-def _refused(where: TextLine | str, name: str, value: float, allowed: str) -> ParameterError:
-    """Make the error of a value.
+def _value_error(where: TextLine | str, name: str, value: float, allowed: str) -> ParameterError:
+    """Return the error for a value that is not allowed.
 
-    where: its line; or the source of recorded parameters, which the message does not name.
+    where: the line of the value, or the source of recorded parameters, which the message does not name.
     """
     at, file = (f"{where}: ", where.file) if isinstance(where, TextLine) else ("", where)
     return ParameterError(f"{at}{name}: {value:g}: {allowed}", file=file, field=name, value=value, allowed=allowed)

@@ -1,4 +1,4 @@
-"""Autopilot that is an external program, and its flight."""
+"""Define the interface of an autopilot that is an external program, and of its flight."""
 
 from abc import abstractmethod
 from contextlib import AbstractContextManager
@@ -15,7 +15,7 @@ from flight.simulation.setup import FlightSetup
 
 
 class ProgramFlight(Airborne, AbstractContextManager["ProgramFlight"]):
-    """Flight of an external program in lockstep with planfly's physics; on exit the program has ended."""
+    """Flight of an external program in lockstep with planfly's physics; leaving the context ends the program."""
 
     @abstractmethod
     def prepare(self) -> None:
@@ -26,7 +26,7 @@ class ProgramFlight(Airborne, AbstractContextManager["ProgramFlight"]):
 
     @abstractmethod
     def keep_log(self, target: Path) -> bool:
-        """End the program in order, and move its own log to a file; return True if there was a log."""
+        """End the program cleanly, move its own log to a file, and return True if there was a log."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class ProgramAutopilot(Autopilot):
 
     @property
     def follows_ground(self) -> bool:
-        """False: heights above terrain are sent to a program as altitudes above sea level."""
+        """False, because heights above terrain are sent to a program as altitudes above sea level."""
         return False
 
     @classmethod
@@ -59,7 +59,7 @@ class ProgramAutopilot(Autopilot):
         """
 
     def described(self, aircraft: str) -> str:
-        """Describe the program and the parameters that the user changed; before the flight its law."""
+        """Describe the program and the parameters that the user changed, or before the flight its control law."""
         return super().described(aircraft) if self.program is None else describe_program(self.program, aircraft)
 
     @property

@@ -1,4 +1,4 @@
-"""Flight characteristics of an aircraft's JSBSim model: trims, modes and step responses."""
+"""Compute the flight characteristics of an aircraft's JSBSim model: trims, modes and step responses."""
 
 import math
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class TrimRow:
 class Mode:
     """A natural mode of the aircraft.
 
-    root: eigenvalue, 1/s; of a complex pair the one with positive imaginary part.
+    root: eigenvalue, 1/s; for a complex pair, the eigenvalue with positive imaginary part.
     """
 
     name: str
@@ -87,7 +87,7 @@ class StepResponse:
 
 
 def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
-    """Return level flights at evenly spaced speeds that guidance may use, where there is a trim.
+    """Return the trimmed level flights at evenly spaced speeds that guidance may use, without speeds that have no trim.
 
     >>> from aircraft.catalog import load_aircraft
     >>> slow, fast = trim_table(load_aircraft("aerosonde"), 2)
@@ -130,8 +130,9 @@ def modes_at(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_AMSL) -> tu
 def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
     """Name the modes of A (8, 8), states as in `flight.dynamics.trim.linearise`, by their eigenvectors.
 
-    Longitudinal, from fast to slow: short period, phugoid. Lateral: an oscillation is the Dutch roll, and a second,
-    slower one is the roll-spiral; of the real roots the faster is roll, the slower spiral.
+    The longitudinal modes are, from fast to slow, short period and phugoid. A lateral oscillation is the Dutch roll,
+    and a second, slower oscillation is the roll-spiral; the faster real root is roll, and the slower real root is
+    spiral.
     """
     roots, vectors = np.linalg.eig(a)
     # Convert speeds to angles, so that the components of an eigenvector can be compared.
@@ -154,9 +155,10 @@ def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
 def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
     """Return the responses to each control alone, without guidance, from level flight at cruise.
 
-    Each control moves by a tenth of its travel: less would be lost in the play of some models' actuators. Elevator (up)
-    and throttle (down if there is not that much left) stay; aileron and rudder return after a second, because no
-    aircraft stays upright with them held. A control without effect, such as a flying wing's rudder, is left out.
+    Each control moves by a tenth of its travel, because less would be lost in the play of some models' actuators.
+    Elevator (up) and throttle (down if it cannot open that much further) stay; aileron and rudder return after a
+    second, because no aircraft stays upright with them held. A control without effect, such as a flying wing's rudder,
+    is left out.
 
     >>> from aircraft.catalog import load_aircraft
     >>> for step in step_responses(load_aircraft("aerosonde")):
@@ -195,10 +197,10 @@ def _step_response(
         fdm.write(moved if _STEP_TIME_S <= k / _RATE_HZ < _STEP_TIME_S + held else commands)
         fdm.step()
         states[k + 1] = fdm.read()
-    change = np.column_stack([_unwrapped(states, name) - states[name][0] for name in quantities])
+    change = np.column_stack([_unwrap_states(states, name) - states[name][0] for name in quantities])
     return StepResponse(control, size, held, states["time"].copy(), quantities, change)
 
 
-def _unwrapped(states: NDArray[np.record], name: str) -> Floats:
+def _unwrap_states(states: NDArray[np.record], name: str) -> Floats:
     values: Floats = states[name]
     return np.unwrap(values) if name == "yaw" else values

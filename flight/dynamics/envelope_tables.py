@@ -31,9 +31,9 @@ _TABLE_NAMES = (*TABLES, *POWERS)
 def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelope:
     """Return the aircraft's envelope, from the cache if possible, otherwise computed and cached.
 
-    Both are equal to the last bit. A cache file that is unreadable, damaged or for another model, JSBSim or schema is
-    computed again; a cache folder without write permission is left alone. Raise FlightError for a model that JSBSim
-    cannot load.
+    The cached and the computed envelope are identical. A cache file that is unreadable, damaged or for another model,
+    JSBSim or schema is computed again; a cache folder without write permission is left alone. Raise FlightError for a
+    model that JSBSim cannot load.
 
     >>> from aircraft.catalog import load_aircraft
     >>> climb, descent = load_envelope(load_aircraft("aerosonde")).air_angles(25.0, 500.0)
@@ -41,8 +41,8 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     13.6 degrees up, 7.7 down
     """
     file = cache_file(aircraft, motor_braking)
-    key = _key(aircraft, motor_braking)
-    tables = _read(file, key, _airspeeds(aircraft))
+    key = _cache_key(aircraft, motor_braking)
+    tables = _read(file, key, _grid_airspeeds(aircraft))
     if tables is None:
         tables = compute_tables(aircraft, motor_braking)
         write_tables(file, key, tables)
@@ -73,10 +73,10 @@ def cache_file(aircraft: Aircraft, motor_braking: bool) -> Path:
 def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]:
     """Compute the tables of `aircraft.envelope.Envelope` by name, with a trim at each grid point.
 
-    In still standard atmosphere at 45 degrees latitude on a course due north.
+    The trims are in still standard atmosphere, at 45 degrees latitude, on a course due north.
     """
     fdm = Fdm(aircraft, motor_braking=motor_braking)
-    airspeeds = _airspeeds(aircraft)
+    airspeeds = _grid_airspeeds(aircraft)
     climb = np.full((airspeeds.size, _GRID_AMSL_M.size), math.nan)
     descent = climb.copy()
     powers = {name: climb.copy() for name in POWERS}
@@ -118,12 +118,12 @@ def _power(fdm: Fdm, at: Trim) -> float:
     return float(fdm.read().power)
 
 
-def _airspeeds(aircraft: Aircraft) -> Floats:
-    """Return the airspeeds (v,) from the stall to 5 m/s above the highest that guidance may use, m/s."""
+def _grid_airspeeds(aircraft: Aircraft) -> Floats:
+    """Return the airspeeds of the grid, from the stall to 5 m/s above guidance's maximum, (v,) m/s."""
     return np.linspace(math.ceil(aircraft.stall_speed), math.ceil(aircraft.airspeed_max) + 5.0, _AIRSPEED_COUNT)
 
 
-def _key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
+def _cache_key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
     return {
         "schema": _SCHEMA_VERSION,
         "aircraft": aircraft.name,

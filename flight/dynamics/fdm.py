@@ -1,7 +1,7 @@
-"""Flight-dynamics model: one JSBSim instance, with state and commands in SI units.
+"""Wrap one JSBSim instance as a flight-dynamics model, with state and commands in SI units.
 
-The only module that imports JSBSim; feet and slugs stay in it and in `flight.dynamics.jsbsim_properties`. JSBSim never
-reports an error: after a NaN, below ground or after a crash it continues. The caller must check the state that it
+Only this module imports JSBSim; feet and slugs are used only here and in `flight.dynamics.jsbsim_properties`. JSBSim
+never reports an error: after a NaN, below ground or after a crash it continues. The caller must check the state that it
 reads.
 """
 
@@ -60,7 +60,7 @@ from world.kernels import Record, field_names
 
 @contextmanager
 def silence() -> Iterator[None]:
-    """Discard standard output: JSBSim prints its banner at every debug level.
+    """Discard standard output, because JSBSim prints its banner at every debug level.
 
     Its C++ side writes to file descriptor 1, its Python side to ``sys.stdout``.
     """
@@ -109,7 +109,7 @@ def load_model(
 ) -> None:
     """Check a model, copy it into an empty folder, and load it from there.
 
-    It is copied because some models write into their own folder.
+    The model is copied because some models write into their own folder.
 
     instance: a JSBSim instance without a model, made for this folder.
     dt: time step, s.
@@ -182,7 +182,7 @@ _PACK_STATE: Callable[..., None] = struct.Struct(f"{len(_STATE_FIELDS)}d").pack_
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """Changes to the published model for validation and robustness: factors, and the parasite drag itself.
+    """Changes to the published model for validation and robustness tests, as factors and as a parasite drag.
 
     mass, drag: factors on the whole aircraft's mass and drag.
     control: factor on the moments of the control surfaces.
@@ -249,7 +249,7 @@ class Fdm:
             raise FlightError(f"rate_hz = {rate_hz} is not a positive number", field="rate_hz", value=rate_hz)
         self.aircraft = aircraft
         self.dt = 1.0 / rate_hz
-        self._exec = _load(aircraft, self.dt, flat_earth, tried or aircraft.embedded, gear)
+        self._exec = _new_instance(aircraft, self.dt, flat_earth, tried or aircraft.embedded, gear)
         access = PropertyAccess(self._exec.get_property_manager(), aircraft.model_file)
         self.properties = access
         if flat_earth:
@@ -420,7 +420,7 @@ class Fdm:
             setter(value / FOOT)
 
     def loop_access(self) -> LoopAccess:
-        """Return the functions that a fast loop reads and sets this instance with."""
+        """Return the functions with which a fast loop reads and sets this instance."""
         commands = self.aircraft.model.commands
         names = [*(command.name for command in commands), *GUST, TERRAIN]
         return LoopAccess(
@@ -432,16 +432,13 @@ class Fdm:
         )
 
     def specific_force(self) -> tuple[float, float, float]:
-        """Return the specific force at the center of gravity along the body axes, m/s^2.
-
-        Accelerometers there would measure it.
-        """
+        """Return the specific force along the body axes, as measured at the center of gravity, m/s^2."""
         x, y, z = self._forces
         share = FOOT / self._mass()
         return x() * share, y() * share, z() * share
 
     def height(self) -> float:
-        """Return the height above the ground last set, m; negative below ground, where JSBSim flies on."""
+        """Return the height above the last ground set, m; negative below ground, where JSBSim flies on."""
         return self._height() * FOOT
 
     # Functions for trims and linearization.
@@ -475,7 +472,7 @@ class Fdm:
     def derivatives(self, states: Floats, commands: Floats) -> Floats:
         """Return the rates (8,) of the states (u, v, w, p, q, r, roll, pitch) with these commands (4,).
 
-        Surfaces and motor are at their commands. An engine keeps the speed of the last `balance`.
+        Surfaces and motor are at their commanded values. An engine keeps the speed of the last `balance`.
         """
         roll, pitch = states[6], states[7]
         axes = body_axes(self._heading, pitch, roll, 0.0)
@@ -516,7 +513,7 @@ def _apply_variation(properties: PropertyAccess, aircraft: Aircraft, variation: 
         properties.set(name, value)
 
 
-def _load(aircraft: Aircraft, dt: float, flat_earth: bool, tried: bool, gear: Gear | None) -> jsbsim.FGFDMExec:
+def _new_instance(aircraft: Aircraft, dt: float, flat_earth: bool, tried: bool, gear: Gear | None) -> jsbsim.FGFDMExec:
     with silence(), temporary_folder("planfly-model-") as copy:
         instance = jsbsim.FGFDMExec(str(copy))
         load_model(instance, copy, aircraft, dt, flat_earth=flat_earth, tried=tried, gear=gear)

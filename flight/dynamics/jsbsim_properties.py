@@ -1,4 +1,4 @@
-"""JSBSim properties that all models have, and its units: feet, slugs and pounds."""
+"""Access the JSBSim properties that all models have, and convert JSBSim's units, feet, slugs and pounds."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -139,5 +139,5 @@ class PropertyAccess:
 
 
 def _read_zero() -> float:
-    """Return zero, the reading of an aircraft without this quantity."""
+    """Return zero, as the reading of a quantity that the aircraft lacks."""
     return 0.0

@@ -36,7 +36,7 @@ _PART_ELEMENTS = frozenset({"engine", "tank", "contact", "thruster"})
 
 
 class _Reader:
-    """Collector of property names from one file's XML events; it stops at the first forbidden element.
+    """Collects the property names from one file's XML events, and stops at the first forbidden element.
 
     main: True for the model itself, False for a file that it includes.
     remove_channels: True to note ``<input>`` and ``<output>`` channels for removal instead of refusing them.
@@ -58,7 +58,7 @@ class _Reader:
         self._parser = expat.ParserCreate()
         self._parser.StartElementHandler = self._start
         self._parser.EndElementHandler = self._end
-        self._parser.CharacterDataHandler = self._text_seen
+        self._parser.CharacterDataHandler = self._collect_text
         self._parser.StartDoctypeDeclHandler = self._doctype
 
     def read(self) -> None:
@@ -133,7 +133,7 @@ class _Reader:
         elif name in _READING_ELEMENTS:
             self.read_names.setdefault(match[1], self._parser.CurrentLineNumber)
 
-    def _text_seen(self, text: str) -> None:
+    def _collect_text(self, text: str) -> None:
         self._text.append(text)
 
 
@@ -142,9 +142,9 @@ def check_model(
 ) -> dict[str, bytes]:
     """Refuse a model that is unsafe for JSBSim, and return its files by name, as JSBSim may read them.
 
-    provided: test whether JSBSim itself has a property of a name before a model is loaded.
+    provided: function that returns True if JSBSim itself has a property of this name before a model is loaded.
     folders: folders of the files that the model includes.
-    shipped: True for JSBSim's own model: its channels are removed, and its names are known to be valid.
+    shipped: True for JSBSim's own model, whose channels are removed and whose names are known to be valid.
 
     Raise FlightError, naming file and line, for a file that cannot be read or is not well formed, for a document type
     declaration, for an ``<input>`` or ``<output>`` channel, for an included file that is not in the folders, and for a
@@ -155,7 +155,7 @@ def check_model(
     while waiting:
         reader = waiting.pop()
         for name, where in reader.brings.items():
-            found = _find(name, folders)
+            found = _find_file(name, folders)
             if found is None:
                 message = f"{reader.file}:{where} brings in another file, which is not in the aircraft's folder"
                 raise FlightError(message, file=reader.file, field="file", value=name)
@@ -173,8 +173,8 @@ def _read(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
     return reader
 
 
-def _find(name: str, folders: Sequence[Path]) -> Path | None:
-    """Return the file of this name, with or without its suffix; never outside the folders."""
+def _find_file(name: str, folders: Sequence[Path]) -> Path | None:
+    """Return the file of this name, with or without its suffix, if it is inside the folders."""
     if Path(name).name != name or name.startswith("."):
         return None
     names = (name, f"{name}.xml")
@@ -218,10 +218,10 @@ except FlightError:
 
 
 def try_model(aircraft: Aircraft) -> None:
-    """Load and step a model in another process, once for each version of it.
+    """Load and step a model in another process, once for each version of the model.
 
-    Raise FlightError if that process dies. If it only refuses the model, nothing is raised: loading the model here will
-    refuse it again, with the reason.
+    Raise FlightError if that process dies. If it only refuses the model, nothing is raised, because loading the model
+    in this process will refuse it again, with the reason.
     """
     code = _try(str(aircraft.folder), model_hash(aircraft))
     if code not in {0, _REFUSED}:

@@ -1,4 +1,4 @@
-"""State and commands exchanged between JSBSim and the guidance core, in SI units and radians."""
+"""Define the state and commands that JSBSim and the guidance core exchange, in SI units and radians."""
 
 from typing import NamedTuple
 

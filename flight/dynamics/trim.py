@@ -1,7 +1,7 @@
-"""Steady straight flight: controls and attitude without acceleration, and linear dynamics about it.
+"""Find steady straight flights, with controls and attitude without acceleration, and the linear dynamics about them.
 
-A trim has eight quantities, `QUANTITIES`. Two are held and Newton's method finds the other six, so that the six body
-accelerations vanish. Speeds and angles are relative to the air mass.
+A trim has eight quantities, `QUANTITIES`. Two of them are held, and Newton's method finds the other six so that the
+six body accelerations vanish. Speeds and angles are relative to the air mass.
 """
 
 import math
@@ -60,7 +60,7 @@ class Engine:
             self._running = True
 
     def settle(self, *, spin: bool) -> None:
-        """Let the engine speed settle for the airspeed and throttle that are set.
+        """Let the engine speed settle for the present airspeed and throttle.
 
         Without ``spin`` the engine keeps its speed, and only quantities that depend on their own derivative (the lift
         of a changing angle of attack) settle.
@@ -131,7 +131,7 @@ class Trim:
     throttle: float
 
     def commands(self) -> Commands:
-        """Return the commands that hold it."""
+        """Return the commands of this flight."""
         return Commands(self.elevator, self.aileron, self.rudder, self.throttle)
 
     def vector(self) -> Floats:
@@ -158,35 +158,35 @@ class Simulator(Protocol):
         """Return the rates (8,) of the states (u, v, w, p, q, r, roll, pitch) with these commands."""
 
 
-def solve(
+def solve_trim(
     balance: Callable[[Floats], Floats],
     held: Mapping[TrimQuantity, float],
     limits: tuple[float, float, float],
     start: Floats | None = None,
 ) -> Floats | None:
-    """Return the trim vector (8,) with two quantities held, or None if there is no such flight.
+    """Find the trim vector (8,) with two quantities held, or None if the iteration does not converge.
 
-    balance: trim vector -> (6,) accelerations.
-    limits: limits of elevator, aileron, rudder.
-    start: (8,) first guess.
+    balance: maps a trim vector to its accelerations, (6,).
+    limits: elevator, aileron and rudder limits.
+    start: first guess, (8,).
 
-    Newton's method with one-sided differences; a step is limited to `_MAX_NEWTON_STEP`, and halved while it increases
-    the residual.
+    Use Newton's method with one-sided differences. Limit each step to `_MAX_NEWTON_STEP`, and halve it while it does
+    not reduce the residual.
     """
     values = (first_guess(25.0) if start is None else start).copy()
     for quantity, value in held.items():
         values[QUANTITIES.index(quantity)] = value
     free = np.array([k for k, quantity in enumerate(QUANTITIES) if quantity not in held])
-    lowest, highest = _bounds(limits)
+    lowest, highest = _trim_bounds(limits)
     residual = balance(values)
-    least, stalled_steps, failed_halvings = math.inf, 0, 0
+    least, stalled_steps, failed_steps = math.inf, 0, 0
     for _ in range(_MAX_ITERATIONS):
         size = float(np.abs(residual).max())
         if size < _MAX_TRIM_ACCELERATION or not np.isfinite(size):
             break
         least, stalled_steps = (size, 0) if size < 0.5 * least else (least, stalled_steps + 1)
         if size > 10.0 * _MAX_TRIM_ACCELERATION and (
-            failed_halvings >= _MAX_FAILED_HALVINGS or stalled_steps >= _MAX_STALLED_STEPS
+            failed_steps >= _MAX_FAILED_HALVINGS or stalled_steps >= _MAX_STALLED_STEPS
         ):
             break
         columns = []
@@ -207,12 +207,12 @@ def solve(
                 break
             step = 0.5 * step
         else:
-            failed_halvings += 1
+            failed_steps += 1
         values, residual = trial, changed
     return values if np.abs(residual).max() < 10.0 * _MAX_TRIM_ACCELERATION else None
 
 
-def _bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
+def _trim_bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
     elevator, aileron, rudder = limits
     lowest = np.array([5.0, -1.2, -0.4, -0.5, -elevator, -aileron, -rudder, 0.0])
     highest = np.array([80.0, 1.2, 0.4, 0.5, elevator, aileron, rudder, 1.0])
@@ -222,13 +222,13 @@ def _bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
 def trim(
     simulator: Simulator, amsl: float, held: Mapping[TrimQuantity, float], near: Trim | None = None
 ) -> Trim | None:
-    """Return the steady flight at this altitude with two of its quantities held, or None if there is none.
+    """Return the steady flight at this altitude with two of its quantities held, or None if no trim is found.
 
     near: a trim to start from.
     """
     simulator.move_to(amsl)
     start = near.vector() if near else simulator.first_guess()
-    values = solve(simulator.balance, held, simulator.surface_limits(), start)
+    values = solve_trim(simulator.balance, held, simulator.surface_limits(), start)
     return None if values is None else from_vector(values, amsl)
 
 
@@ -267,10 +267,7 @@ def full_throttle(simulator: Simulator, airspeed: float, amsl: float, near: Trim
 
 
 def idle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return the steepest steady descent at this airspeed (m/s) and altitude (m), or None.
-
-    The throttle is closed.
-    """
+    """Return the steepest steady descent, with closed throttle, at this airspeed (m/s) and altitude (m), or None."""
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, near)
 
 
@@ -285,10 +282,10 @@ def slowest(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim
 
 
 def linearise(simulator: Simulator, at: Trim) -> tuple[Floats, Floats]:
-    """Return A (8, 8) and B (8, 4) about a trim, by central differences.
+    """Return the matrices A (8, 8) and B (8, 4) of the linear dynamics about a trim, by central differences.
 
-    States u, v, w, p, q, r, roll, pitch (m/s, rad/s, rad; velocity relative to the air); commands in the order of
-    `flight.dynamics.state.Commands`, without actuator and motor lags. Altitude and course are held.
+    The states are u, v, w, p, q, r, roll, pitch (m/s, rad/s, rad; velocity relative to the air). The commands are in
+    the order of `flight.dynamics.state.Commands`, without actuator and motor lags. Altitude and course are held.
     """
     simulator.move_to(at.amsl)
     roll, pitch = attitude(at)

@@ -1,4 +1,4 @@
-"""Conversion of equivalent airspeed, which sensors measure and autopilots use, to true airspeed."""
+"""Convert equivalent airspeed, which sensors measure and autopilots use, to true airspeed."""
 
 from world.kernels import compiled
 
@@ -14,6 +14,6 @@ _MAX_ALTITUDE_M = 11_000.0
 def true_by_equivalent(amsl: float) -> float:
     """Return the ratio of true to equivalent airspeed in the standard atmosphere at an altitude, m.
 
-    It is 1.05 at 1,000 m.
+    The ratio is 1.05 at 1,000 m.
     """
     return (1.0 - _LAPSE_PER_M * min(_MAX_ALTITUDE_M, amsl)) ** (-0.5 * _DENSITY_POWER)

@@ -1,4 +1,4 @@
-"""Gains of guidance and inner loops for an aircraft, read from ``aircraft/<name>/gains.toml``."""
+"""Read the gains of guidance and inner loops for an aircraft from ``aircraft/<name>/gains.toml``."""
 
 import math
 from dataclasses import MISSING, asdict, dataclass, fields
@@ -41,7 +41,7 @@ class Gains:
     Cross-track:
 
     cross_track_frequency, cross_track_damping, cross_track_integral: second-order cross-track law.
-    intercept: steepest course to the path from far away.
+    intercept: maximum angle between course and path when far from the path.
     turn_lead, turn_smoothing: lead time of the path's curvature in the feedforward, and averaging time about that
         point.
     aside_frequency: frequency of the return to the path after the offset from rolling into an arc.
@@ -62,7 +62,7 @@ class Gains:
     yaw_rate_gain: yaw damping.
     sideslip_gain: rudder per rad of sideslip.
 
-    Reference laws, which have defaults, as have gains that an aircraft can do without:
+    Reference laws, whose gains have defaults, like other gains that an aircraft may omit:
 
     l1_period, l1_damping, l1_integral: ArduPlane's NAVL1_PERIOD, NAVL1_DAMPING and NAVL1_XTRACK_I, and its defaults.
     field_approach: course to the path far from it.

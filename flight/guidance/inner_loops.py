@@ -1,4 +1,4 @@
-"""Inner loops on roll, pitch and yaw rate, shared by all control laws, and the memory of the guidance."""
+"""Implement the inner loops on roll, pitch and yaw rate, which all control laws share, and the memory of guidance."""
 
 import math
 
@@ -64,7 +64,7 @@ GUIDANCE_MEMORY = record_dtype(
 def steer_elevator(
     state: Record, gains: Record, memory: Record, commands: Record, climb_rate: float, push: float
 ) -> None:
-    """Set the elevator for an upward acceleration ``push`` (m/s^2), by load factor and angle of attack.
+    """Set the elevator for an upward acceleration ``push`` (m/s^2) by way of load factor and angle of attack.
 
     climb_rate: m/s.
     """
@@ -91,7 +91,7 @@ def steer_elevator(
 
 @inner
 def roll_model(wanted: float, bank: float, rate: float, gains: Record, dt: float) -> tuple[float, float, float]:
-    """Return bank (rad), roll rate and roll acceleration of the model roll one tick later.
+    """Advance the model roll by one tick, and return its bank (rad), roll rate and roll acceleration.
 
     The model is a critically damped oscillator with limits of roll rate and roll acceleration.
     """
@@ -108,7 +108,7 @@ def roll_model(wanted: float, bank: float, rate: float, gains: Record, dt: float
 def follow_roll(
     state: Record, gains: Record, memory: Record, commands: Record, bank: float, rate: float, turn: float, dt: float
 ) -> None:
-    """Set aileron and rudder to follow a given roll.
+    """Set aileron and rudder so that the aircraft follows a given roll.
 
     bank: rad.
     rate: roll rate, rad/s.

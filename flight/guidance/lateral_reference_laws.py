@@ -1,4 +1,4 @@
-"""Lateral control laws of other autopilots, as formulas: L1 and the vector field.
+"""Implement the lateral control laws of other autopilots, L1 and the vector field, as formulas.
 
 L1 is the law of Park, Deyst and How ("A New Nonlinear Guidance Logic for Trajectory Tracking", AIAA 2004-4900) in
 ArduPlane's form: period and damping as parameters, a capture angle of 45 degrees, an integrator, and leg switching at a
@@ -44,7 +44,7 @@ WAYPOINT = record_dtype(
 def waypoint_column(count: int) -> Records:
     """Return `WAYPOINT` records (count,), all 0, with the memory stride of a flight's path.
 
-    Contiguous records are another type to numba, for which every control law would be compiled a second time.
+    Numba treats contiguous records as another type, and would compile every control law a second time for it.
 
     >>> waypoint_column(3).shape, waypoint_column(3).flags.c_contiguous
     ((3,), False)
@@ -74,7 +74,7 @@ def l1_length(speed: float, period: float, damping: float) -> float:
 def l1_angles(
     estimated: Record, a_east: float, a_north: float, b_east: float, b_north: float, length: float
 ) -> tuple[float, float]:
-    """Return the angles from ground velocity to leg or waypoint, and from there to the aim point, rad.
+    """Return the angle from ground velocity to leg or waypoint, and the angle from that to the aim point, rad.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     a_east, a_north, b_east, b_north: the leg's ends, m.
@@ -117,9 +117,7 @@ def l1_acceleration(angle: float, speed: float, length: float, damping: float) -
 
 @inner
 def l1_reached(estimated: Record, a: Record, b: Record, length: float, radius: float) -> bool:
-    """Return True if L1 switches to the next leg.
-
-    It switches within the turn distance of b, or past the line through b across the leg.
+    """Return True if L1 switches to the next leg, within the turn distance of b or past the line across the leg at b.
 
     estimated: as for `l1_angles`.
     a, b: the leg's ends, of `WAYPOINT`.
@@ -140,7 +138,7 @@ def field_course(
     """Return the course that the vector field commands next to a path, rad.
 
     course: course of the path here, rad.
-    cross: m right of the path.
+    cross: distance to the right of the path, m.
     curvature: 1/m, positive to the right.
     """
     if curvature == 0.0:

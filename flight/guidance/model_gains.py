@@ -1,4 +1,4 @@
-"""Compute gains from an aircraft's linear model and from typical values for the rest, in a second.
+"""Compute an aircraft's gains in a second from its linear model, and from typical values where the model has none.
 
 The airframe's own gains come from a linear model in level flight at cruise (500 m); the roll and pitch loops are placed
 by control power, as fast as servos and airspeed allow.
@@ -77,7 +77,7 @@ _FIXED_GAINS = {
 def at_airspeed(airspeed: float) -> dict[str, float]:
     """Return `ROUND_FIGURES` scaled to an airspeed, m/s.
 
-    Gains of control surfaces are scaled with airspeed elsewhere, and stay.
+    The gains of control surfaces stay unchanged, because they are scaled with airspeed elsewhere.
     """
     ratio = airspeed / 25.0
     found: dict[str, float] = {}
@@ -93,10 +93,10 @@ def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, floa
     Raise FlightError for an aircraft that cannot hold level flight at cruise.
     """
     fdm = Fdm(aircraft) if fdm is None else fdm
-    return _airframe_gains(aircraft, *linearise(fdm, _level(aircraft, fdm)))
+    return _gains_of_matrices(aircraft, *linearise(fdm, _level_cruise(aircraft, fdm)))
 
 
-def _level(aircraft: Aircraft, fdm: Fdm) -> Trim:
+def _level_cruise(aircraft: Aircraft, fdm: Fdm) -> Trim:
     level = straight(fdm, aircraft.airspeed, AMSL)
     if level is None:
         message = f"{aircraft.name} holds no level flight at {aircraft.airspeed:g} m/s and {AMSL:g} m"
@@ -104,7 +104,7 @@ def _level(aircraft: Aircraft, fdm: Fdm) -> Trim:
     return level
 
 
-def _airframe_gains(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float]:
+def _gains_of_matrices(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float]:
     speed = aircraft.airspeed
     _, v, w, p, q, r = range(6)
     elevator, aileron, rudder = range(3)
@@ -127,7 +127,8 @@ def _airframe_gains(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float
 def idle_throttle(aircraft: Aircraft, fdm: Fdm, level: Trim) -> float:
     """Return the throttle (0..1) below which an electric motor has no thrust in this level flight.
 
-    Below it no motor current flows. Its resolution is 0.02. Return 0 for an aircraft without an electric motor.
+    Below this throttle no motor current flows. The resolution is 0.02. Return 0 for an aircraft without an electric
+    motor.
     """
     fdm.move_to(level.amsl)
     for throttle in np.arange(0.0, level.throttle, _THROTTLE_STEP).tolist():
@@ -145,9 +146,9 @@ def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
     Raise FlightError as `airframe_gains` does.
     """
     fdm = Fdm(aircraft) if fdm is None else fdm
-    level = _level(aircraft, fdm)
+    level = _level_cruise(aircraft, fdm)
     a, b = linearise(fdm, level)
-    own = _airframe_gains(aircraft, a, b)
+    own = _gains_of_matrices(aircraft, a, b)
     placed = (
         at_airspeed(aircraft.airspeed) | own | _FIXED_GAINS | {"throttle_idle": idle_throttle(aircraft, fdm, level)}
     )

@@ -1,7 +1,7 @@
-"""Estimated state that guidance uses: true position and velocity plus a time-correlated error.
+"""Compute the estimated state for guidance as true position and velocity plus a time-correlated error.
 
-Each axis has a second-order Gauss-Markov error, typical of an estimator that blends satellite and inertial navigation:
-it varies smoothly, and the velocity error is its rate. The autocorrelation is (1 + t / T) exp(-t / T).
+Each axis has a second-order Gauss-Markov error, typical of an estimator that blends satellite and inertial navigation.
+The error varies smoothly, and the velocity error is its rate. The autocorrelation is (1 + t / T) exp(-t / T).
 """
 
 import math
@@ -49,9 +49,9 @@ def navigate(
         for name in literal_unroll(_MOTION_FIELDS):
             estimated[name] = true[name]
         return
-    east, velocity_east = _error(lags, 0, noise, sigma, time_constant, dt)
-    north, velocity_north = _error(lags, 1, noise, sigma, time_constant, dt)
-    up, velocity_up = _error(lags, 2, noise, sigma, time_constant, dt)
+    east, velocity_east = _step_error(lags, 0, noise, sigma, time_constant, dt)
+    north, velocity_north = _step_error(lags, 1, noise, sigma, time_constant, dt)
+    up, velocity_up = _step_error(lags, 2, noise, sigma, time_constant, dt)
     estimated.east = true.east + east
     estimated.north = true.north + north
     estimated.up = true.up + up
@@ -61,10 +61,10 @@ def navigate(
 
 
 @inner
-def _error(
+def _step_error(
     lags: Record, axis: int, noise: Floats, sigma: float, time_constant: float, dt: float
 ) -> tuple[float, float]:
-    """Return the errors of position (m) and velocity (m/s) on one axis, one tick later."""
+    """Advance the error of one axis by a tick, and return the errors of position (m) and velocity (m/s)."""
     decay = math.exp(-dt / time_constant)
     # The second lag's variance is half of the first lag's variance.
     scale = sigma * math.sqrt(2.0)

@@ -1,9 +1,9 @@
-"""Fly-by path of a fixed wing: straight legs joined by fly-by arcs, slopes joined by parabolas.
+"""Compute the fly-by path of a fixed wing, with legs joined by fly-by arcs and slopes joined by parabolas.
 
 A fly-by arc has the bank-limited radius for the highest ground speed in the turn, and the corners of a loiter have the
 loiter's radius. If the legs are too short for their turns, arcs are drawn tighter than the bank limit so that the path
-stays continuous: the flight will then leave it, and the verdict says so. A fly-over waypoint is passed through: its
-corner stays sharp, as do U-turns.
+stays continuous; the flight will then leave the path, and the verdict says so. The path goes through a fly-over
+waypoint, whose corner stays sharp, like the corner of a U-turn.
 """
 
 import math
@@ -77,7 +77,7 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
 
 @inner
 def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:
-    """Update the position along the path in the memory, and return the path's course there, rad.
+    """Update the position along the path in the memory, and return the path's course at that position, rad.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     pieces: of `PIECE`.
@@ -217,7 +217,7 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, sw
     ([883.0, 183.0, 883.0], 117)
     """
     points = route.waypoints
-    courses, runs, turns = leg_courses(points), leg_runs(points), _turns(route, swing)
+    courses, runs, turns = leg_courses(points), leg_runs(points), _turn_angles(route, swing)
     tangents, radii, back = _arcs_at_waypoints(route, limits, courses, runs, turns)
     back *= swing != "none"
     pieces: list[tuple[float, ...]] = []
@@ -229,7 +229,7 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, sw
         straight = runs[leg] - tangents[leg] - back[leg] - tangents[leg + 1]
         course = float(courses[leg])
         if terrain is not None and math.isfinite(route.above_ground[leg + 1]):
-            nodes += _ground_profile_corners(route, terrain, leg, begin, course, at, straight)
+            nodes += _ground_following_corners(route, terrain, leg, begin, course, at, straight)
         if straight > 1e-6 or not pieces:
             pieces.append((at, straight, *begin, course, 0.0, leg, math.inf))
             at += straight
@@ -258,7 +258,7 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, sw
 
 
 def reversals(route: Route) -> NDArray[np.int64]:
-    """Return the indices of fly-over waypoints that reverse the course: either turn side is possible.
+    """Return the indices of fly-over waypoints that reverse the course, so that a turn to either side is possible.
 
     >>> way = np.array([[0.0, 0.0, 90.0], [0.0, 900.0, 90.0], [60.0, 0.0, 90.0], [900.0, 0.0, 90.0]])
     >>> over = np.array([False, True, True, False])
@@ -269,7 +269,7 @@ def reversals(route: Route) -> NDArray[np.int64]:
     return np.flatnonzero(route.fly_over & (turns > math.pi - REVERSAL_SIDE_TOLERANCE_RAD))
 
 
-def _turns(route: Route, swing: Swing) -> Floats:
+def _turn_angles(route: Route, swing: Swing) -> Floats:
     """Return the turn at each inner waypoint, (w - 2,) rad, positive to the right; see `fly_by_path`."""
     turns = signed_turns(route.waypoints)
     if swing == "long":
@@ -278,7 +278,7 @@ def _turns(route: Route, swing: Swing) -> Floats:
     return turns
 
 
-def _ground_profile_corners(
+def _ground_following_corners(
     route: Route, terrain: Terrain, leg: int, begin: Floats, course: float, at: float, straight: float
 ) -> list[tuple[float, float]]:
     """Return corners (distance along the path, altitude; m) of the altitude profile of a leg above ground.
@@ -308,8 +308,8 @@ def _arcs_at_waypoints(
 ) -> tuple[Floats, Floats, Floats]:
     """Return the arcs at each waypoint, (w,) m each.
 
-    They are the tangent lengths of fly-by arcs, shortened if a leg is too short for them; the radii; and, for waypoints
-    that are flown over, the length of the next leg until the path is back on it, 0 if that leg is too short.
+    The results are the tangent lengths of fly-by arcs, shortened if a leg is too short for them; their radii; and, for
+    waypoints that are flown over, the length of the next leg until the path is back on it, 0 if that leg is too short.
     """
     count = len(route.waypoints)
     tangents, radii, back = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -347,7 +347,7 @@ def _arcs_at_waypoints(
 def _overshoot_angle(turn: float) -> float:
     """Return the angle by which a fly-over turn (rad) overshoots the next course.
 
-    It follows from cos phi = (1 + cos turn) / 2.
+    The angle phi follows from cos phi = (1 + cos turn) / 2.
     """
     return math.acos(0.5 * (1.0 + math.cos(turn)))
 
@@ -355,7 +355,7 @@ def _overshoot_angle(turn: float) -> float:
 def _fly_over_arcs(
     corner: Floats, course: float, turn: float, radius: float
 ) -> list[tuple[Floats, float, float, float]]:
-    """Return the arcs of a fly-over turn: start (2,) m, course there (rad), curvature (1/m), length (m).
+    """Return the arcs of a fly-over turn, each as start (2,) m, course at the start (rad), curvature (1/m), length (m).
 
     Two arcs turn past the next leg's course, each by an angle small enough for `flight.guidance.path.project` to tell
     its direction, and the third leads back onto that leg.
@@ -447,7 +447,7 @@ def _set_circles(corners: Records, route: Route) -> None:
 
 
 def _set_loiters(waypoints: Records, items: dict[int, MissionItem]) -> None:
-    """Set how each corner's loiter ends, according to its item."""
+    """Set the end condition of each corner's loiter according to its item."""
     waypoints["stays"] = math.nan
     for k in np.flatnonzero(waypoints["circle"]).tolist():
         item = items.get(int(waypoints["item"][k]))

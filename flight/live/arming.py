@@ -1,4 +1,4 @@
-"""Arming, modes and start of the vehicle by ground stations, as a state machine without a clock."""
+"""Control arming, modes and start of the vehicle by ground stations, as a state machine without a clock."""
 
 from dataclasses import dataclass
 
@@ -65,7 +65,7 @@ class ArmingState:
     @property
     def armable(self) -> bool:
         """True if arming would be accepted now."""
-        return not self.judging and not self._why_not_armed(False)
+        return not self.judging and not self._arming_refusal(False)
 
     @property
     def starts(self) -> bool:
@@ -90,7 +90,7 @@ class ArmingState:
             return CommandResult(ACCEPTED)
         if self.judging:
             return CommandResult(IN_PROGRESS)
-        reason = self._why_not_armed(forced)
+        reason = self._arming_refusal(forced)
         if reason:
             return CommandResult(DENIED, f"arming denied: {reason}")
         self.armed = True
@@ -138,7 +138,7 @@ class ArmingState:
         self.place = Place()
 
     def diverted(self, mode: int) -> None:
-        """Note that the flight is in this mode now."""
+        """Store that the flight is in this mode now."""
         self.mode = mode
         self.mission_state = ACTIVE if mode == AUTO else PAUSED
 
@@ -152,37 +152,37 @@ class ArmingState:
         return CommandResult(ACCEPTED)
 
     def mission_uploaded(self) -> None:
-        """Note that a mission was uploaded and is being judged."""
+        """Store that a mission was uploaded and is being judged."""
         self.judging, self.mission_state = True, NOT_STARTED
 
     def mission_judged(self, judged: MissionJudged) -> str:
-        """Note a verdict; return why the vehicle was disarmed, "" if it was not."""
+        """Store a verdict, and return the reason why the vehicle was disarmed, or "" if it was not disarmed."""
         self.judging = False
         self.judged = judged
         self.mission_state = NOT_STARTED
-        reason = self._why_not_armed(False)
+        reason = self._arming_refusal(False)
         if self.armed and reason:
             self.armed = False
             return f"disarmed: {reason}"
         return ""
 
     def mission_cleared(self) -> None:
-        """Note that the mission was cleared."""
+        """Store that the mission was cleared."""
         self.judging, self.judged, self.mission_state = False, None, NO_MISSION
         if self.mode == AUTO:
             self.mode = MANUAL
 
     def flight_started(self) -> None:
-        """Note that the flight has started."""
+        """Store that the flight has started."""
         self.flying, self.mission_state = True, ACTIVE
 
     def flight_ended(self, completed: bool) -> None:
-        """Note that the flight is over: disarmed, ready to fly again."""
+        """Store that the flight is over; the vehicle is then disarmed and ready to fly again."""
         self.flying = self.armed = self.end_requested = False
         self.mission_state = COMPLETE if completed and self.mode == AUTO else NOT_STARTED
         self.mode, self.place = MANUAL, None
 
-    def _why_not_armed(self, forced: bool) -> str:
+    def _arming_refusal(self, forced: bool) -> str:
         if self.judged is None:
             return ""
         if not self.judged.possible:

@@ -1,4 +1,4 @@
-"""Flight process of the live vehicle, apart from the link since JSBSim holds the interpreter's lock.
+"""Run the flight of the live vehicle in its own process, because JSBSim holds the interpreter's lock.
 
 Requests arrive over a pipe and events go back: a state snapshot as packed bytes, everything else pickled.  Both ends
 belong to planfly; nothing from a station is ever unpickled.
@@ -19,7 +19,7 @@ belong to planfly; nothing from a station is ever unpickled.
 | `FlightEnded` | when the aircraft stops |
 | `FlightJudged` | for each log that is closed: one, and one more for each diversion |
 
-A diversion ends one flight and begins the next in the air: each has its setup, its log and its verdict.
+A diversion ends one flight and begins the next in the air; each flight has its own setup, log and verdict.
 """
 
 import math
@@ -84,8 +84,10 @@ class StartFlight:
 class Place:
     """Center of a loiter.
 
-    lat_deg, lon_deg: NaN for the aircraft's position.  alt: m in the frame, NaN for the aircraft's altitude.
-    frame: MAV_FRAME.  radius: m, 0 for the autopilot's own.
+    lat_deg, lon_deg: NaN for the aircraft's position.
+    alt: m in the frame, NaN for the aircraft's altitude.
+    frame: MAV_FRAME.
+    radius: m, 0 for the autopilot's own radius.
     """
 
     lat_deg: float = math.nan
@@ -144,9 +146,10 @@ class MissionJudged:
 
 @dataclass(frozen=True, slots=True)
 class FlightDiverted:
-    """Event: the aircraft is on another route, or cannot be and flies on.
+    """Event: the aircraft is on another route, or flies on because it cannot be diverted.
 
-    mode: of the flight now.  problem: reason why it cannot, "" if it is diverted.
+    mode: mode of the flight now.
+    problem: reason why it cannot be diverted, "" if it is diverted.
     items: seq of the item at each waypoint, -1 for no item.
     """
 
@@ -193,7 +196,7 @@ class LogSink(Protocol):
         """
 
     def abandon(self) -> None:
-        """Close the log of a flight that could not go on."""
+        """Close the log of a flight that could not continue."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,7 +210,7 @@ class PreparedFlight:
 class FlightFactory(Protocol):
     """Application's part of the flight process.
 
-    speed: times real time.
+    speed: speed of the flight relative to real time.
     """
 
     aircraft: Aircraft
@@ -292,7 +295,7 @@ class _RequestQueue:
         return self._early.popleft() if self._early else self._connection.recv()
 
     def waiting(self) -> object:
-        """Return the next request, or None if no request waits."""
+        """Return the next request without blocking, or None; return EndFlight(quit=True) if the link is gone."""
         if not self._early and not self._connection.poll():
             return None
         try:
@@ -301,7 +304,7 @@ class _RequestQueue:
             return EndFlight(quit=True)
 
     def ending(self) -> bool:
-        """Return True if the process is to end, by a request or because the link is gone; none is removed."""
+        """Return True if a request or a closed link asks the process to end; no request is removed."""
         try:
             while self._connection.poll():
                 self._early.append(self._connection.recv())
@@ -313,7 +316,7 @@ class _RequestQueue:
 def _run_flight(
     connection: Connection, requests: _RequestQueue, prepared: PreparedFlight, factory: FlightFactory
 ) -> bool:
-    """Fly in real time; return False when the process is to end."""
+    """Fly in real time, and return False if the process is to end."""
     try:
         flight = Flight(prepared.setup, factory.aircraft, local_map=prepared.local_map)
         log = factory.open_log(prepared.setup, AUTO)
@@ -358,7 +361,7 @@ class _LoggedFlight:
         self._loiter_logs = 0
 
     def run_in_real_time(self) -> tuple[str, bool]:
-        """Step the flight by the clock; return how it ended, and True if the process continues."""
+        """Step the flight by the clock; return the reason why it ended, and True if the process continues."""
         clock, speed = time.monotonic, self._factory.speed
         started = begun = clock()
         ticks, flushed, beat = 0, started, 0
@@ -395,7 +398,10 @@ class _LoggedFlight:
         return ended, go_on
 
     def finish(self, ended: str, hurry: Callable[[], bool]) -> list[FlightJudged]:
-        """Judge each route, and close its log; hurry: as in `LogSink.finish`."""
+        """Judge each route, and close its log.
+
+        hurry: as in `LogSink.finish`.
+        """
         endings = (*self._ends, ended)
         return [log.finish(how, hurry) for log, how in zip(self._logs, endings, strict=True)]
 
@@ -420,9 +426,9 @@ class _LoggedFlight:
         send_event(self._connection, FlightDiverted(request.mode, "", tuple(int(item) for item in route.items)))
 
     def _begin_route(self, request: DivertFlight, left: str) -> bool:
-        """Begin a route at the aircraft's position, with its own log.
+        """Begin a route at the aircraft's position, with its own log, and return False if there is no such route.
 
-        left: end of the current route.  Return False if there is no such route.
+        left: text on the end of the current route.
         """
         try:
             prepared = self._factory.divert(request, self._flight.position)

@@ -1,4 +1,4 @@
-"""The vehicle's link: one UDP socket, and the stations that it serves.
+"""Serve the vehicle's stations on one UDP socket.
 
 A station gets more than heartbeats only after it has sent a valid HEARTBEAT, or, on this machine, any message addressed
 to the vehicle, from an address that is allowed, and signed if a key is set.  The table of stations is bounded; a silent
@@ -58,7 +58,7 @@ class MavlinkFrame:
 
 
 class Decoder:
-    """Decodes frames of the dialect; bytes that are not a frame, or a damaged frame, give nothing."""
+    """Decodes frames of the dialect, and ignores damaged frames and bytes outside frames."""
 
     def __init__(self) -> None:
         self._mav = mavlink.MAVLink(None)
@@ -77,7 +77,7 @@ def split_frames(data: bytes) -> list[MavlinkFrame]:
     data = data[:LARGEST]
     at = 0
     while at < len(data) and len(found) < MAX_FRAMES:
-        frame = _frame_at(data, at) if data[at] in (MAGIC_V1, MAGIC_V2) else None
+        frame = _parse_frame_at(data, at) if data[at] in (MAGIC_V1, MAGIC_V2) else None
         if frame is None:
             at += 1
         else:
@@ -86,7 +86,7 @@ def split_frames(data: bytes) -> list[MavlinkFrame]:
     return found
 
 
-def _frame_at(data: bytes, at: int) -> MavlinkFrame | None:
+def _parse_frame_at(data: bytes, at: int) -> MavlinkFrame | None:
     """Return the frame that starts at an offset, or None if no whole frame starts there."""
     is_v2 = data[at] == MAGIC_V2
     head = 10 if is_v2 else 6
@@ -176,7 +176,7 @@ def read_key(path: Path) -> bytes:
 
 
 class Refused(Enum):
-    """Reason to distrust a frame; `Dropped` has their numbers."""
+    """Reason to distrust a frame; `Dropped` counts the frames by reason."""
 
     UNSIGNED = auto()
     FORGED = auto()
@@ -201,7 +201,7 @@ class Signing:
     _streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
 
     def refuses(self, frame: MavlinkFrame, wall: float) -> Refused | None:
-        """Return the reason to distrust a frame; None if it is signed with the key and newer than its stream.
+        """Return the reason to distrust a frame, or None if it is signed with the key and newer than its stream.
 
         A stream is a system, its component and its link id.  wall: s since 1970.  A frame with a bad signature leaves
         no trace.
@@ -217,13 +217,13 @@ class Signing:
         last = self._streams.get(stream)
         # Compared with this machine's clock, not with trusted timestamps: a series of frames cannot lead into the
         # future.
-        self.clock = max(self.clock, _timestamp(wall))
+        self.clock = max(self.clock, _signing_timestamp(wall))
         if stamp > self.clock + _MAX_LEAD_UNITS:
             return Refused.FUTURE
         if last is None:
             # Compared with this machine's clock, not with others' timestamps: a station whose clock is ahead locks no
             # other out.
-            if stamp + _MAX_LAG_UNITS < _timestamp(wall):
+            if stamp + _MAX_LAG_UNITS < _signing_timestamp(wall):
                 return Refused.OLD
             if len(self._streams) >= _MAX_STREAMS:
                 return Refused.STREAMS
@@ -237,10 +237,10 @@ class Signing:
     def sign(self, packed: bytes, wall: float) -> bytes:
         """Sign a packed MAVLink 2 frame that is not signed yet.
 
-        Beyond the year 2104 timestamps stay at the largest that six bytes hold, and stations drop them as replayed.
+        After the year 2104 timestamps stay at the maximum of six bytes, and stations drop the frames as replayed.
         """
-        self.clock = max(self.clock, _timestamp(wall))
-        self.newest = min(max(self.newest + 1, _timestamp(wall)), _MAX_TIMESTAMP)
+        self.clock = max(self.clock, _signing_timestamp(wall))
+        self.newest = min(max(self.newest + 1, _signing_timestamp(wall)), _MAX_TIMESTAMP)
         number = packed[7] | packed[8] << 8 | packed[9] << 16
         body = bytearray(packed[:-2])
         body[2] |= SIGNED
@@ -250,7 +250,7 @@ class Signing:
         return signed + hashlib.sha256(self.key + signed).digest()[:6]
 
 
-def _timestamp(wall: float) -> int:
+def _signing_timestamp(wall: float) -> int:
     return min(max(0, int((wall - EPOCH) * _UNITS_PER_S)), _MAX_TIMESTAMP)
 
 
@@ -275,7 +275,7 @@ class Peer:
     """A station that has identified itself.
 
     periods: s between messages, None for a message that is off.  due: next time of each.
-    parameter: the next one to send, if it asked for all.
+    parameter: the next parameter to send, if the station requested all parameters.
     """
 
     address: Address
@@ -295,14 +295,14 @@ class Peer:
 
 @dataclass(slots=True)
 class Dropped:
-    """Numbers of dropped frames, by reason.
+    """Number of dropped frames by reason.
 
     address: datagrams from an address that is not allowed.
     unsigned, forged: without a signature, and with a signature that does not match the key.
     replayed: signed by the key, and no newer than an earlier frame of its stream.
-    old: the first of a stream, and from more than a minute ago.
+    old: first frame of a stream, and older than a minute.
     future: signed by the key, and more than a day ahead of this machine's clock.
-    streams: of more streams than are stored.
+    streams: from a stream beyond the number of stored streams.
     stranger: from another machine that has sent no HEARTBEAT.
     others: to another system, or from the vehicle itself.
     """
@@ -424,7 +424,7 @@ class Link:
         return found
 
     def take(self, data: bytes, source: Address) -> list[tuple[Any, Peer]]:
-        """Return the messages of one datagram; a HEARTBEAT among them makes the sender a peer."""
+        """Return the messages of one datagram, and register its sender as a peer if it contains a HEARTBEAT."""
         if self.access.allowed and not is_loopback(source[0]) and source[0] not in self.access.allowed:
             self.dropped.address += 1
             return []
@@ -455,13 +455,13 @@ class Link:
         return found
 
     def _is_local_request(self, message: Any, source: Address) -> bool:
-        """Return True if a message from this machine, where heartbeats are optional, addresses the vehicle."""
+        """Return True if a message from this machine, which need not send heartbeats, addresses the vehicle."""
         return (
             is_loopback(source[0]) and getattr(message, "target_system", 0) == SYSTEM and self._is_for_vehicle(message)
         )
 
     def _notice_stranger(self, message: Any, host: str) -> None:
-        """Add a notice, once for each address, that it gets no answer, and why."""
+        """Add a notice, once for each address, with the reason why the address gets no answer."""
         if host in self._strangers or len(self._strangers) >= _MAX_NAMED_STRANGERS or not self._is_for_vehicle(message):
             return
         self._strangers.add(host)
@@ -516,7 +516,7 @@ class Link:
         return system in (0, SYSTEM) and component in (0, COMPONENT)
 
     def forget_silent(self) -> None:
-        """Drop the peers that have been silent for `SILENCE`."""
+        """Remove the peers that have been silent for `SILENCE`."""
         now = self.clock()
         for key in [key for key, peer in self.peers.items() if now - peer.heard >= SILENCE]:
             del self.peers[key]

@@ -1,4 +1,4 @@
-"""The vehicle's side of the MAVLink mission protocol, as a state machine without socket and clock.
+"""Implement the vehicle's side of the MAVLink mission protocol, as a state machine without socket and clock.
 
 A mission, a fence and rally points are each accepted whole or not at all: an upload is collected next to the current
 list and replaces it only when its last item has arrived and every item is valid.  One station uploads at a time;
@@ -40,7 +40,7 @@ _INT32_MAX = 2**31 - 1
 
 
 class MissionType(IntEnum):
-    """MAV_MISSION_TYPE: the list, of a vehicle's three, to which an item belongs."""
+    """MAV_MISSION_TYPE, which says to which of a vehicle's three lists an item belongs."""
 
     MISSION = 0
     FENCE = 1
@@ -63,9 +63,10 @@ def to_message(
     seq: int | None = None,
     mission_type: MissionType | None = None,
 ) -> Any:
-    """Return MISSION_ITEM_INT of an item: x and y are rounded to 1e-7 degrees, never truncated.
+    """Return an item as MISSION_ITEM_INT, with x and y rounded to 1e-7 degrees, not truncated.
 
-    seq: None keeps the item's own number.  mission_type: None takes the type of its command.
+    seq: None keeps the item's own number.
+    mission_type: None takes the type of the item's command.
 
     >>> message = to_message(MissionItem(3, 16, 0, (0.0,) * 4, 46.0, 8.0, 500.0))
     >>> message.get_type(), message.seq, message.x
@@ -95,7 +96,7 @@ def from_message(message: Any, source: str) -> MissionItem:
     ``source`` names the sender in error messages.
 
     INT32_MAX in an integer x or y is NaN (MAVLink's "unset").  A float's latitude and longitude are rounded to the
-    nearest 1e-7 degrees.  Raise MissionError, one line: item, field, value, what is allowed.
+    nearest 1e-7 degrees.  Raise MissionError with one line that names item, field, value, and the allowed values.
     """
     command, frame = int(message.command), int(message.frame)
     located = is_located(command, frame)
@@ -124,7 +125,7 @@ def from_message(message: Any, source: str) -> MissionItem:
 
 
 def uploaded(lists: dict[MissionType, tuple[MissionItem, ...]], own: Home) -> tuple[Mission, int]:
-    """Return the mission of the lists, and the offset from its items' seq to the stations' numbers.
+    """Return the mission of the lists, and the offset between its items' seq and the stations' numbers.
 
     Item 0 is home, as in ArduPilot, if it is a waypoint above mean sea level, or one with no parameter set: MAVSDK's
     `mission` plugin sends no home, and its waypoints are relative and have a radius.
@@ -156,7 +157,7 @@ def _is_home(item: MissionItem) -> bool:
 
 
 def listed(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
-    """Return the lists of a mission for stations: home first, seq without gaps, jumps to the new numbers.
+    """Return the lists of a mission for stations, with home first, seq without gaps, and jumps renumbered.
 
     >>> place = MissionItem(4, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> items, fences, rally = listed(Mission(Home(46.0, 8.0, 0.0), (place, replace(place, seq=7))))
@@ -182,7 +183,7 @@ def listed(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
 
 
 def start_problem(mission: Mission, first: int, *, in_flight: bool = False) -> str:
-    """Return why a mission cannot be flown from the item with this seq on; "" if it can.
+    """Return the reason why a mission cannot be flown from the item with this seq on, or "" if it can.
 
     in_flight: True if the leg from the aircraft to the item will be its first leg.
 
@@ -275,10 +276,12 @@ class MissionReply:
 class _Upload:
     """An upload in progress.
 
-    heard: time of its last message; first_asked, asked: first and last request for the current item, s of the caller's
-    clock.  wait: time until the next request, s.  repeated: True if any request was repeated.
-    asked_in_vain: number of requests for the first item before it arrived.  floats: True if items arrive as
-    MISSION_ITEM.
+    heard: time of the last message, s of the caller's clock.
+    first_asked, asked: times of the first and last request for the current item, s of the caller's clock.
+    wait: time until the next request, s.
+    repeated: True if any request was repeated.
+    asked_in_vain: number of requests for the first item before it arrived.
+    floats: True if items arrive as MISSION_ITEM.
     """
 
     station: Station
@@ -297,7 +300,8 @@ class _Upload:
 class _Finished:
     """An upload that was accepted.
 
-    asked, acknowledged: last request for its last item, and its last ACK, s.  left: remaining requests for that item.
+    asked, acknowledged: times of the last request for its last item, and of its last ACK, s.
+    left: number of remaining requests for that item.
     """
 
     station: Station
@@ -318,7 +322,7 @@ class MissionServer:
     lists: the vehicle's items, seq from 0 on; item 0 of a mission may be home.  changed: the lists that an upload
     replaced since the caller last cleared it.  locked: reason why the mission may not change now, "" if it may.
     go_to: flies to an item's place, at its altitude, and loiters there; latitude and longitude are NaN for the
-    aircraft's position.  Returns why it does not, "" if it does.
+    aircraft's position.  Returns the reason why it does not, or "" if it does.
     """
 
     lists: dict[MissionType, tuple[MissionItem, ...]] = field(default_factory=lambda: dict.fromkeys(MissionType, ()))
@@ -330,7 +334,7 @@ class MissionServer:
     _finished: dict[MissionType, _Finished] = field(default_factory=dict)
 
     def handle(self, message: Any, station: Station, now: float) -> list[MissionReply]:
-        """Answer a message of the protocol; any other gets no answer.
+        """Answer a message of the protocol; other messages get no answer.
 
         ``now``: s, any clock that never goes back.
         """
@@ -348,7 +352,7 @@ class MissionServer:
         return handler(self, message, station, kind, now) if handler else []
 
     def tick(self, now: float) -> list[MissionReply]:
-        """Repeat requests for missing items, or for the last item, and give up silent uploads."""
+        """Repeat requests for missing items, or for the last item, and abandon uploads of silent stations."""
         replies = []
         for kind, upload in list(self._uploads.items()):
             if now - upload.heard > UPLOAD_TIMEOUT:
@@ -471,7 +475,7 @@ class MissionServer:
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, named)]
 
     def _cancel_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
-        """Free the lock of a station that gives up (MISSION_ACK with an error)."""
+        """Free the lock of a station that cancels its upload (MISSION_ACK with an error)."""
         upload = self._uploads.get(kind)
         if upload is None or upload.station != station or message.type == mavlink.MAV_MISSION_ACCEPTED:
             return []
@@ -483,7 +487,7 @@ class MissionServer:
         return []
 
     def _stop_confirmations(self, station: Station) -> None:
-        """Stop requests to a station for its finished uploads: it sends other messages now."""
+        """Stop requests to a station for its finished uploads, because it sends other messages now."""
         for done in self._finished.values():
             if done.station == station:
                 done.left = 0
@@ -497,7 +501,7 @@ class MissionServer:
         return ""
 
     def _drop_other_uploads(self, station: Station) -> None:
-        """Drop the uploads of other stations, which have gone silent, when a station takes the lock."""
+        """Drop the uploads of other, silent stations when a station takes the lock."""
         self._uploads = {kind: upload for kind, upload in self._uploads.items() if upload.station == station}
 
     def _request(self, upload: _Upload, kind: MissionType, now: float) -> MissionReply:
@@ -522,7 +526,7 @@ def _request(
 
 
 def _placement_problem(item: MissionItem, kind: MissionType) -> str:
-    """Return why an item does not belong into a list; "" if it does."""
+    """Return the reason why an item does not belong in a list, or "" if it does."""
     fits = (
         item.command in _ALLOWED_COMMANDS[kind]
         if kind in _ALLOWED_COMMANDS
@@ -532,7 +536,7 @@ def _placement_problem(item: MissionItem, kind: MissionType) -> str:
 
 
 def _refusal_result(message: Any) -> int:
-    """Return MAV_MISSION_RESULT for an item that `from_message` refused, by the invalid number."""
+    """Return the MAV_MISSION_RESULT that names the invalid number of an item that `from_message` refused."""
     degree = 1.0 if message.get_type() == "MISSION_ITEM" else 1e7
     if abs(message.x) > 90.0 * degree:
         return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)

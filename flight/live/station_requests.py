@@ -1,4 +1,4 @@
-"""Requests of a station other than missions: commands, modes, parameters, messages and their rates."""
+"""Answer a station's requests other than missions: commands, modes, parameters, messages and their rates."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -40,7 +40,7 @@ class Parameter:
 
     low, high: range that a station may set; high is None for a fixed parameter.
     fixed: reason why it is fixed.
-    flies: True for a parameter of the law that flies: it is set on the ground, and the mission is judged again.
+    flies: True for a parameter of the flying control law, which is set on the ground; the mission is then judged again.
     """
 
     name: str
@@ -96,7 +96,7 @@ class Parameters:
         )
 
     def find(self, name: bytes, number: int) -> int | None:
-        """Return the number of the parameter in a PARAM_REQUEST_READ or PARAM_SET, or None if it is unknown.
+        """Return the number of the parameter that a PARAM_REQUEST_READ or PARAM_SET names, or None if it is unknown.
 
         number: -1 to find it by name.
         """
@@ -107,7 +107,7 @@ class Parameters:
     def set(self, name: bytes, value: float, *, in_flight: bool = False) -> tuple[int | None, str]:
         """Set a parameter for a station.
 
-        Return its number (None if it is unknown), and why it was refused ("" if it was set).
+        Return its number (None if it is unknown), and the reason why it was refused ("" if it was set).
         """
         number = self._numbers.get(_decode_name(name))
         if number is None:
@@ -126,7 +126,7 @@ class Parameters:
         return number, ""
 
     def _set_law_parameter(self, entry: Parameter, value: float) -> str:
-        """Change a parameter of the law; return why it was refused, "" if it was changed."""
+        """Change a parameter of the control law; return the reason why it was refused, or "" if it was changed."""
         if not math.isfinite(value):
             return f"{entry.name} {value:g}: a finite number is expected; {entry.value:g} kept"
         # 0.7 travels as 0.699999988: the number that was typed is the shortest one with the same float32.
@@ -154,14 +154,14 @@ def vehicle_parameters(
     flown: Callable[[Mapping[str, float]], Mapping[str, float]] = _no_flown_parameters,
     not_flown: Iterable[str] = (),
 ) -> Parameters:
-    """Return the parameters of a vehicle and of its law, by the autopilot's names, in alphabetical order.
+    """Return the parameters of a vehicle and of its control law, by the autopilot's names, in alphabetical order.
 
     airspeed, slowest, fastest: m/s.
     max_bank_deg: degrees.
     system: the vehicle's MAVLink system id.
-    speed: times real time.
+    speed: speed of the flight relative to real time.
     flown: as in `Parameters`; its names replace the vehicle's own.
-    not_flown: parameters of the law that are not flown, which cannot be set.
+    not_flown: parameters of the control law that are not flown; they cannot be set.
 
     >>> parameters = vehicle_parameters(
     ...     airspeed=25.0, slowest=18.0, fastest=31.0, max_bank_deg=30.0, system=1, speed=1.0,
@@ -236,9 +236,9 @@ class _WaitingArmCommand:
 
 @dataclass(slots=True)
 class Requests:
-    """Answers requests with messages for the station, and texts for all of them.
+    """Answers requests with messages for the requesting station, and with texts for all stations.
 
-    start_at: sets the start of the next flight to an item, by the station's number.
+    start_at: function that sets the start of the next flight to an item, by the station's number.
     """
 
     arming: ArmingState
@@ -261,7 +261,7 @@ class Requests:
             replies += self._acknowledge(item.peer, item.system, item.component, _ARM_COMMAND, reply)
         return replies
 
-    def _command(self, message: Any, peer: Peer, now: float) -> list[Response]:
+    def _on_command(self, message: Any, peer: Peer, now: float) -> list[Response]:
         system, component = message.get_srcSystem(), message.get_srcComponent()
         number = int(message.command)
         if number == _ARM_COMMAND:
@@ -273,15 +273,15 @@ class Requests:
                     reply = CommandResult(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
             return self._acknowledge(peer, system, component, number, reply)
         if number in _MESSAGE_COMMANDS:
-            reply, extra = self._message_command(number, message, peer, now)
+            reply, extra = self._run_message_command(number, message, peer, now)
         else:
-            reply, extra = self._flight_command(number, message), []
+            reply, extra = self._run_flight_command(number, message), []
         return [
             *self._acknowledge(peer, system, component, number, reply),
             *(PeerMessage(peer, item) for item in extra),
         ]
 
-    def _flight_command(self, number: int, message: Any) -> CommandResult:
+    def _run_flight_command(self, number: int, message: Any) -> CommandResult:
         if number == mavlink.MAV_CMD_DO_SET_MODE:
             return self.arming.set_mode(_to_integer(message.param2))
         if number == mavlink.MAV_CMD_MISSION_START:
@@ -297,7 +297,9 @@ class Requests:
             return self.start_at(_to_integer(message.param1))
         return CommandResult(UNSUPPORTED, _NOT_FLOWN.get(number, ""))
 
-    def _message_command(self, number: int, message: Any, peer: Peer, now: float) -> tuple[CommandResult, list[Any]]:
+    def _run_message_command(
+        self, number: int, message: Any, peer: Peer, now: float
+    ) -> tuple[CommandResult, list[Any]]:
         named = _MESSAGE_COMMANDS[number]
         wanted = _to_integer(message.param1) if named is None else named
         kind = mavlink.mavlink_map.get(wanted)
@@ -340,7 +342,7 @@ class Requests:
         number = mavlink.MAVLINK_MSG_ID_SET_MODE
         return self._acknowledge(peer, message.get_srcSystem(), message.get_srcComponent(), number, reply)
 
-    def _mission_set_current(self, message: Any, peer: Peer, now: float) -> list[Response]:
+    def _on_mission_set_current(self, message: Any, peer: Peer, now: float) -> list[Response]:
         reply = self.start_at(int(message.seq))
         if reply.result == ACCEPTED:
             return [PeerMessage(peer, telemetry_message("MISSION_CURRENT", self.status))]
@@ -370,7 +372,7 @@ class Requests:
             replies.append(PeerMessage(peer, self.parameters.message(number)))
         return replies
 
-    def _ping(self, message: Any, peer: Peer, _now: float) -> list[Response]:
+    def _on_ping(self, message: Any, peer: Peer, _now: float) -> list[Response]:
         if message.target_system or message.target_component:
             return []
         pong = mavlink.MAVLink_ping_message(
@@ -378,7 +380,7 @@ class Requests:
         )
         return [PeerMessage(peer, pong)]
 
-    def _timesync(self, message: Any, peer: Peer, _now: float) -> list[Response]:
+    def _on_timesync(self, message: Any, peer: Peer, _now: float) -> list[Response]:
         if message.tc1 != 0:
             return []
         return [PeerMessage(peer, mavlink.MAVLink_timesync_message(int(self.status.wall * 1e9), message.ts1))]
@@ -441,16 +443,16 @@ _MESSAGE_COMMANDS: dict[int, int | None] = {
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
 }
 _HANDLERS: dict[str, Callable[[Requests, Any, Peer, float], list[Response]]] = {
-    "COMMAND_LONG": Requests._command,
-    "COMMAND_INT": Requests._command,
+    "COMMAND_LONG": Requests._on_command,
+    "COMMAND_INT": Requests._on_command,
     "SET_MODE": Requests._set_mode,
-    "MISSION_SET_CURRENT": Requests._mission_set_current,
+    "MISSION_SET_CURRENT": Requests._on_mission_set_current,
     "SET_POSITION_TARGET_GLOBAL_INT": Requests._go_to,
     "SET_POSITION_TARGET_LOCAL_NED": Requests._go_to,
     "REQUEST_DATA_STREAM": Requests._set_streams,
     "PARAM_REQUEST_LIST": Requests._list_parameters,
     "PARAM_REQUEST_READ": Requests._read_parameter,
     "PARAM_SET": Requests._write_parameter,
-    "PING": Requests._ping,
-    "TIMESYNC": Requests._timesync,
+    "PING": Requests._on_ping,
+    "TIMESYNC": Requests._on_timesync,
 }

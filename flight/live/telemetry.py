@@ -1,4 +1,4 @@
-"""Telemetry: MAVLink messages of a state snapshot, and their rates."""
+"""Make the MAVLink telemetry messages of a state snapshot, and define their rates."""
 
 import math
 import struct
@@ -24,9 +24,14 @@ from world.kernels import Record
 class Snapshot:
     """State of the aircraft at one time; SI and radians, north and east true, altitudes AMSL.
 
-    height: above ground, NaN if unknown.  v_north, v_east, v_down: over the ground.  p, q, r: body rates.
-    throttle: 0..1.  wind_north, wind_east: velocity of the air.  current: A.  energy: Wh used.  leg: the active one, -1
-    before the start.
+    height: height above ground, NaN if unknown.
+    v_north, v_east, v_down: velocity over the ground.
+    p, q, r: body rates.
+    throttle: 0..1.
+    wind_north, wind_east: velocity of the air.
+    current: A.
+    energy: Wh used.
+    leg: the active leg, -1 before the start.
     """
 
     time: float
@@ -52,7 +57,7 @@ class Snapshot:
     leg: float = -1.0
 
     def pack(self) -> bytes:
-        """Return the bytes of the snapshot, a fixed number.
+        """Return the snapshot as a fixed number of bytes.
 
         >>> parked = Snapshot(time=0.0, lat_deg=46.0, lon_deg=8.0, amsl=500.0, height=100.0)
         >>> Snapshot.unpack(parked.pack()) == parked
@@ -70,7 +75,7 @@ class Snapshot:
 
     @property
     def finite(self) -> bool:
-        """True if it can be sent to a station: a flight may end with values that are not finite."""
+        """True if all values are finite, so that it can be sent to a station; a flight may end with other values."""
         return all(math.isfinite(value) for value in astuple(replace(self, height=0.0)))
 
 
@@ -123,7 +128,7 @@ class SnapshotMaker:
             v_down=-v_up,
             roll=roll,
             pitch=pitch,
-            yaw=_wrap(yaw - turn),
+            yaw=_wrap_angle(yaw - turn),
             p=p,
             q=q,
             r=r,
@@ -138,13 +143,13 @@ class SnapshotMaker:
 
 
 def _to_true(vector: Floats, turn: float) -> tuple[float, float, float]:
-    """Return a vector east, north and up on the map as true east, north and up."""
+    """Rotate a vector east, north and up on the map to true east, north and up."""
     east, north, up = (float(value) for value in vector)
     cos, sin = math.cos(turn), math.sin(turn)
     return east * cos - north * sin, north * cos + east * sin, up
 
 
-def _wrap(angle: float) -> float:
+def _wrap_angle(angle: float) -> float:
     return math.remainder(angle, 2.0 * math.pi)
 
 
@@ -269,7 +274,7 @@ class Status:
     """State of the vehicle for `telemetry_message`.
 
     snapshot: the aircraft.
-    home: origin of heights over home.
+    home: origin of heights above home.
     boot, wall: s since the vehicle started, and since 1970.
     mode: ArduPlane's number.
     ready: True if arming would be accepted, or has been.
@@ -296,7 +301,7 @@ class Status:
 
 
 def heartbeat(status: Status) -> Any:
-    """Return HEARTBEAT of a fixed wing that follows ArduPilot's conventions.
+    """Return the HEARTBEAT of a fixed-wing aircraft, in ArduPilot's conventions.
 
     >>> parked = Snapshot(time=0.0, lat_deg=46.0, lon_deg=8.0, amsl=500.0, height=100.0)
     >>> message = heartbeat(Status(parked, Home(46.0, 8.0, 400.0), mode=AUTO, armed=True))
@@ -334,19 +339,19 @@ def telemetry_message(name: str, status: Status) -> Any:
     return maker(status) if maker else None
 
 
-def _ms(status: Status) -> int:
+def _boot_ms(status: Status) -> int:
     return int(status.boot * 1e3) & 0xFFFFFFFF
 
 
-def _attitude(status: Status) -> Any:
+def _attitude_message(status: Status) -> Any:
     now = status.snapshot
-    return mavlink.MAVLink_attitude_message(_ms(status), now.roll, now.pitch, now.yaw, now.p, now.q, now.r)
+    return mavlink.MAVLink_attitude_message(_boot_ms(status), now.roll, now.pitch, now.yaw, now.p, now.q, now.r)
 
 
-def _position(status: Status) -> Any:
+def _position_message(status: Status) -> Any:
     now = status.snapshot
     return mavlink.MAVLink_global_position_int_message(
-        _ms(status),
+        _boot_ms(status),
         round(now.lat_deg * 1e7),
         round(now.lon_deg * 1e7),
         round(now.amsl * 1e3),
@@ -354,27 +359,27 @@ def _position(status: Status) -> Any:
         _to_int16(now.v_north * 100),
         _to_int16(now.v_east * 100),
         _to_int16(now.v_down * 100),
-        round(_degrees(now.yaw) * 100) % 36000,
+        round(_to_degrees(now.yaw) * 100) % 36000,
     )
 
 
-def _hud(status: Status) -> Any:
+def _hud_message(status: Status) -> Any:
     now = status.snapshot
     return mavlink.MAVLink_vfr_hud_message(
         now.airspeed,
         math.hypot(now.v_north, now.v_east),
-        int(_degrees(now.yaw)),
+        int(_to_degrees(now.yaw)),
         max(0, min(100, round(now.throttle * 100))),
         now.amsl,
         -now.v_down,
     )
 
 
-def _mission_current(status: Status) -> Any:
+def _mission_current_message(status: Status) -> Any:
     return mavlink.MAVLink_mission_current_message(status.current, status.total, status.mission_state, 0)
 
 
-def _sys_status(status: Status) -> Any:
+def _sys_status_message(status: Status) -> Any:
     health = _SENSORS | (_PREARM if status.ready else 0)
     share = max(0.0, 1.0 - status.snapshot.energy / status.battery)
     present = _SENSORS | _PREARM
@@ -395,7 +400,7 @@ def _sys_status(status: Status) -> Any:
     )
 
 
-def _gps(status: Status) -> Any:
+def _gps_message(status: Status) -> Any:
     now = status.snapshot
     return mavlink.MAVLink_gps_raw_int_message(
         int(status.boot * 1e6),
@@ -406,19 +411,19 @@ def _gps(status: Status) -> Any:
         50,
         80,
         min(65534, round(math.hypot(now.v_north, now.v_east) * 100)),
-        round(_degrees(math.atan2(now.v_east, now.v_north)) * 100) % 36000,
+        round(_to_degrees(math.atan2(now.v_east, now.v_north)) * 100) % 36000,
         16,
     )
 
 
-def _wind(status: Status) -> Any:
+def _wind_message(status: Status) -> Any:
     now = status.snapshot
     # Direction from which the wind blows.
     source = math.degrees(math.atan2(-now.wind_east, -now.wind_north))
     return mavlink.MAVLink_wind_message(source, math.hypot(now.wind_east, now.wind_north), 0.0)
 
 
-def _wind_cov(status: Status) -> Any:
+def _wind_cov_message(status: Status) -> Any:
     now = status.snapshot
     unknown = math.nan
     return mavlink.MAVLink_wind_cov_message(
@@ -426,12 +431,12 @@ def _wind_cov(status: Status) -> Any:
     )
 
 
-def _extended_state(status: Status) -> Any:
+def _extended_state_message(status: Status) -> Any:
     landed = mavlink.MAV_LANDED_STATE_IN_AIR if status.flying else mavlink.MAV_LANDED_STATE_ON_GROUND
     return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, landed)
 
 
-def _home(status: Status) -> Any:
+def _home_message(status: Status) -> Any:
     home = status.home
     return mavlink.MAVLink_home_position_message(
         round(home.lat_deg * 1e7),
@@ -448,36 +453,36 @@ def _home(status: Status) -> Any:
     )
 
 
-def _autopilot_version(_status: Status) -> Any:
+def _autopilot_version_message(_status: Status) -> Any:
     return mavlink.MAVLink_autopilot_version_message(
         _CAPABILITIES, _VERSION, 0, 0, 0, list(b"planfly\0"), [0] * 8, [0] * 8, 0, 0, 0x706C616E
     )
 
 
-def _system_time(status: Status) -> Any:
-    return mavlink.MAVLink_system_time_message(int(status.wall * 1e6), _ms(status))
+def _system_time_message(status: Status) -> Any:
+    return mavlink.MAVLink_system_time_message(int(status.wall * 1e6), _boot_ms(status))
 
 
 def _to_int16(value: float) -> int:
     return max(-32767, min(32767, round(value)))
 
 
-def _degrees(angle: float) -> float:
+def _to_degrees(angle: float) -> float:
     return math.degrees(angle) % 360.0
 
 
 _MAKERS = {
     "HEARTBEAT": heartbeat,
-    "ATTITUDE": _attitude,
-    "GLOBAL_POSITION_INT": _position,
-    "VFR_HUD": _hud,
-    "MISSION_CURRENT": _mission_current,
-    "SYS_STATUS": _sys_status,
-    "GPS_RAW_INT": _gps,
-    "WIND": _wind,
-    "WIND_COV": _wind_cov,
-    "EXTENDED_SYS_STATE": _extended_state,
-    "HOME_POSITION": _home,
-    "AUTOPILOT_VERSION": _autopilot_version,
-    "SYSTEM_TIME": _system_time,
+    "ATTITUDE": _attitude_message,
+    "GLOBAL_POSITION_INT": _position_message,
+    "VFR_HUD": _hud_message,
+    "MISSION_CURRENT": _mission_current_message,
+    "SYS_STATUS": _sys_status_message,
+    "GPS_RAW_INT": _gps_message,
+    "WIND": _wind_message,
+    "WIND_COV": _wind_cov_message,
+    "EXTENDED_SYS_STATE": _extended_state_message,
+    "HOME_POSITION": _home_message,
+    "AUTOPILOT_VERSION": _autopilot_version_message,
+    "SYSTEM_TIME": _system_time_message,
 }

@@ -1,4 +1,4 @@
-"""The live vehicle: the stations' link, the flight process, and the state between them."""
+"""Run the live vehicle, which connects the stations' link with the flight process."""
 
 import contextlib
 import errno
@@ -89,16 +89,16 @@ class Downlink:
             self._link.send(message, peer)
 
     def heartbeat_now(self) -> None:
-        """Send the next heartbeat at once: its contents have changed."""
+        """Send the next heartbeat at once, because its contents have changed."""
         self._next_heartbeat = self._link.clock()
 
     def wait(self, now: float, patience: float) -> float:
-        """Return the time until something is due, s, at most ``patience``."""
+        """Return the time until the next message is due, s, at most ``patience``."""
         due = min((at for peer in self._link.peers.values() for at in peer.due.values()), default=now + patience)
         return max(0.0, min(patience, due - now, self._next_heartbeat - now))
 
     def tick(self, now: float) -> None:
-        """Send what is due."""
+        """Send all messages that are due."""
         if now >= self._next_heartbeat:
             self._next_heartbeat = (
                 now + _HEARTBEAT_PERIOD_S
@@ -108,10 +108,10 @@ class Downlink:
             self._link.forget_silent()
             self._link.send_heartbeat(heartbeat(self._status))
         for peer in self._link.peers.values():
-            self._telemetry(peer, now)
+            self._send_telemetry(peer, now)
             self._stream_parameters(peer)
 
-    def _telemetry(self, peer: Peer, now: float) -> None:
+    def _send_telemetry(self, peer: Peer, now: float) -> None:
         for name, due in peer.due.items():
             if now < due:
                 continue
@@ -138,7 +138,7 @@ class Downlink:
 
 
 class MissionProgress:
-    """Reports to stations the current item and the items that were reached.
+    """Reports the current item, and the items that were reached, to stations.
 
     shift: offset from an item's seq to the station's number.
     first: the station's number of the item at which the next flight starts; 0 for the whole mission.
@@ -157,18 +157,18 @@ class MissionProgress:
         self.first = 0
 
     def started(self) -> None:
-        """Note that a flight begins."""
+        """Start the progress of a flight that begins."""
         self._leg, self._way = -1, None
 
     def diverted(self, items: tuple[int, ...]) -> None:
-        """Note that another route begins.
+        """Start the progress on another route.
 
         items: seq of the mission's item at each waypoint; empty for a route outside the mission.
         """
         self._leg, self._way = -1, items
 
     def at_start(self) -> None:
-        """Set the current item of a mission that is not being flown: its start."""
+        """Set the current item of a mission that is not being flown to the mission's start."""
         self._status.current = self.first or (self._station_number(0) if self._arming.judged is not None else 0)
 
     def refresh(self) -> None:
@@ -296,7 +296,7 @@ class Vehicle:
             self.step(_MAX_WAIT_S)
 
     def close(self) -> None:
-        """Make the flight process end its flight, if it is ready; its last texts go to the terminal."""
+        """Make the flight process, if it is ready, end its flight; show its last texts at the terminal."""
         until = self._clock() + CLOSING
         with contextlib.suppress(OSError, EOFError):
             if self._ready:
@@ -376,7 +376,7 @@ class Vehicle:
         self._refresh()
 
     def _judge_changes(self) -> None:
-        """Request a verdict on a changed mission; a fence or rally points that change belong to it."""
+        """Request a verdict on a changed mission, which includes a changed fence and changed rally points."""
         # One request at a time: stations that upload faster than missions are judged must not fill the pipe.
         if not self.server.changed or self.arming.flying or self._outstanding:
             return
@@ -405,7 +405,7 @@ class Vehicle:
         self._refresh()
 
     def _divert(self, place: Place) -> None:
-        """Divert the aircraft: to the mission's current item, home, or to a loiter at a place."""
+        """Divert the aircraft to the mission's current item, to home, or to a loiter at a place."""
         mission, shift = uploaded(self.server.lists, self._standby.home)
         mission = replace(mission, home=self.status.home)
         if self.arming.mode == AUTO:
@@ -413,7 +413,7 @@ class Vehicle:
         self._send_request(DivertFlight(self.arming.mode, mission, place))
 
     def _go_to(self, item: MissionItem) -> str:
-        """Fly to an item's place; return why not, "" if it does."""
+        """Fly to an item's place, and return the reason why this is refused, or ""."""
         return self.arming.go_to(Place(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
 
     def _handle_diversion(self, event: FlightDiverted) -> None:
@@ -463,7 +463,7 @@ class Vehicle:
             self._restart_process()
 
     def _restart_process(self) -> None:
-        """Start another flight process after a crash: JSBSim can abort, and that must not end the vehicle."""
+        """Start another flight process after a crash, because an abort of JSBSim must not end the vehicle."""
         self._flight.close()
         self._deaths += 1
         if self._deaths >= _MAX_CRASHES:

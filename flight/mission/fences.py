@@ -1,4 +1,4 @@
-"""Geofences and rally points: shapes, conversion from and to zones, and a test of positions."""
+"""Convert geofences from and to zones, test positions against them, and build rally points."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -68,11 +68,11 @@ def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionI
     bands = [zone.name for zone in zones if zone.floor is not None or zone.ceiling is not None]
     notes = []
     if bands:
-        notes.append(f"a fence has no floor and no ceiling: {_names(bands)} in the fence at every height")
+        notes.append(f"a fence has no floor and no ceiling: {_joined_names(bands)} in the fence at every height")
     if closed:
-        notes.append(f"a fence has no holes in what it excludes: {_names(closed)} in the fence without them")
+        notes.append(f"a fence has no holes in what it excludes: {_joined_names(closed)} in the fence without them")
     if left_out:
-        notes.append(f"every inclusion of a fence counts: {_names(left_out)} left out, being of several parts")
+        notes.append(f"every inclusion of a fence counts: {_joined_names(left_out)} left out, being of several parts")
     return items, notes
 
 
@@ -92,7 +92,7 @@ def _ring_items(ring: Ring, command: Command, origin: GeoOrigin) -> Iterator[Mis
         yield fence_item(origin, command, float(len(ring)), corner)
 
 
-def _names(names: list[str]) -> str:
+def _joined_names(names: list[str]) -> str:
     """Return up to three names, and the number of others."""
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(names[:3]) + more + (" is" if len(names) == 1 else " are")
@@ -112,7 +112,7 @@ _MAX_NAMES = 12
 
 
 def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list[tuple[MissionItem, ...]]:
-    """Group fence items into shapes: a polygon's corners together, a circle alone.
+    """Group fence items into shapes, each the corners of one polygon or a single circle.
 
     Raise MissionError for a polygon with fewer corners than stated.
     """
@@ -191,8 +191,8 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
     (west, east), (south, north) = scenario.bounds
     corners = np.array([[west, south], [east, south], [east, north], [west, north]])
     fences = [fence_item(scenario.origin, Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, 4.0, point) for point in corners]
-    missiles, crossed = _split_kept(_missile_zones(scenario), scenario.origin, passes)
-    zones, passed = _split_kept(scenario.zones, scenario.origin, passes)
+    missiles, crossed = _split_by_altitude(_missile_zones(scenario), scenario.origin, passes)
+    zones, passed = _split_by_altitude(scenario.zones, scenario.origin, passes)
     fences += zone_fences(missiles, scenario.origin)[0]
     items, of_zones = zone_fences(zones, scenario.origin)
     fences += items
@@ -217,7 +217,7 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
     every = numbered([*fences, *mission.fences])
     # A mission that begins or ends on the ground keeps its rally points: its last position is where it lands.
     grounded = bool(mission.rally) or scenario.launch is not None or scenario.landing is not None
-    rally = mission.rally if grounded else numbered(_rally(mission))
+    rally = mission.rally if grounded else numbered(_ends_as_rally_points(mission))
     return replace(mission, fences=every, rally=rally), tuple(notes)
 
 
@@ -231,7 +231,7 @@ def _missile_zones(scenario: Scenario) -> list[Zone]:
     ]
 
 
-def _split_kept(zones: Sequence[Zone], origin: GeoOrigin, passes: PassTest) -> tuple[list[Zone], list[str]]:
+def _split_by_altitude(zones: Sequence[Zone], origin: GeoOrigin, passes: PassTest) -> tuple[list[Zone], list[str]]:
     """Return the zones that stay fences at every altitude, and the names of the others."""
     kept, passed = [], []
     for zone in zones:
@@ -242,7 +242,7 @@ def _split_kept(zones: Sequence[Zone], origin: GeoOrigin, passes: PassTest) -> t
     return kept, passed
 
 
-def _rally(mission: Mission) -> list[MissionItem]:
+def _ends_as_rally_points(mission: Mission) -> list[MissionItem]:
     positions = [item for item in mission.items if item.has_position]
     home = mission.home
     if home is None or not positions or math.isnan(home.alt):

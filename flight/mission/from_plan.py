@@ -1,4 +1,4 @@
-"""Convert a plan to a mission: a speed change, then waypoints AMSL in the world's frame."""
+"""Convert a plan to a mission with a speed change, followed by waypoints with altitudes AMSL."""
 
 import math
 from collections.abc import Iterator
@@ -60,9 +60,9 @@ def plan_mission(
     [(178, 25.0), (16, 10.0), (16, 20.0), (16, 10.0)]
     """
     ways = plan.ways or GroundWays()
-    points = _all_places(plan, ways)
+    points = _mission_places(plan, ways)
     radii = acceptance_radii(plan.scenario, points, airspeed, max_bank, tracking)
-    home = _home(plan)
+    home = _home_position(plan)
     builder = _ItemBuilder(plan.scenario.origin)
     if ways.climb is not None:
         builder.add(Command.NAV_TAKEOFF, (LAUNCH_PITCH, 0.0, 0.0, 0.0), np.append(ways.climb.home[:2], ways.climb.up))
@@ -77,7 +77,7 @@ def plan_mission(
             builder.add(Command.NAV_WAYPOINT, (0.0, float(radii[k]), 0.0, 0.0), points[k])
         builder.add(Command.NAV_LAND, (ways.descent.go_around, 0.0, 0.0, 0.0), ways.descent.point)
     returns = plan.scenario.returns
-    rally = () if returns is None else tuple(_rally(plan.scenario.origin, returns.rally, home))
+    rally = () if returns is None else tuple(_rally_items(plan.scenario.origin, returns.rally, home))
     return Mission(
         home=home, items=tuple(builder.items), rally=rally, cruise_speed=_round_to_thousandths(airspeed), source=source
     )
@@ -102,8 +102,8 @@ class _ItemBuilder:
         self.items.append(MissionItem(len(self.items) + 1, int(command), int(frame), params, lat, lon, up))
 
 
-def _all_places(plan: Plan, ways: GroundWays) -> Floats:
-    """Return all places flown to, (w, 3) m, from above home to the landing point.
+def _mission_places(plan: Plan, ways: GroundWays) -> Floats:
+    """Return all positions flown to, from above home to the landing point, (w, 3) m.
 
     The landing point has the line-up's altitude.
     """
@@ -116,7 +116,7 @@ def _all_places(plan: Plan, ways: GroundWays) -> Floats:
     return np.concatenate(parts)
 
 
-def _home(plan: Plan) -> Home:
+def _home_position(plan: Plan) -> Home:
     """Return the scenario's home, or the ground below the start, or the start if the ground is unknown."""
     scenario, first = plan.scenario, plan.waypoints[0]
     place = scenario.home if scenario.home is not None else first
@@ -126,7 +126,7 @@ def _home(plan: Plan) -> Home:
     return Home(on_grid(float(lat[0])), on_grid(float(lon[0])), _round_to_thousandths(up))
 
 
-def _rally(origin: GeoOrigin, points: Floats, home: Home) -> Iterator[MissionItem]:
+def _rally_items(origin: GeoOrigin, points: Floats, home: Home) -> Iterator[MissionItem]:
     """Yield rally points (n, 3) m as items, with heights above home, as ground stations write them."""
     for number, (east, north, up) in enumerate(points.tolist()):
         lat, lon = to_geo(origin, east, north)
@@ -155,12 +155,12 @@ def acceptance_radii(
 
 
 def _fly_by_offsets(turns: Floats, radius: float) -> Floats:
-    """Return the distances at which arcs of a radius (m) pass the corners of turns (rad), m."""
+    """Return the distances at which arcs of the given radius (m) pass the corners of the given turns (rad), m."""
     return np.asarray(radius * (1.0 / np.cos(turns / 2.0) - 1.0))
 
 
 def _turn_distances(scenario: Scenario, points: Floats, airspeed: float, tracking: TrackingError) -> Floats:
-    """Return the radii (w,), whole m, for the highest ground speed between the two courses of each corner."""
+    """Return the acceptance radii for the highest ground speed between the two courses of each corner, (w,) whole m."""
     radii = np.full(len(points), tracking.corner_acceptance(0.0, airspeed))
     speeds = corner_speeds(scenario, points, airspeed)
     for i, (turn, fastest) in enumerate(zip(turning_angles(points), speeds, strict=True), 1):

@@ -1,4 +1,4 @@
-"""Departure and landing that are flown: where a mission's take-off and landing begin and end.
+"""Find the take-off and the landing of a mission that are simulated, and where each begins and ends.
 
 A take-off is flown if the scenario states how the aircraft is launched and the mission begins with a take-off item; a
 landing is flown if the scenario has a strip and the mission ends with a landing item. All other flights begin and end
@@ -68,7 +68,7 @@ class TakeOff:
         return place, self.speed * np.array([*(level * along), rise])
 
     def described(self) -> str:
-        """Describe how the flight begins, in words."""
+        """Describe the start of the flight in words."""
         how = {"catapult": "from a catapult", "hand": "by hand", "runway": "on a runway"}[self.launch.method]
         course = math.degrees(self.course) % 360.0
         return (
@@ -103,11 +103,11 @@ class Approach:
     base: float
 
     def place(self, position: Floats) -> tuple[Floats, Floats]:
-        """Return the distances of positions (n, 3) past the landing point and right of its course, (n,) m."""
+        """Return how far positions (n, 3) lie past the landing point, and to the right of its course, (n,) m each."""
         return _along_and_right(position, self.point, self.course)
 
     def on_strip(self, position: Floats) -> tuple[Floats, Floats]:
-        """Return the distances of positions (n, 3) along the strip from its center, and to its right, (n,) m.
+        """Return how far positions (n, 3) lie along the strip from its center, and to its right, (n,) m each.
 
         The strip lies where the scenario has it, on its stated course, or on the landing's course if none is stated. A
         landing against the stated course uses the same strip.
@@ -119,7 +119,7 @@ class Approach:
 
 
 def _along_and_right(position: Floats, begin: Floats, course: float) -> tuple[Floats, Floats]:
-    """Return the distances of positions (n, 3) ahead of a point on a course (rad) and to its right, m."""
+    """Return how far positions (n, 3) lie ahead of a point on a course (rad), and to the right of the course, m."""
     east, north = position[..., 0] - begin[0], position[..., 1] - begin[1]
     sin, cos = math.sin(course), math.cos(course)
     return east * sin + north * cos, east * cos - north * sin
@@ -142,9 +142,9 @@ class GroundWays:
 
 
 def find_ground_ways(scenario: Scenario, mission: Mission, route: Route, slowest: float) -> GroundWays:
-    """Find the take-off and the landing of a mission that are flown in a scenario, on the mission's route.
+    """Find the take-off and the landing of a mission that a flight in the scenario simulates.
 
-    slowest: lowest speed of level flight, m/s, which sets the launch speed if none is stated.
+    slowest: minimum level-flight speed, m/s, which sets the launch speed if the scenario states none.
 
     >>> from world.scenario import load_scenario
     >>> bool(find_ground_ways(load_scenario("tight"), Mission(None, ()), None, 15.0))

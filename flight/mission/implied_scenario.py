@@ -62,8 +62,8 @@ def implied_scenario(
     flight = flight or FlightTable(aircraft_by_default=True)
     itinerary = make_itinerary(mission)
     origin = mission_origin(mission, itinerary.stops)
-    box, flown = _boxes(mission, itinerary, origin)
-    terrain, table, box = _ground(terrain_path, origin, box, flown)
+    box, flown = _area_and_flown_box(mission, itinerary, origin)
+    terrain, table, box = _load_terrain(terrain_path, origin, box, flown)
     placed = place_stops(mission, origin, terrain, itinerary=itinerary, vertical_legs=vertical_legs)
     top = max(float(place.position[2]) for place in placed.stops)
     if terrain is not None:
@@ -74,8 +74,8 @@ def implied_scenario(
         origin=OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
         terrain=table,
         area=AreaTable(east_m=box[0].tolist(), north_m=box[1].tolist(), ceiling_amsl_m=min(top + AREA_BUFFER, HIGHEST)),
-        start=_end(placed.stops[0].position, terrain),
-        destination=_end(placed.stops[-1].position, terrain),
+        start=_raised_above_ground(placed.stops[0].position, terrain),
+        destination=_raised_above_ground(placed.stops[-1].position, terrain),
         flight=flight,
     )
     return ImpliedScenario(from_spec(spec, mission.source, ground=terrain, external=True), placed)
@@ -104,7 +104,7 @@ def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOri
     return origin
 
 
-def _boxes(mission: Mission, itinerary: Itinerary, origin: GeoOrigin) -> tuple[Floats, Floats]:
+def _area_and_flown_box(mission: Mission, itinerary: Itinerary, origin: GeoOrigin) -> tuple[Floats, Floats]:
     """Return the area, and the smallest box of the positions flown to; both (2, 2) [[e0, e1], [n0, n1]] m."""
     stops = itinerary.stops
     points = on_map(mission.source, stops, origin)
@@ -121,7 +121,7 @@ def _boxes(mission: Mission, itinerary: Itinerary, origin: GeoOrigin) -> tuple[F
     return np.clip(area + np.array([-around, around]), -MAP_EXTENT, MAP_EXTENT), flown
 
 
-def _ground(
+def _load_terrain(
     path: str | None, origin: GeoOrigin, box: Floats, flown: Floats
 ) -> tuple[Terrain | None, TerrainTable, Floats]:
     """Return the terrain, its table, and the area clipped at the tile's edge."""
@@ -133,8 +133,8 @@ def _ground(
     if not ((inside[:, 0] <= flown[:, 0]) & (flown[:, 1] <= inside[:, 1])).all():
         lons, lats = raster.corners.T
         raise TerrainError(
-            f"{path}: the mission flies to {_degrees(*to_geo(origin, *flown))}; the terrain covers"
-            f" {_degrees(lats, lons)}",
+            f"{path}: the mission flies to {_position_text(*to_geo(origin, *flown))}; the terrain covers"
+            f" {_position_text(lats, lons)}",
             file=path,
         )
     file = Path(path)
@@ -143,11 +143,11 @@ def _ground(
     return read_terrain(raster, origin, inside, GROUND_BUFFER), table, inside
 
 
-def _degrees(lats: Floats, lons: Floats) -> str:
+def _position_text(lats: Floats, lons: Floats) -> str:
     return f"latitude {lats.min():.4f}..{lats.max():.4f}, longitude {lons.min():.4f}..{lons.max():.4f}"
 
 
-def _end(point: Floats, terrain: Terrain | None) -> EndTable:
+def _raised_above_ground(point: Floats, terrain: Terrain | None) -> EndTable:
     east, north, amsl = (float(value) for value in point)
     if terrain is not None:
         amsl = max(amsl, float(terrain.height(east, north)) + 1.0)

@@ -1,4 +1,4 @@
-"""A MAVLink mission as data: items, home, fences and rally points."""
+"""Represent a MAVLink mission by its items, home, fences and rally points."""
 
 import math
 from collections.abc import Iterable
@@ -155,7 +155,7 @@ def command_name(command: int) -> str:
 
 
 def on_grid(degrees: float) -> float:
-    """Return degrees rounded to whole 1e-7 degrees, never truncated; NaN stays NaN.
+    """Round degrees to a multiple of 1e-7, without truncating; NaN stays NaN.
 
     >>> on_grid(36.50000006), on_grid(-84.19999994)
     (36.5000001, -84.1999999)
@@ -228,7 +228,7 @@ class Camera:
     across, along: footprint of a photo across and along the track, m per m above ground.
     front, side: required overlap with the next photo and with the photos of the next line, as a fraction of the
         footprint; None for no requirement.
-    interval: shortest time between photos, s; 0 if unknown.
+    interval: minimum time between photos, s; 0 if unknown.
     """
 
     across: float
@@ -280,9 +280,10 @@ class Mission:
 
 
 def renumbered(mission: Mission) -> Mission:
-    """Return a mission whose items are numbered from 1 without gaps, as ground stations number them.
+    """Return a mission with its items numbered from 1 without gaps, as ground stations number them.
 
-    Number 0 is home in both forms. The targets of jumps are renumbered too; a jump to a missing item stays one.
+    Number 0 is home in both forms. The targets of jumps are renumbered too; the target of a jump to a missing item
+    stays missing.
 
     >>> way = tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (0, 1, 5))
     >>> [item.seq for item in renumbered(Mission(None, way)).items]
@@ -331,7 +332,7 @@ class ItemProblem(NamedTuple):
         return f"{self.field} {self.value:.10g}: {self.allowed}"
 
     def at(self, file: str, where: object) -> dict[str, Any]:
-        """Return the arguments of a `MissionError` for this problem.
+        """Return the arguments for a `MissionError` on this problem.
 
         file: file that holds the item.
         where: beginning of the message.
@@ -350,7 +351,7 @@ def position_problem(lat_deg: float, lon_deg: float) -> ItemProblem | None:
 
 
 def item_problem(item: MissionItem) -> ItemProblem | None:
-    """Return the fault of an item that no autopilot could interpret, or None.
+    """Return the fault of an item if no autopilot could interpret the item, or None.
 
     >>> print(item_problem(MissionItem(1, 16, 0, (0.0,) * 4, 91.0, 8.0, 75.0)))
     latitude 91: allowed -90..90 degrees (latitude and longitude swapped?)
@@ -377,7 +378,7 @@ def item_problem(item: MissionItem) -> ItemProblem | None:
 
 
 def _count_problem(item: MissionItem) -> ItemProblem | None:
-    """Return the fault of parameters that are counts or sizes, or None."""
+    """Return the fault of an item's parameters that are counts or sizes, or None."""
     p1, p2 = item.params[:2]
     if item.command in JUMPS:
         if not (p1 >= 0 and p1 == int(p1)):

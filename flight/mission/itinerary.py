@@ -1,4 +1,4 @@
-"""A mission's items in flying order: jumps unrolled, speeds assigned, deviations noted.
+"""List a mission's stops in flying order, with jumps unrolled and a speed for each leg.
 
 ArduPlane and PX4 reach the same places in the same order, but run the commands between them at different times. PX4
 runs each where it stands (`MissionBase::advance_mission`). ArduPlane runs the first before the next place, and the
@@ -94,7 +94,7 @@ def loiter_of(item: MissionItem) -> Loiter | None:
 
 
 class OpenItem(NamedTuple):
-    """An item that changes the flight path and is not flown as the autopilot would.
+    """An item that changes the flight path, but is not simulated as the autopilot flies it.
 
     item: seq of the mission item.
     text: its command, and the part that is not flown.
@@ -105,7 +105,7 @@ class OpenItem(NamedTuple):
 
 
 class Gate(NamedTuple):
-    """A CONDITION_GATE on the leg to a stop: commands after it take effect when it is passed.
+    """A CONDITION_GATE on the leg to a stop; later commands take effect when the aircraft passes the gate.
 
     item: seq of the mission item.
     airspeed: airspeed until it is passed, m/s; NaN for the aircraft's own.
@@ -187,7 +187,7 @@ def make_itinerary(mission: Mission) -> Itinerary:
     Raise MissionError for a mission without a position, for a jump to a missing item, and for a mission that unrolls to
     more than `MAX_STOPS` places.
     """
-    walk, steps = _Walk(mission), _Steps(mission)
+    walk, steps = _ItineraryBuilder(mission), _Steps(mission)
     for step in steps:
         walk.take(step)
         if len(walk.stops) > MAX_STOPS:
@@ -225,7 +225,7 @@ def make_itinerary(mission: Mission) -> Itinerary:
 
 
 class _Step(NamedTuple):
-    """The next navigation item, and the commands before it.
+    """The next navigation item, and the commands that precede it.
 
     between: the commands before it, following jumps, as PX4 runs them.
     early: the command that ArduPlane runs before the item, or None.
@@ -294,7 +294,7 @@ class _Steps:
         while k < len(self.items):
             item = self.items[k]
             if counting:
-                self._count_step(item)
+                self._check_length(item)
             if item.command not in JUMPS:
                 return k
             target, repeats = self._jump_target(item), int(item.params[1])
@@ -312,7 +312,7 @@ class _Steps:
                 k += 1
         return None
 
-    def _count_step(self, item: MissionItem) -> None:
+    def _check_length(self, item: MissionItem) -> None:
         self.reached.add(item.seq)
         self._walked += 1
         if self._walked > _MAX_STEPS:
@@ -345,8 +345,8 @@ class _NotesOfBothReadings:
         self.by_value.add(text, seq)
 
 
-class _Walk:
-    """Stops, speed, home and notes while a mission is unrolled."""
+class _ItineraryBuilder:
+    """Build an itinerary step by step; hold its stops, speed, home and notes meanwhile."""
 
     def __init__(self, mission: Mission) -> None:
         self.source = mission.source
@@ -367,12 +367,12 @@ class _Walk:
     def take(self, step: _Step) -> None:
         """Process the commands before a navigation item, and the item."""
         for item in step.between:
-            self._run_by_value(item)
+            self._run_as_px4(item)
         run = () if step.early is None else (step.early, *step.late)
         for k, item in enumerate(run):
             # A home that is set on a leg does not move the altitude of the item that is already flown to.
             if k == 0 or item.command != Command.DO_SET_HOME:
-                self._run(item, run[k + 1 :])
+                self._run_as_arduplane(item, run[k + 1 :])
         for item in step.late:
             if item not in step.between:
                 self.notes.usual.add(f"{command_name(item.command)}: run a round early, as ArduPlane does", item.seq)
@@ -396,13 +396,13 @@ class _Walk:
                 notes.add(text, seq)
                 left[OpenItem(seq, text)] = None
 
-    def _run(self, item: MissionItem, behind: Sequence[MissionItem]) -> None:
+    def _run_as_arduplane(self, item: MissionItem, behind: Sequence[MissionItem]) -> None:
         """Run a command as ArduPlane does.
 
         behind: commands that are run after it on the leg to the same item.
         """
         if item.command == Command.DO_CHANGE_SPEED:
-            self._change_speed(item)
+            self._change_speed_as_arduplane(item)
         elif item.command == Command.DO_SET_HOME:
             self._set_home(item)
         elif item.command == Command.CONDITION_GATE:
@@ -418,12 +418,12 @@ class _Walk:
         else:
             self._note_not_flown(item, by_value=False)
 
-    def _run_by_value(self, item: MissionItem) -> None:
+    def _run_as_px4(self, item: MissionItem) -> None:
         """Run a command as PX4 does."""
         if not item.autocontinue:
             self._note_wait(item)
         if item.command == Command.DO_CHANGE_SPEED:
-            self._change_by_value(item)
+            self._change_speed_as_px4(item)
         elif item.command == Command.CONDITION_GATE:
             self._add_gate(item)
         else:
@@ -456,13 +456,13 @@ class _Walk:
         if not item.autocontinue:
             self._note_wait(item)
         if item.command in TAKEOFFS:
-            self._take_off(item)
+            self._add_take_off(item)
         elif item.command in PLACES:
-            self._fly_to(item)
+            self._add_stop(item)
         elif item.command == Command.NAV_RETURN_TO_LAUNCH:
-            self._return(item)
+            self._add_return(item)
         elif item.command in LANDINGS:
-            self._land(item)
+            self._add_landing(item)
         else:
             self._note_not_flown(item, by_value=False)
             self._note_not_flown(item, by_value=True)
@@ -478,13 +478,13 @@ class _Walk:
         )
 
     def _add_gate(self, item: MissionItem) -> None:
-        """Note a gate as PX4 does, which passes a gate without a position, or before the start, at once."""
+        """Add a gate to the next leg; PX4 passes a gate without a position, or before the start, at once."""
         if item.has_position and self.stops:
             self.gates.append(Gate(item.seq, item.lat_deg, item.lon_deg, self.airspeed_by_value))
         else:
             self.notes.by_value.add(f"{command_name(item.command)}: passed at once", item.seq)
 
-    def _take_off(self, item: MissionItem) -> None:
+    def _add_take_off(self, item: MissionItem) -> None:
         name = command_name(item.command)
         vertical = item.command == Command.NAV_VTOL_TAKEOFF
         if self.stops:
@@ -512,7 +512,7 @@ class _Walk:
         else:
             self.stops.append(over_home)
 
-    def _fly_to(self, item: MissionItem) -> None:
+    def _add_stop(self, item: MissionItem) -> None:
         name = command_name(item.command)
         if not item.has_position and loiter_of(item) is not None and self.stops:
             text = f"{name} without a position: flown about the place before"
@@ -545,7 +545,7 @@ class _Walk:
         radius = item.params[1] if item.command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT) else 0.0
         self.stops.append(self._make_stop(item, radius if radius > 0.0 else 0.0))
 
-    def _return(self, item: MissionItem) -> None:
+    def _add_return(self, item: MissionItem) -> None:
         if not self.has_home and self.home is self.first_home:
             self.leave_open("NAV_RETURN_TO_LAUNCH without a home: not flown", item.seq)
         elif not self.stops:
@@ -557,7 +557,7 @@ class _Walk:
             self.stops.append(replace(self._make_stop(home), airspeed=math.nan, airspeed_by_value=math.nan))
             self.ended = True
 
-    def _land(self, item: MissionItem) -> None:
+    def _add_landing(self, item: MissionItem) -> None:
         name = command_name(item.command)
         if not self.stops:
             self.leave_open(f"{name} before the start: not flown", item.seq)
@@ -590,7 +590,7 @@ class _Walk:
             return
         self.home = Home(item.lat_deg, item.lon_deg, up)
 
-    def _change_speed(self, item: MissionItem) -> None:
+    def _change_speed_as_arduplane(self, item: MissionItem) -> None:
         """Read a speed change as ArduPlane does (`Plane::do_change_speed`)."""
         kind, speed, throttle = item.params[:3]
         notes = self.notes.usual
@@ -613,7 +613,7 @@ class _Walk:
         elif speed != -1.0:
             notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: ignored", item.seq)
 
-    def _change_by_value(self, item: MissionItem) -> None:
+    def _change_speed_as_px4(self, item: MissionItem) -> None:
         """Read a speed change as PX4 does (`navigator_main.cpp`, VEHICLE_CMD_DO_CHANGE_SPEED)."""
         kind, speed, throttle = item.params[:3]
         notes = self.notes.by_value

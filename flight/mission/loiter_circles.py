@@ -1,4 +1,4 @@
-"""Loiters on the map: where a route joins a loiter, how far around it goes, and where it leaves.
+"""Lay out loiters on the map, from joining the circle to leaving it.
 
 A loiter is laid out as the corners of a polygon around its circle, each with an arc of the circle's radius. The arcs
 touch, so that the path is the circle, while turns, legs, altitudes and clearances are judged as everywhere else. The
@@ -65,7 +65,7 @@ class LoiterRules:
     lines_up: True if, steering to the center, it counts turns from where it turns away from the center, and continues
         after the loiter is over until it heads for the next waypoint within `LINED_UP`.
     holds_height: True if it holds its altitude on the leg to a loiter that climbs or descends to an altitude.
-    climb, sink: fastest climb and descent in a loiter, m/s.
+    climb, sink: maximum climb and descent rate in a loiter, m/s.
     short: altitude tolerance, m.
     ends_in_circle: True if it loiters without end about a mission's last waypoint.
     unflown: note for people on the parts of its loiters that are not flown, "" for none.
@@ -90,7 +90,7 @@ class LoiterRules:
     before_return: str = ""
 
     def end_note(self) -> str:
-        """Return a note for people on what happens after the mission's end.
+        """Return a note for people on the loiter that follows the mission's end.
 
         >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
         'after the last waypoint it circles about that without end, with NAV_LOITER_RAD, 80 m: flown once'
@@ -129,7 +129,7 @@ class RoutePoint:
 
 
 class Unjoined(NamedTuple):
-    """A stop that is not laid out where its item says, since no tangent joins it to a circle.
+    """A stop that is not laid out at its stated position, because no tangent joins it to a circle.
 
     item, circle: seq of its item, and seq of the circle's item.
     is_circle: True if it is a circle, which is laid out on the other circle; otherwise it lies inside that circle and
@@ -179,7 +179,7 @@ def lay_circles(
     MissionError for a loiter too wide or too long to lay out.
     """
     unjoined: list[Unjoined] = []
-    nodes = _nodes(source, stops, notes, own_radius, rules, unjoined)
+    nodes = _make_nodes(source, stops, notes, own_radius, rules, unjoined)
     courses = [tangent_course(a, b) for a, b in pairwise(nodes)]
     points: list[RoutePoint] = []
     up = float(stops[0].position[2])
@@ -204,7 +204,7 @@ def lay_circles(
     return points, tuple(unjoined)
 
 
-def _nodes(
+def _make_nodes(
     source: str,
     stops: list[PlacedStop],
     notes: Notes,
@@ -212,9 +212,9 @@ def _nodes(
     rules: LoiterRules,
     unjoined: list[Unjoined],
 ) -> list[Node]:
-    """Return points and circles in flying order, each with a tangent to the next.
+    """Return points and circles in flying order, each joined to the next by a tangent.
 
-    ``unjoined`` gets the others.
+    Append the stops that no tangent joins to ``unjoined``.
 
     A flight that takes off inside its first circle begins on that circle: no part of its take-off is flown.
     """
@@ -328,7 +328,7 @@ def _corners_around(
     slopes: SpiralSlopes,
     rules: LoiterRules,
 ) -> list[RoutePoint]:
-    """Return the corners around a circle, joined on one course and left on another.
+    """Return the corners around a circle that the path joins on one course and leaves on another.
 
     into, onward: those courses, rad; ``onward`` is None at the mission's end.
 

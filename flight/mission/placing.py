@@ -112,16 +112,16 @@ def place_stops(
     if itinerary is None:
         itinerary = make_itinerary(mission)
     heights = _Heights(mission.source, itinerary.home, origin, terrain, notes)
-    stops = _placed_stops(mission.source, itinerary, origin, heights, vertical_legs)
+    stops = _place_stops(mission.source, itinerary, origin, heights, vertical_legs)
     takeoff_ground = math.nan if itinerary.takeoff is None else heights.ground_at_home()
     landing_ground = heights.touchdown(itinerary)
     back, heights_back, home = mission, heights, itinerary.last_home or itinerary.home
     if home is not itinerary.home:
         # A return and its landing sequence use the home that a DO_SET_HOME set.
         back, heights_back = replace(mission, home=home), _Heights(mission.source, home, origin, terrain, notes)
-    places = _return_places(back, home, origin, heights_back) if itinerary.returns else ()
-    marked = tuple(_marked_starts(back, origin, heights_back)) if itinerary.returns else ()
-    landings = _landings(back, origin, heights_back, marked)
+    places = _place_returns(back, home, origin, heights_back) if itinerary.returns else ()
+    marked = tuple(_landing_starts(back, origin, heights_back)) if itinerary.returns else ()
+    landings = _place_landings(back, origin, heights_back, marked)
     return PlacedMission(
         mission,
         origin,
@@ -149,11 +149,11 @@ def return_places(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) 
     if mission.home is None:
         return ()
     heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
-    return _return_places(mission, mission.home, origin, heights)
+    return _place_returns(mission, mission.home, origin, heights)
 
 
 def home_place(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> ReturnPlace | None:
-    """Return a mission's home on the map, wherever its rally points are, or None if it has none.
+    """Return a mission's home on the map, or None if the mission has no home; rally points are not checked.
 
     >>> home_place(Mission(Home(36.5, 8.0, 300.0), ()), GeoOrigin(36.5, 8.0), None).up
     300.0
@@ -177,10 +177,10 @@ def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None)
     if mission.home is None:
         return ()
     heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
-    return tuple(start for _, start in _marked_starts(mission, origin, heights))
+    return tuple(start for _, start in _landing_starts(mission, origin, heights))
 
 
-def _marked_starts(mission: Mission, origin: GeoOrigin, heights: "_Heights") -> Iterator[tuple[int, LandingStart]]:
+def _landing_starts(mission: Mission, origin: GeoOrigin, heights: "_Heights") -> Iterator[tuple[int, LandingStart]]:
     """Yield the start of each landing sequence with the list index of its DO_LAND_START.
 
     A DO_LAND_START with nothing to fly to after it is left out.
@@ -189,23 +189,23 @@ def _marked_starts(mission: Mission, origin: GeoOrigin, heights: "_Heights") -> 
         first = next((one for one in mission.items[k + 1 :] if _is_flown_to(one)), None)
         if mark.command != Command.DO_LAND_START or first is None:
             continue
-        place = _placed_start(first, origin, heights)
+        place = _place_start(first, origin, heights)
         onward = _places_to_landing(mission.items[k + 1 :], origin, heights)[1:]
-        counted = _place_of(mark, origin, heights) if mark.has_position else place.place
+        counted = _position_of(mark, origin, heights) if mark.has_position else place.place
         yield k, place._replace(mark=counted, onward=onward)
 
 
-def _landings(
+def _place_landings(
     mission: Mission, origin: GeoOrigin, heights: "_Heights", marked: Sequence[tuple[int, LandingStart]]
 ) -> tuple[PlacedLanding, ...]:
-    """Return a mission's landing sequences, except those that begin with the landing or cannot be placed."""
+    """Return a mission's landing sequences, without those that begin with the landing or cannot be placed."""
     found = []
     for k, start in marked:
         if start.lands:
             continue
         try:
             itinerary = make_itinerary(replace(mission, items=mission.items[k:]))
-            stops = _placed_stops(mission.source, itinerary, origin, heights, vertical_legs=False)
+            stops = _place_stops(mission.source, itinerary, origin, heights, vertical_legs=False)
         except MissionError:
             continue
         if itinerary.landing is not None and len(stops) > 1:
@@ -218,9 +218,11 @@ def _landings(
 def landing_sequence(
     mission: Mission, origin: GeoOrigin, terrain: Terrain | None, first: int
 ) -> tuple[LandingStart, ...]:
-    """Return the places of a landing sequence, from an item up to the landing, which is left out.
+    """Return the places of a landing sequence, from item `first` up to the landing, without the landing itself.
 
-    Empty for a mission without a home. first: number of the item.
+    first: number of the first item.
+
+    Return no places for a mission without a home.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> over, none = int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4
@@ -245,7 +247,7 @@ def _places_to_landing(
         if item.command in LANDINGS:
             break
         if _is_flown_to(item):
-            found.append(_placed_start(item, origin, heights))
+            found.append(_place_start(item, origin, heights))
     return tuple(found)
 
 
@@ -253,20 +255,20 @@ def _is_flown_to(item: MissionItem) -> bool:
     return item.command in PLACES | LANDINGS and item.has_position
 
 
-def _place_of(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> tuple[float, float, float]:
+def _position_of(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> tuple[float, float, float]:
     stop = ItineraryStop(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
     east, north = on_map(heights.source, (stop,), origin)[0].tolist()
     return east, north, heights.amsl(stop, east, north, heights.home_amsl())
 
 
-def _placed_start(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> LandingStart:
-    place, loiter = _place_of(item, origin, heights), loiter_of(item)
+def _place_start(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> LandingStart:
+    place, loiter = _position_of(item, origin, heights), loiter_of(item)
     radius = (loiter or Loiter(0.0)).radius
     return LandingStart(item.seq, place, place, loiter is not None, radius, lands=item.command in LANDINGS)
 
 
 def landing_places(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, float, float], ...]:
-    """Return where a mission lands: item number, east and north (m) of each landing that states a place.
+    """Return the item number, east and north (m) of each landing that states a position.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> land = MissionItem(2, Command.NAV_LAND, Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, 36.5, 8.0, 10.0)
@@ -283,7 +285,7 @@ def landing_places(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, floa
 
 
 def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
-    """Return a mission's rally points as places to fly to; as in ArduPlane, a point at 0, 0 is ignored.
+    """Return a mission's rally points as stops; ignore a point at 0, 0, as ArduPlane does.
 
     >>> from flight.mission.items import Frame, MissionItem
     >>> point = MissionItem(0, 5100, Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, 36.5, 8.0, 90.0)
@@ -297,7 +299,7 @@ def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
     )
 
 
-def _return_places(mission: Mission, home: Home, origin: GeoOrigin, heights: "_Heights") -> tuple[ReturnPlace, ...]:
+def _place_returns(mission: Mission, home: Home, origin: GeoOrigin, heights: "_Heights") -> tuple[ReturnPlace, ...]:
     """Return home and the rally points on the map.
 
     Raise MissionError, naming the rally point, for one beyond the largest map.
@@ -316,7 +318,7 @@ def _return_places(mission: Mission, home: Home, origin: GeoOrigin, heights: "_H
     return tuple(places)
 
 
-def _placed_stops(
+def _place_stops(
     source: str, itinerary: Itinerary, origin: GeoOrigin, heights: "_Heights", vertical_legs: bool
 ) -> list[PlacedStop]:
     """Return the stops on the map, merging a stop with the one before at the same position."""
@@ -332,7 +334,7 @@ def _placed_stops(
             if vertical_legs and _is_vertical(kept[-1], new):
                 kept.append(PlacedStop(stop, _offset_vertical_leg(kept, new.position)))
                 continue
-            kept[-1] = PlacedStop(_merge(source, kept[-1], new, notes), kept[-1].position)
+            kept[-1] = PlacedStop(_merge_stops(source, kept[-1], new, notes), kept[-1].position)
         else:
             kept.append(new)
     return kept
@@ -349,11 +351,11 @@ def on_map(source: str, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> 
     if far.any():
         stop = stops[int(np.argmax(far))]
         raise MissionError(
-            f"{source}: {_name(stop)}: latitude {stop.lat_deg:.7f}, longitude {stop.lon_deg:.7f}: more than"
+            f"{source}: {_stop_name(stop)}: latitude {stop.lat_deg:.7f}, longitude {stop.lon_deg:.7f}: more than"
             f" {MAP_EXTENT / 1000:.0f} km from the map's origin at {origin.lat_deg:.5f}, {origin.lon_deg:.5f}"
             " (columns swapped, or a sign lost?)",
             file=source,
-            field=_name(stop),
+            field=_stop_name(stop),
             value=(stop.lat_deg, stop.lon_deg),
         )
     return points
@@ -377,7 +379,7 @@ class _Heights:
         """
         if math.isnan(stop.alt):
             if math.isnan(last):
-                message = f"{self.source}: {_name(stop)}: no altitude, and none before to keep"
+                message = f"{self.source}: {_stop_name(stop)}: no altitude, and none before to keep"
                 raise MissionError(message, file=self.source, field="altitude")
             return last
         if stop.frame in AMSL:
@@ -385,17 +387,17 @@ class _Heights:
         elif stop.frame in OVER_HOME:
             height = self.home_amsl() + stop.alt
         else:
-            height = self._ground(stop, east, north) + stop.alt
+            height = self._ground_below(stop, east, north) + stop.alt
         if not LOWEST <= height <= HIGHEST:
             allowed = f"allowed {LOWEST:.0f}..{HIGHEST:.0f}"
-            raise MissionError.at(self.source, _name(stop), height, allowed, shown=f"{height:.1f} m AMSL")
+            raise MissionError.at(self.source, _stop_name(stop), height, allowed, shown=f"{height:.1f} m AMSL")
         return height
 
-    def _ground(self, stop: ItineraryStop, east: float, north: float) -> float:
+    def _ground_below(self, stop: ItineraryStop, east: float, north: float) -> float:
         terrain = self.terrain
         under = math.nan if terrain is None else float(terrain.height(east, north))
         if math.isnan(under):
-            asked = f"{self.source}: {_name(stop)}: height above terrain (frame {stop.frame})"
+            asked = f"{self.source}: {_stop_name(stop)}: height above terrain (frame {stop.frame})"
             lacks = "no terrain is given to count from" if terrain is None else f"{terrain.source} has no data there"
             raise MissionError(f"{asked}: {lacks}", file=self.source, field="frame", value=stop.frame)
         return under
@@ -455,7 +457,7 @@ def _is_vertical(kept: PlacedStop, new: PlacedStop) -> bool:
 
 
 def _offset_vertical_leg(kept: list[PlacedStop], point: Floats) -> Floats:
-    """Return the last position moved by `VERTICAL_STEP` m along its course, at the altitude of a point.
+    """Return the last position, moved by `VERTICAL_STEP` m along its course and to the altitude of `point`.
 
     Without a course the last position is moved to the east.
     """
@@ -466,7 +468,7 @@ def _offset_vertical_leg(kept: list[PlacedStop], point: Floats) -> Floats:
     return np.array([east + VERTICAL_STEP * math.sin(course), north + VERTICAL_STEP * math.cos(course), point[2]])
 
 
-def _merge(source: str, kept: PlacedStop, new: PlacedStop, notes: Notes) -> ItineraryStop:
+def _merge_stops(source: str, kept: PlacedStop, new: PlacedStop, notes: Notes) -> ItineraryStop:
     """Merge a stop with the one before it at the same place; return the merged stop."""
     before, after = kept.stop, new.stop
     climb = float(new.position[2] - kept.position[2])
@@ -474,18 +476,18 @@ def _merge(source: str, kept: PlacedStop, new: PlacedStop, notes: Notes) -> Itin
         side = "above" if climb > 0.0 else "below"
         if after.command not in TAKEOFFS:
             raise MissionError(
-                f"{source}: {_name(after)}: {abs(climb):.1f} m straight {side} {_name(before)}:"
+                f"{source}: {_stop_name(after)}: {abs(climb):.1f} m straight {side} {_stop_name(before)}:"
                 " no fixed wing flies that; places differ by 1 m or more across the ground, or in nothing",
                 file=source,
-                field=_name(after),
+                field=_stop_name(after),
             )
         notes.add(f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the leg that follows", after.item)
     else:
-        notes.add(f"at the place of {_name(before)}: merged with it", after.item)
+        notes.add(f"at the place of {_stop_name(before)}: merged with it", after.item)
     return before if before.item >= 0 else after
 
 
-def _name(stop: ItineraryStop) -> str:
+def _stop_name(stop: ItineraryStop) -> str:
     if stop.command == Command.NAV_RALLY_POINT:
         return f"rally point {stop.item + 1}"
     return f"item {stop.item}" if stop.item >= 0 else "home"

@@ -50,16 +50,16 @@ def field_notes(
         places, beyond = (), (str(error),)
     return (
         *beyond,
-        *_tail_winds(route, scenario),
-        *_home_elsewhere(mission, scenario),
-        *_rally_points(places[1:], route, scenario, rules),
-        *_low_return(places[:1], scenario, rules),
-        *_forbidden_landing_sequence(mission, parameters),
+        *_note_tail_winds(route, scenario),
+        *_note_distant_home(mission, scenario),
+        *_note_rally_points(places[1:], route, scenario, rules),
+        *_note_low_return(places[:1], scenario, rules),
+        *_note_forbidden_landing_sequence(mission, parameters),
         *_landing_ground(mission, route, scenario),
     )
 
 
-def _tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
+def _note_tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
     """Note tail wind at a launch or a landing that the scenario states."""
     courses = leg_courses(route.waypoints)
     launch, landing = scenario.launch, scenario.landing
@@ -75,7 +75,7 @@ def _tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
             yield f"{name}: {tail:.1f} m/s of wind from behind on {round(math.degrees(course)) % 360}°"
 
 
-def _home_elsewhere(mission: Mission, scenario: Scenario) -> Iterator[str]:
+def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
     """Note a mission's home that is far from the scenario's home, where the launch is."""
     home, stated = mission.home, scenario.home
     if home is None or stated is None:
@@ -86,7 +86,7 @@ def _home_elsewhere(mission: Mission, scenario: Scenario) -> Iterator[str]:
         yield f"the mission's home is {away:.0f} m from the scenario's: launched there, heights count from elsewhere"
 
 
-def _rally_points(
+def _note_rally_points(
     points: tuple[ReturnPlace, ...], route: Route, scenario: Scenario, rules: ReturnRules
 ) -> Iterator[str]:
     """Note rally points below ground, and those beyond the distance limit of every return from the route."""
@@ -96,13 +96,13 @@ def _rally_points(
         up = point.up + rules.rally_height
         if up <= under:
             yield f"{name} is {under - up:.0f} m under the ground there: {up:.0f} m AMSL, the ground {under:.0f} m"
-        away = _distance(route.waypoints, (point.east, point.north))
+        away = _distance_from_path(route.waypoints, (point.east, point.north))
         if 0.0 < rules.rally_limit < away:
             limit = f"RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
             yield f"{name} is {away / 1000.0:.1f} km from the mission or more, beyond {limit}: no return flies to it"
 
 
-def _distance(way: Floats, spot: tuple[float, float]) -> float:
+def _distance_from_path(way: Floats, spot: tuple[float, float]) -> float:
     """Return the smallest horizontal distance of a point from a path (w, 3), m."""
     begin, step = way[:-1, :2], np.diff(way[:, :2], axis=0)
     length2 = np.maximum(1e-12, (step**2).sum(axis=1))
@@ -110,7 +110,7 @@ def _distance(way: Floats, spot: tuple[float, float]) -> float:
     return float(np.hypot(*(begin + share[:, None] * step - np.array(spot)).T).min())
 
 
-def _low_return(home: tuple[ReturnPlace, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
+def _note_low_return(home: tuple[ReturnPlace, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
     """Note a return to home whose altitude is below the ground under its loiter."""
     if not home or scenario.terrain is None or math.isnan(rules.height):
         return
@@ -126,7 +126,7 @@ def _low_return(home: tuple[ReturnPlace, ...], scenario: Scenario, rules: Return
         )
 
 
-def _forbidden_landing_sequence(mission: Mission, parameters: Mapping[str, float]) -> Iterator[str]:
+def _note_forbidden_landing_sequence(mission: Mission, parameters: Mapping[str, float]) -> Iterator[str]:
     """Note a landing sequence that a parameter forbids: ArduPlane's check before arming (AP_Arming.cpp)."""
     marks = [item.seq for item in mission.items if item.command == Command.DO_LAND_START]
     if marks and parameters.get("RTL_AUTOLAND") == 0.0:

@@ -75,7 +75,7 @@ class LandingStart(NamedTuple):
 
 
 def nearest_landing(here: Place, landings: Sequence[LandingStart]) -> LandingStart | None:
-    """Return the landing sequence that ArduPlane chooses at a place (east, north, up): the nearest in 3D.
+    """Return the landing sequence that ArduPlane chooses at a position (east, north, up), the nearest in 3D.
 
     It follows `AP_Mission::get_landing_sequence_start` (libraries/AP_Mission/AP_Mission.cpp). Return None without any.
 
@@ -104,9 +104,9 @@ class ReturnRules:
     radius: loiter radius there, m, negative to the left; 0 for the aircraft's own radius.
     climb_first: height gain before it turns with its full bank limit, m; inf for the whole missing height, 0 for none.
     first_bank: bank limit during that climb, rad.
-    sink: fastest descent, m/s.
+    sink: maximum descent rate, m/s.
     least_slope: height difference below which a descent is flown as a step, at once, m.
-    rally_limit: largest distance to the nearest rally point that is flown to, m; 0 for no limit.
+    rally_limit: maximum distance to the nearest rally point that is flown to, m; 0 for no limit.
     includes_home: True if home is chosen where it is nearer than every rally point.
     slope_to_stated_height: True if the slope down to a rally point is drawn as if its height above home were an
         altitude AMSL, and flown no higher than its start. ArduPlane 4.6-dev does that: it holds its altitude first, and
@@ -207,11 +207,13 @@ def choose_target(rules: ReturnRules, here: Place, home: ReturnPlace, rally: Seq
     away = _distance(here, rally[nearest])
     name = f"rally point {rally[nearest].number or nearest + 1}"
     if 0.0 < rules.rally_limit < away:
-        reason = f"{name}, the nearest, is {_km(away)} away, beyond RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
+        reason = (
+            f"{name}, the nearest, is {_distance_text(away)} away, beyond RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
+        )
         return go_home._replace(reason=reason)
     if rules.includes_home and to_home <= away:
         why = "" if rules.holds_height else " (RALLY_INCL_HOME 1)"
-        return go_home._replace(reason=f"nearer than {name}, which is {_km(away)} away{why}")
+        return go_home._replace(reason=f"nearer than {name}, which is {_distance_text(away)} away{why}")
     count = f"of {len(rally)} rally points" if len(rally) > 1 else "rally point"
     point = rally[nearest]
     base = point.base if rules.slope_to_stated_height else _LEVEL_SLOPE_BASE_M * rules.holds_height
@@ -253,7 +255,7 @@ def described_return(target: ReturnTarget, rules: ReturnRules, up: float, onward
             )
     ends = f"from its circle on to {onward}" if onward else f"circles for {UNLIMITED:.0f} s; the mission ends there"
     return (
-        f"NAV_RETURN_TO_LAUNCH: to {target.name}, {_km(target.distance)} away{reason}, {way}"
+        f"NAV_RETURN_TO_LAUNCH: to {target.name}, {_distance_text(target.distance)} away{reason}, {way}"
         f" {target.position[2]:.0f} m AMSL{first}; {ends}"
     )
 
@@ -266,7 +268,7 @@ def lay_return(
     ability: ReturnAbility,
     onward: Place | None = None,
 ) -> list[RoutePoint]:
-    """Return the waypoints of a return: its turn, its straight leg, and the loiter at its end.
+    """Return the waypoints of a return's turn, its straight leg, and the loiter at its end.
 
     before: the route up to the return, which begins at its last point, on the course of its last leg.
     stop: the itinerary stop of the return.
@@ -315,33 +317,37 @@ class _ReturnBuilder:
         return abs(self._slope_from[2] - self._circle.up + self._slope_base) < self._least_slope
 
     @property
-    def _rise(self) -> float:
+    def _height_difference(self) -> float:
         return self._circle.up - self._at[2]
 
     def turn_gently(self, course: float, rules: ReturnRules) -> float:
         """Fly the arc at the first bank limit while that limit applies, and return the course at its end."""
-        climb = min(rules.climb_first, max(0.0, self._rise)) if math.isinf(rules.climb_first) else rules.climb_first
+        climb = (
+            min(rules.climb_first, max(0.0, self._height_difference))
+            if math.isinf(rules.climb_first)
+            else rules.climb_first
+        )
         if climb <= 0.0:
             return course
         wide = self._ability.turn_radius(course, course + math.pi, self._at[2])
         wide *= math.tan(self._ability.max_bank) / math.tan(max(1e-3, rules.first_bank))
-        arc = self._arc(course, wide)
+        arc = self._turn_to_tangent(course, wide)
         if arc is None:
             return course
         node, part, onward = arc
         # A height gain that is never reached never lifts the limit.
-        length = climb / self._ability.climb if self._rise >= climb else math.inf
+        length = climb / self._ability.climb if self._height_difference >= climb else math.inf
         sweep = min(part, length / wide)
         self._add_arc(node, course, sweep)
         end = course + math.copysign(sweep, node.turn)
-        self._add(*on_rim(node, end), 0.0)
+        self._add_waypoint(*on_rim(node, end), 0.0)
         self._slope_from = self._at
         return onward if sweep == part else end
 
     def turn(self, course: float) -> None:
         """Fly the turn to the target, the straight leg, and the loiter there."""
         bearing = _course(self._at, (self._circle.east, self._circle.north, 0.0))
-        arc = self._arc(course, self._ability.turn_radius(course, bearing, self._at[2]))
+        arc = self._turn_to_tangent(course, self._ability.turn_radius(course, bearing, self._at[2]))
         point = Node(self._stop, *self._at)
         if arc is None:
             # No tangent leads from the turn to the loiter: the corner stays sharp.
@@ -350,7 +356,7 @@ class _ReturnBuilder:
             node, part, onward = arc
             if abs(node.turn) * math.tan(0.5 * min(part, CORNER)) > _MIN_TANGENT_M:
                 self._add_arc(node, course, part)
-                self._add(*on_rim(node, onward), 0.0)
+                self._add_waypoint(*on_rim(node, onward), 0.0)
             else:
                 onward = tangent_course(point, self._circle)
         self._add_slope_break(onward)
@@ -360,10 +366,10 @@ class _ReturnBuilder:
         """Add a waypoint on the straight leg where a climb or step ends, or a held altitude begins to fall."""
         join = on_rim(self._circle, onward)
         run = math.hypot(join[0] - self._at[0], join[1] - self._at[1])
-        if self._rise > 0.0:
-            needed = self._rise / self._ability.climb
+        if self._height_difference > 0.0:
+            needed = self._height_difference / self._ability.climb
         elif self._is_step:
-            needed = -self._rise / self._dive
+            needed = -self._height_difference / self._dive
         else:
             fall = self._slope_from[2] - self._circle.up
             begins = self._slope_base / max(1e-6, fall + self._slope_base)
@@ -371,14 +377,14 @@ class _ReturnBuilder:
             needed = run * (begins - first) / max(1e-6, last - first)
         if _MIN_TANGENT_M < needed < run - _MIN_TANGENT_M:
             east, north = (a + needed / run * (b - a) for a, b in zip(self._at[:2], join, strict=True))
-            self._add(east, north, 0.0)
+            self._add_waypoint(east, north, 0.0)
 
     def circle_from(self, east: float, north: float, course: float) -> None:
         """Fly to a point on the circle, and around it until its altitude is reached and its time is over."""
         if math.hypot(east - self._at[0], north - self._at[1]) > _MIN_TANGENT_M:
-            self._add(east, north, 0.0)
+            self._add_waypoint(east, north, 0.0)
         radius = abs(self._circle.turn)
-        missing = self._rise
+        missing = self._height_difference
         spiral = abs(missing) / (self._ability.climb if missing > 0.0 else self._dive) / radius
         if self._onward is not None:
             self._continue_to(course, spiral if abs(missing) > _LANDING_JOIN_TOLERANCE_M else 0.0, self._onward)
@@ -388,10 +394,10 @@ class _ReturnBuilder:
 
     def _add_circle(self, course: float, sweep: float) -> None:
         self._add_arc(self._circle, course, sweep, on_circle=True)
-        self._add(*on_rim(self._circle, course + math.copysign(sweep, self._circle.turn)), 0.0, on_circle=True)
+        self._add_waypoint(*on_rim(self._circle, course + math.copysign(sweep, self._circle.turn)), 0.0, on_circle=True)
 
     def _continue_to(self, course: float, spiral: float, onward: Place) -> None:
-        """Fly around the circle until its altitude is reached, and turn from there to a place.
+        """Fly around the circle until its altitude is reached, and turn towards a place.
 
         The turn takes the shorter direction.
         """
@@ -400,23 +406,27 @@ class _ReturnBuilder:
             course += math.copysign(spiral, self._circle.turn)
         self._circle = Node(self._stop, onward[0], onward[1], self._at[2])
         radius = self._ability.turn_radius(course, _course(self._at, onward), self._at[2])
-        arc = self._arc(course, radius)
+        arc = self._turn_to_tangent(course, radius)
         if arc is not None and radius * math.tan(0.5 * min(arc[1], CORNER)) > _MIN_TANGENT_M:
             node, part, end = arc
             self._add_arc(node, course, part, on_circle=True)
-            self._add(*on_rim(node, end), 0.0, on_circle=True)
+            self._add_waypoint(*on_rim(node, end), 0.0, on_circle=True)
 
-    def _arc(self, course: float, radius: float) -> tuple[Node, float, float] | None:
-        """Return the arc from here to a tangent of the target's loiter: its circle, angle and final course.
+    def _turn_to_tangent(self, course: float, radius: float) -> tuple[Node, float, float] | None:
+        """Return the circle, angle and final course of the arc that leads to a tangent of the target's loiter.
 
         Choose the shorter direction; return None if no tangent leads on.
         """
         off = float(wrap(_course(self._at, (self._circle.east, self._circle.north, 0.0)) - course))
         side = math.copysign(1.0, off)
-        found = [one for one in (self._arc_to(course, side * radius), self._arc_to(course, -side * radius)) if one]
+        found = [
+            one
+            for one in (self._turn_on_side(course, side * radius), self._turn_on_side(course, -side * radius))
+            if one
+        ]
         return next((one for one in found if one[1] < _MAX_TURN_ANGLE_RAD), None)
 
-    def _arc_to(self, course: float, turn: float) -> tuple[Node, float, float] | None:
+    def _turn_on_side(self, course: float, turn: float) -> tuple[Node, float, float] | None:
         east, north, up = self._at
         node = Node(self._stop, east + turn * math.cos(course), north - turn * math.sin(course), up, turn)
         if not is_joined(node, self._circle):
@@ -426,10 +436,10 @@ class _ReturnBuilder:
 
     def _add_arc(self, node: Node, course: float, sweep: float, *, on_circle: bool = False) -> None:
         for east, north in circle_corners(node, course, sweep):
-            self._add(east, north, abs(node.turn), on_circle=on_circle)
+            self._add_waypoint(east, north, abs(node.turn), on_circle=on_circle)
 
-    def _add(self, east: float, north: float, arc: float, *, on_circle: bool = False) -> None:
-        """Add a waypoint at the return's altitude there."""
+    def _add_waypoint(self, east: float, north: float, arc: float, *, on_circle: bool = False) -> None:
+        """Add a waypoint at the altitude that the return has at this position."""
         run = math.hypot(east - self._at[0], north - self._at[1])
         up, end = self._at[2], self._circle.up
         if end >= up:
@@ -449,14 +459,14 @@ class _ReturnBuilder:
         return min(start, end + left * (start - end + self._slope_base))
 
     def _slope_fraction(self, east: float, north: float) -> float:
-        """Return the fraction of the slope's line that lies behind a point."""
+        """Return the fraction of the sloping line that lies behind a point."""
         from_e, from_n, _ = self._slope_from
         along_e, along_n = self._circle.east - from_e, self._circle.north - from_n
         return ((east - from_e) * along_e + (north - from_n) * along_n) / max(1e-6, along_e**2 + along_n**2)
 
 
 def _rim_ahead(here: Place, course: float, circle: Node) -> tuple[float, float, float]:
-    """Return where a straight path from inside a circle meets it, and the course around it there."""
+    """Return the point where a straight path from inside a circle meets the circle, and its course on the circle."""
     off_e, off_n = here[0] - circle.east, here[1] - circle.north
     along = off_e * math.sin(course) + off_n * math.cos(course)
     ahead = -along + math.sqrt(max(0.0, along * along + circle.turn * circle.turn - off_e * off_e - off_n * off_n))
@@ -473,5 +483,5 @@ def _distance(a: Place, b: Place | ReturnPlace) -> float:
     return math.hypot(b[0] - a[0], b[1] - a[1])
 
 
-def _km(distance: float) -> str:
+def _distance_text(distance: float) -> str:
     return f"{distance / 1000.0:.1f} km" if distance >= 1000.0 else f"{distance:.0f} m"

@@ -1,4 +1,4 @@
-"""A mission's route as the aircraft flies it: waypoints on the map with airspeeds, jumps unrolled."""
+"""Lay out a mission's route as the aircraft flies it, with waypoints, airspeeds and unrolled jumps."""
 
 import math
 from collections.abc import Callable
@@ -181,7 +181,7 @@ class RouteRules(NamedTuple):
     reads_as_px4: True if it reads only the value of a speed change, and reads gates, as PX4 does.
     turn_distance: distance before a waypoint at which it turns to the next leg, m, by the turn (rad, positive) and the
         waypoint's altitude (m AMSL); None for guidance that follows the fly-by path.
-    acceptance_limit: largest acceptance radius that it accepts from an item, m.
+    acceptance_limit: maximum acceptance radius that it accepts from an item, m.
     """
 
     returns: ReturnRules = USUAL_RULES
@@ -205,7 +205,7 @@ def fly_over_waypoints(
     limits: Limits | None,
     turn_distance: Callable[[float, float], float] | None = None,
 ) -> NDArray[np.bool_]:
-    """Return which waypoints (w,) are flown over, since the fly-by arc at the bank limit misses them.
+    """Flag the waypoints that are flown over, because the fly-by arc at the bank limit misses them, (w,).
 
     points: (w, 3) m.
     airspeed: (w - 1,) m/s.
@@ -429,7 +429,7 @@ def lay_route(
         acceptance=acceptance,
         fly_over=(arcs == 0.0) & (fly_over | over),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
-        started=_started(placed.itinerary, stops[0], placed.origin, waypoints),
+        started=_start_text(placed.itinerary, stops[0], placed.origin, waypoints),
         notes=_notes_of(placed.itinerary, landing, reads_as_px4) + placed.notes + notes.lines(),
         arcs=arcs,
         stops=np.cumsum([False, *(a is not b for a, b in pairwise(stops))]),
@@ -466,7 +466,7 @@ def _notes_of(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4:
 
 
 def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[OpenItem, ...]:
-    """Return the items that leave the verdict open, of an itinerary and of its return's landing sequence."""
+    """Return the items of an itinerary, and of its return's landing sequence, that leave the verdict open."""
     own = itinerary.open_by_value if reads_as_px4 else itinerary.open_items
     return own if landing is None else own + landing.open_items
 
@@ -474,30 +474,30 @@ def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px
 def _lay_circles(
     source: str, limits: Limits | None, loiters: LoiterRules, notes: Notes, stops: list[PlacedStop]
 ) -> tuple[list[RoutePoint], tuple[Unjoined, ...]]:
-    return lay_circles(source, stops, notes, _own_radius(limits), _spiral_slopes(limits), loiters)
+    return lay_circles(source, stops, notes, _make_own_radius(limits), _make_spiral_slopes(limits), loiters)
 
 
 def _direct_landing(
     placed: PlacedMission, kept: list[PlacedStop], rules: ReturnRules, notes: Notes
 ) -> PlacedLanding | None:
-    """Return the landing sequence that a return flies to at once, or None.
+    """Return the landing sequence to which a return flies directly, or None.
 
     kept: the stops before the return.
     """
     if rules.lands != "straight" or not kept:
         return None
     east, north, up = kept[-1].position.tolist()
-    landing = _nearest(placed, (east, north, up), notes)
+    landing = _nearest_landing(placed, (east, north, up), notes)
     if landing is None:
         return None
     away, seq = math.dist((east, north), landing.start.place[:2]), placed.itinerary.stops[-1].item
     text = f"at once to the landing sequence at item {landing.start.item}, {away / 1000.0:.1f} km away"
-    notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name}: {text}{_nearest_of_text(placed)}", seq)
+    notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name}: {text}{_landing_choice_text(placed)}", seq)
     return landing
 
 
-def _nearest(placed: PlacedMission, here: tuple[float, float, float], notes: Notes) -> PlacedLanding | None:
-    """Return the landing sequence that a return goes to from a place, m.
+def _nearest_landing(placed: PlacedMission, here: tuple[float, float, float], notes: Notes) -> PlacedLanding | None:
+    """Return the landing sequence that a return chooses at a position (m).
 
     Return None, with a note, if the return is not flown there.
     """
@@ -510,7 +510,7 @@ def _nearest(placed: PlacedMission, here: tuple[float, float, float], notes: Not
     return landing
 
 
-def _nearest_of_text(placed: PlacedMission) -> str:
+def _landing_choice_text(placed: PlacedMission) -> str:
     count = len(placed.landing_starts)
     return f" (the nearest of {count}, height counted)" if count > 1 else ""
 
@@ -550,19 +550,21 @@ def _lay_return(
         allowed = f"allowed {LOWEST:.0f}..{HIGHEST:.0f}"
         where = f"item {stop.item}: return to {target.name}"
         raise MissionError.at(source, where, up, allowed, shown=f"{up:.1f} m AMSL")
-    climb, dive = _spiral_slopes(limits)(stop.airspeed, max(here[2], up))
+    climb, dive = _make_spiral_slopes(limits)(stop.airspeed, max(here[2], up))
     ability = ReturnAbility(
         turn_radius=lambda a, b, amsl: (
             DEFAULT_RADIUS if limits is None else limits.turn_radius(a, b, amsl, stop.airspeed)
         ),
-        circle=_own_radius(limits)(stop.airspeed, up),
+        circle=_make_own_radius(limits)(stop.airspeed, up),
         climb=climb,
         dive=dive,
         max_bank=math.radians(30.0) if limits is None else limits.max_bank,
         airspeed=stop.airspeed,
     )
-    landing = _nearest(placed, target.position, notes) if rules.lands == "circle" else None
-    onward = "" if landing is None else f"the landing sequence at item {landing.start.item}{_nearest_of_text(placed)}"
+    landing = _nearest_landing(placed, target.position, notes) if rules.lands == "circle" else None
+    onward = (
+        "" if landing is None else f"the landing sequence at item {landing.start.item}{_landing_choice_text(placed)}"
+    )
     notes.add(described_return(target, rules, here[2], onward), stop.item)
     if rules.landing_counts and any(item.command in LANDINGS for item in placed.mission.items):
         notes.add(f"the mission's landing counts as a place to return to: not flown to; to {target.name}", stop.item)
@@ -592,7 +594,7 @@ def _with_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
                 text = "CONDITION_GATE beside what is no waypoint: the speed after it is flown from the leg's begin"
                 notes.add(text, gate.item)
                 continue
-            share = _gate_share(before.position, place.position, to_map(placed.origin, gate.lat_deg, gate.lon_deg))
+            share = _gate_fraction(before.position, place.position, to_map(placed.origin, gate.lat_deg, gate.lon_deg))
             point = before.position + share * (place.position - before.position)
             far = min(math.dist(point[:2], one.position[:2]) for one in (out[-1], place)) >= SAME_PLACE
             if passed < share < 1.0 and far:
@@ -605,7 +607,7 @@ def _with_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
     return out
 
 
-def _gate_share(a: Floats, b: Floats, gate: tuple[Any, Any]) -> float:
+def _gate_fraction(a: Floats, b: Floats, gate: tuple[Any, Any]) -> float:
     """Return the fraction of the leg from a to b at which the plane of a gate (east, north, m) cuts it."""
     out = b[:2] - np.array([float(gate[0]), float(gate[1])])
     along = float((b[:2] - a[:2]) @ out)
@@ -635,10 +637,10 @@ def _note_cruise_speed(mission: Mission, airspeed: float, first: ItineraryStop, 
         notes.add(text)
 
 
-def _own_radius(limits: Limits | None) -> OwnRadius:
-    """Return a function for the radius of a loiter that states none.
+def _make_own_radius(limits: Limits | None) -> OwnRadius:
+    """Return a function for the radius of a loiter whose item states none.
 
-    It is a tenth wider than the tightest turn in this wind, in whole tens of meters.
+    The radius is a tenth larger than that of the tightest turn in this wind, rounded up to 10 m.
     """
 
     def radius(airspeed: float, up: float) -> float:
@@ -652,10 +654,10 @@ def _own_radius(limits: Limits | None) -> OwnRadius:
     return radius
 
 
-def _spiral_slopes(limits: Limits | None) -> SpiralSlopes:
-    """Return a function for the slopes of a spiral.
+def _make_spiral_slopes(limits: Limits | None) -> SpiralSlopes:
+    """Return a function for the climb and dive slopes of a spiral.
 
-    They are a fraction of the aircraft's limits on the spiral's worst course.
+    Both are a fraction of the aircraft's slope limits on the worst course of the spiral.
     """
 
     def slopes(airspeed: float, up: float) -> tuple[float, float]:
@@ -672,7 +674,7 @@ def _spiral_slopes(limits: Limits | None) -> SpiralSlopes:
     return slopes
 
 
-def _started(itinerary: Itinerary, first: ItineraryStop, origin: GeoOrigin, waypoints: Floats) -> str:
+def _start_text(itinerary: Itinerary, first: ItineraryStop, origin: GeoOrigin, waypoints: Floats) -> str:
     course = math.degrees(float(leg_courses(waypoints)[0])) % 360.0
     lat, lon = first.lat_deg, first.lon_deg
     if first.loiter is not None:

@@ -70,7 +70,7 @@ def turn_around_of(route: Route, survey: Survey) -> float:
 
 
 def _lead_lengths(route: Route, survey: Survey) -> list[float]:
-    """Return how far the lines extend straight beyond their photos at each end of each turn-around, m."""
+    """Return the straight distance of each line beyond its photos, at each end of each turn-around, m."""
     points, pairs = route.waypoints[:, :2], zip(survey.lines[:-1], survey.lines[1:], strict=True)
     ends = [pair for one, other in pairs for pair in ((one.last, one.ends), (other.begins, other.first))]
     return [math.dist(points[one], points[other]) for one, other in ends]
@@ -110,10 +110,10 @@ def with_layout(
         corners, own = route.waypoints[photo_line.first : photo_line.last + 1, :2], mission.items[first:end]
         steps = [item for item in own if is_navigation(item.command)]
         if _waypoint_of_item(mission, route)[steps[0].seq] != photo_line.first:
-            own = (_waypoint(steps[0], corners[0], origin), *own)
+            own = (_make_waypoint(steps[0], corners[0], origin), *own)
         lines.append(_Line(corners, own))
     if layout.course is not None:
-        turned = _with_course(lines, survey, layout.course, origin)
+        turned = _lines_on_course(lines, survey, layout.course, origin)
         if turned is None:
             return None
         lines = turned
@@ -121,8 +121,8 @@ def with_layout(
     (first, _), (_, end) = items.lines[0], items.lines[-1]
     made = [*mission.items[: items.before]]
     made += _without_leads(mission, route, mission.items[items.before : first], survey.lines[0].first, longest)
-    for number, line in enumerate(_in_flying_order(lines, layout)):
-        made += _with_ends(line, layout.turn_around, layout.lead_in if number == 0 else 0.0, origin)
+    for number, line in enumerate(_order_lines(lines, layout)):
+        made += _items_with_turn_arounds(line, layout.turn_around, layout.lead_in if number == 0 else 0.0, origin)
     made += _without_leads(mission, route, mission.items[end : items.behind], survey.lines[-1].last, longest)
     # Renumber all items: two items with one number would be ambiguous.
     numbered = [replace(item, seq=k) for k, item in enumerate([*made, *mission.items[items.behind :]], 1)]
@@ -158,7 +158,7 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
 
 
 def _waypoint_of_item(mission: Mission, route: Route) -> dict[int, int]:
-    """Return the waypoint of each navigation item by its number, or the one before it if it has none."""
+    """Return the waypoint of each navigation item by its number, or the previous waypoint if the item has none."""
     own, here, out = {int(seq): i for i, seq in enumerate(route.items)}, 0, dict[int, int]()
     for item in mission.items:
         if is_navigation(item.command):
@@ -186,7 +186,7 @@ def _without_leads(
     return [item for item in items if not leads(item)]
 
 
-def _in_flying_order(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
+def _order_lines(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
     """Return the lines in flying order, in alternating directions; the first line keeps its direction.
 
     The lines of a survey that keeps its order stay as they are.
@@ -205,11 +205,11 @@ def _in_flying_order(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line
         for k in lateral[begin :: layout.every]:
             line, ahead = lines[k], len(out) % 2 == 0
             along = float((line.corners[-1] - line.corners[0]) @ unit) > 0.0
-            out.append(line if along == ahead else _reversed(line))
+            out.append(line if along == ahead else _reverse_line(line))
     return out
 
 
-def _reversed(line: _Line) -> _Line:
+def _reverse_line(line: _Line) -> _Line:
     """Return a line in the opposite direction.
 
     Its waypoints swap places; the commands between them stay in place.
@@ -221,25 +221,27 @@ def _reversed(line: _Line) -> _Line:
     )
 
 
-def _with_ends(line: _Line, turn_around: float, lead_in: float, origin: GeoOrigin) -> list[MissionItem]:
+def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, origin: GeoOrigin) -> list[MissionItem]:
     """Return a line's items with the waypoints of its turn-arounds and of a longer lead-in."""
     steps = [item for item in line.items if is_navigation(item.command)]
     into, out = line.corners[0] - line.corners[1], line.corners[-1] - line.corners[-2]
     into, out = (way / max(float(np.hypot(*way)), 1e-9) for way in (into, out))
     leads = sorted({turn_around, max(turn_around, lead_in)} - {0.0}, reverse=True)
-    made = [_waypoint(steps[0], line.corners[0] + metres * into, origin) for metres in leads]
+    made = [_make_waypoint(steps[0], line.corners[0] + metres * into, origin) for metres in leads]
     made += line.items
-    return made if turn_around <= 0.0 else [*made, _waypoint(steps[-1], line.corners[-1] + turn_around * out, origin)]
+    return (
+        made if turn_around <= 0.0 else [*made, _make_waypoint(steps[-1], line.corners[-1] + turn_around * out, origin)]
+    )
 
 
-def _waypoint(like: MissionItem, place: Floats, origin: GeoOrigin) -> MissionItem:
+def _make_waypoint(like: MissionItem, place: Floats, origin: GeoOrigin) -> MissionItem:
     """Return a plain waypoint at the altitude of another item."""
     lat, lon = (on_grid(float(value)) for value in to_geo(origin, float(place[0]), float(place[1])))
     nothing = (0.0, 0.0, 0.0, like.params[3] if math.isnan(like.params[3]) else 0.0)
     return replace(like, command=int(Command.NAV_WAYPOINT), params=nothing, lat_deg=lat, lon_deg=lon)
 
 
-def _with_course(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOrigin) -> list[_Line] | None:
+def _lines_on_course(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOrigin) -> list[_Line] | None:
     """Return lines on another course over the hull of the present ones, or None if that is impossible."""
     ends = [item for line in lines for item in line.items if is_navigation(item.command)]
     if len({(item.frame, item.alt) for item in ends}) != 1 or any(_is_bent(line.corners) for line in lines):
@@ -255,7 +257,7 @@ def _with_course(lines: Sequence[_Line], survey: Survey, course: float, origin: 
     pattern, out = lines[0], list[Floats]()
     for k in range(count):
         at = float(lateral.min()) + margin + k * survey.spacing
-        crossed = _crossing(lateral, along, at)
+        crossed = _line_within_outline(lateral, along, at)
         if crossed is None or crossed[1] - crossed[0] < _MIN_LINE_LENGTH_M:
             continue
         out.append(np.array([at * right + metres * unit for metres in crossed]))
@@ -267,7 +269,7 @@ def _with_course(lines: Sequence[_Line], survey: Survey, course: float, origin: 
         out.reverse()
     if math.dist(out[0][1], start) < math.dist(out[0][0], start):
         out = [places[::-1] for places in out]
-    return [_Line(places, _moved_items(pattern.items, places, origin)) for places in out]
+    return [_Line(places, _move_items(pattern.items, places, origin)) for places in out]
 
 
 def convex_hull(points: Floats) -> Floats | None:
@@ -300,8 +302,8 @@ def _is_bent(corners: Floats) -> bool:
     return bool(np.abs(off).max() > _BEND_TOLERANCE_M)
 
 
-def _crossing(lateral: Floats, along: Floats, at: float) -> tuple[float, float] | None:
-    """Return where a line enters and leaves a convex outline, m along it, or None if it does not cross it."""
+def _line_within_outline(lateral: Floats, along: Floats, at: float) -> tuple[float, float] | None:
+    """Return where a line enters and leaves a convex outline, m along the line, or None if they do not cross."""
     found = []
     for k in range(len(lateral)):
         one, other = lateral[k - 1] - at, lateral[k] - at
@@ -310,7 +312,7 @@ def _crossing(lateral: Floats, along: Floats, at: float) -> tuple[float, float] 
     return (min(found), max(found)) if len(found) >= 2 else None
 
 
-def _moved_items(items: Sequence[MissionItem], ends: Floats, origin: GeoOrigin) -> tuple[MissionItem, ...]:
+def _move_items(items: Sequence[MissionItem], ends: Floats, origin: GeoOrigin) -> tuple[MissionItem, ...]:
     """Return a line's items moved to another line: its first and last waypoint at the new ends, no others."""
     steps = [k for k, item in enumerate(items) if is_navigation(item.command)]
     out = []

@@ -1,4 +1,4 @@
-"""Surveys in a route: parallel photo lines, and the turn-arounds between them.
+"""Find surveys in a route, which consist of parallel photo lines and the turn-arounds between them.
 
 No mission item marks a survey: QGroundControl's survey and Mission Planner's grid are waypoints, with items that switch
 the camera between them. Surveys are therefore found by their geometry, whichever program wrote them: three or more
@@ -104,7 +104,7 @@ class Survey:
         return self.lines[-1].last
 
     def line(self, number: int) -> PhotoLine:
-        """Return one of its lines by its number in flying order."""
+        """Return the line with this number in flying order."""
         return self.lines[number]
 
     def has_leg(self, leg: int) -> bool:
@@ -316,10 +316,10 @@ class _Runs:
     def following(self, here: int) -> list[int]:
         """Return the runs that can be the next line after a run, or its first part, in flying order."""
         if here not in self._following:
-            self._following[here] = self._find_following(here)
+            self._following[here] = self._search_following(here)
         return self._following[here]
 
-    def _find_following(self, here: int) -> list[int]:
+    def _search_following(self, here: int) -> list[int]:
         found, own = list[tuple[int, float, float]](), self.length((here, here))
         for after in range(here + 1, min(len(self.runs), here + 2 + _MAX_TURN_AROUND_RUNS)):
             between = self._distances[self.runs[after][0]] - self._distances[self.runs[here][1]]
@@ -433,7 +433,7 @@ def _make_survey(
     gaps = _line_gaps(np.sort(offsets))
     if len(gaps) + 1 < (_MIN_LINES_WITH_PHOTOS if camera.any() else _MIN_LINES):
         return None
-    lines = tuple(_photo_line(runs.ends(line), camera) for line in chain)
+    lines = tuple(_camera_part(runs.ends(line), camera) for line in chain)
     if len(gaps) + 1 < _MIN_LINES and not all(line.photo > 0.0 for line in lines):
         return None
     # A camera that is off between lines shows where they begin.
@@ -454,7 +454,7 @@ def _line_gaps(places: Floats) -> list[float]:
     ]
 
 
-def _photo_line(run: tuple[int, int], camera: Floats) -> PhotoLine:
+def _camera_part(run: tuple[int, int], camera: Floats) -> PhotoLine:
     """Return the part of a run on which the camera is on, or the whole run if it is never on."""
     first, last = run
     on = np.flatnonzero(camera[first:last] != 0.0)
@@ -508,17 +508,17 @@ def _without_leads(
 
 
 def _without_lead(points: Floats, line: PhotoLine, lead: float) -> PhotoLine:
-    """Return a line between the waypoints at a distance ``lead`` (m) from the ends of its run.
+    """Shorten a line to the waypoints at a distance ``lead`` (m) from the ends of its run.
 
-    An end without such a waypoint stays.
+    Keep an end that has no such waypoint.
     """
     inner = range(line.first + 1, line.last)
-    near = max(_LEAD_LENGTH_TOLERANCE_M, 0.01 * lead)
+    tolerance = max(_LEAD_LENGTH_TOLERANCE_M, 0.01 * lead)
 
-    def from_end(end: int) -> list[int]:
-        return [i for i in inner if abs(math.dist(points[i, :2], points[end, :2]) - lead) <= near]
+    def points_at_lead_distance(end: int) -> list[int]:
+        return [i for i in inner if abs(math.dist(points[i, :2], points[end, :2]) - lead) <= tolerance]
 
-    into, out = from_end(line.begins), from_end(line.ends)
+    into, out = points_at_lead_distance(line.begins), points_at_lead_distance(line.ends)
     first = into[0] if into and line.first == line.begins else line.first
     last = out[-1] if out and line.last == line.ends else line.last
     return line._replace(first=first, last=last) if first < last else line

@@ -68,10 +68,10 @@ def expand_items(items: list[Any], source: str, warnings: list[str], plans: list
         place = f"mission.items.{k}"
         name = str(item.get("complexItemType", ""))[:40] if kind == "ComplexItem" else ""
         if name in _TRANSECT_KINDS:
-            made = _transects(item, source, place, name)
+            made = _transect_items(item, source, place, name)
             plans.append(_survey_plan(item["TransectStyleComplexItem"], made, f"{source}: {place}", warnings))
         elif name == _LANDING_KIND:
-            made = _landing(item, source, place, _last_number(out) + 1)
+            made = _landing_items(item, source, place, _last_number(out) + 1)
         else:
             known = f"only SimpleItem, {', '.join(_TRANSECT_KINDS)} and {_LANDING_KIND} are read"
             allowed = f"{known}; have the ground station turn it into items first"
@@ -102,7 +102,7 @@ def _to_present_form(item: Any, place: str, warnings: list[str]) -> Any:
     return item
 
 
-def _transects(item: dict[str, Any], source: str, place: str, name: str) -> list[Any]:
+def _transect_items(item: dict[str, Any], source: str, place: str, name: str) -> list[Any]:
     held = item.get("TransectStyleComplexItem")
     items = held.get("Items") if isinstance(held, dict) else None
     if not isinstance(items, list) or not items:
@@ -113,7 +113,7 @@ def _transects(item: dict[str, Any], source: str, place: str, name: str) -> list
 
 
 class _CameraCalc(BaseModel):
-    """QGC's camera of a survey (`CameraCalc.cc`): known by name, by its lens and sensor, or not at all."""
+    """QGC's camera of a survey (`CameraCalc.cc`), given by name, by lens and sensor, or by distances alone."""
 
     # QGC writes whole numbers as integers.
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True)
@@ -173,11 +173,11 @@ def _last_number(items: list[Any]) -> int:
     return number if isinstance(number, int) else len(items)
 
 
-def _landing(item: dict[str, Any], source: str, place: str, number: int) -> list[Any]:
+def _landing_items(item: dict[str, Any], source: str, place: str, number: int) -> list[Any]:
     """Return DO_LAND_START, the approach (a descending loiter or a waypoint) and LAND, as QGC sends them."""
 
     def read(key: str) -> list[Any] | None:
-        return _coordinate(item, key, source, place)
+        return _read_coordinate(item, key, source, place)
 
     approach = read("landingApproachCoordinate") or read("loiterCoordinate")
     land = read("landCoordinate")
@@ -213,7 +213,7 @@ def _landing(item: dict[str, Any], source: str, place: str, number: int) -> list
     ]
 
 
-def _coordinate(item: dict[str, Any], key: str, source: str, place: str) -> list[Any] | None:
+def _read_coordinate(item: dict[str, Any], key: str, source: str, place: str) -> list[Any] | None:
     value = item.get(key)
     if value is None:
         return None
@@ -320,7 +320,7 @@ def _check_vehicle(kind: int | None, source: str) -> None:
         raise MissionError.at(source, "mission.vehicleType", kind, allowed)
 
 
-def _autopilot(firmware: int | None, source: str) -> str:
+def _autopilot_of(firmware: int | None, source: str) -> str:
     """Return the autopilot that a firmwareType names, "" for none. Raise MissionError for an unknown one."""
     if firmware is None or firmware in _UNNAMED_FIRMWARES:
         return ""
@@ -339,14 +339,14 @@ def parse_plan_file(text: str, source: str) -> Mission:
     try:
         data = json.loads(text.removeprefix("\ufeff"), parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
-        raise MissionError(f"{source}: not valid JSON: {_line(error)}", file=source) from error
+        raise MissionError(f"{source}: not valid JSON: {_first_line(error)}", file=source) from error
     warnings, plans = _check_kind(data, source)
     try:
         file = _File.model_validate(data)
     except ValidationError as error:
         raise MissionError(**first_fault(error, data).at(source)) from error
     _check_vehicle(file.mission.vehicleType, source)
-    autopilot = _autopilot(file.mission.firmwareType, source)
+    autopilot = _autopilot_of(file.mission.firmwareType, source)
     items = [_read_item(item, k, source) for k, item in enumerate(file.mission.items)]
     if not (items or file.geoFence.circles or file.geoFence.polygons or file.rallyPoints.points):
         raise MissionError(f"{source}: mission.items: no items", file=source, field="mission.items")
@@ -516,7 +516,7 @@ def _cruise_speed(mission: Mission) -> float:
 
 
 def _item_json(item: MissionItem) -> dict[str, Any]:
-    numbers = [_or_null(value) for value in (*item.params, item.lat_deg, item.lon_deg, item.alt)]
+    numbers = [_nan_as_null(value) for value in (*item.params, item.lat_deg, item.lon_deg, item.alt)]
     data: dict[str, Any] = {
         "autoContinue": item.autocontinue,
         "command": int(item.command),
@@ -546,7 +546,7 @@ def _fence_json(fences: tuple[MissionItem, ...]) -> dict[str, Any]:
     return {"circles": circles, "polygons": polygons, "version": 2}
 
 
-def _or_null(value: float) -> float | None:
+def _nan_as_null(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
@@ -554,5 +554,5 @@ def _refuse_constant(name: str) -> float:
     raise ValueError(f"{name} is not a number")
 
 
-def _line(error: BaseException) -> str:
+def _first_line(error: BaseException) -> str:
     return str(error).splitlines()[0]

@@ -104,7 +104,7 @@ def parse_waypoints(text: str, source: str) -> Mission:
     number, header = lines[0]
     if header.split() != HEADER.split():
         raise MissionError(
-            f"{source}:{number}: header {_shown(header)}: '{HEADER}' is expected",
+            f"{source}:{number}: header {_short_repr(header)}: '{HEADER}' is expected",
             file=source,
             field="header",
             value=header,
@@ -112,10 +112,10 @@ def parse_waypoints(text: str, source: str) -> Mission:
         )
     if len(lines) - 1 > MAX_ITEMS:
         raise MissionError(f"{source}: {len(lines) - 1:,} items: at most {MAX_ITEMS:,} are read", file=source)
-    rows = [_row(TextLine(source, number), line) for number, line in lines[1:]]
+    rows = [_parse_row(TextLine(source, number), line) for number, line in lines[1:]]
     if not rows:
         raise MissionError(f"{source}: no items after the header", file=source)
-    warnings = _warnings(rows, *_split_home(rows))
+    warnings = _collect_warnings(rows, *_split_home(rows))
     home, body = _split_home(_renumbered_rows(rows))
     fences = numbered([row.item for row in body if row.item.command in FENCES])
     fence_shapes(fences, source)
@@ -129,15 +129,15 @@ def parse_waypoints(text: str, source: str) -> Mission:
     )
 
 
-def _row(where: TextLine, line: str) -> _Row:
+def _parse_row(where: TextLine, line: str) -> _Row:
     fields = line.split()
     if len(fields) != len(_COLUMNS):
         raise MissionError(
             f"{where}: {len(fields)} columns: {len(_COLUMNS)} are expected ({', '.join(_COLUMNS)})", file=where.file
         )
     values = dict(zip(_COLUMNS, fields, strict=True))
-    integers = {name: _integer(where, name, values[name]) for name in _ALLOWED_RANGES}
-    p1, p2, p3, p4, lat, lon, alt = (_number(where, name, values[name]) for name in _COLUMNS[4:11])
+    integers = {name: _parse_integer(where, name, values[name]) for name in _ALLOWED_RANGES}
+    p1, p2, p3, p4, lat, lon, alt = (_parse_number(where, name, values[name]) for name in _COLUMNS[4:11])
     # A home line of Mission Planner may carry command 0.
     command = integers["command"] or (Command.NAV_WAYPOINT if integers["seq"] == 0 else 0)
     if is_located(command, integers["frame"]) and position_problem(lat, lon) is None:
@@ -158,23 +158,23 @@ def _row(where: TextLine, line: str) -> _Row:
     return _Row(where, bool(integers["current"]), item)
 
 
-def _refused(where: TextLine, field: str, value: str | int, shown: str, allowed: str) -> MissionError:
+def _value_error(where: TextLine, field: str, value: str | int, shown: str, allowed: str) -> MissionError:
     return MissionError(
         f"{where}: {field} {shown}: {allowed}", file=where.file, field=field, value=value, allowed=allowed
     )
 
 
-def _integer(where: TextLine, name: str, text: str) -> int:
+def _parse_integer(where: TextLine, name: str, text: str) -> int:
     low, high = _ALLOWED_RANGES[name]
     if not _WHOLE_NUMBER.fullmatch(text) or not low <= int(text) <= high:
-        raise _refused(where, name, text, _shown(text), f"a whole number {low}..{high} is expected")
+        raise _value_error(where, name, text, _short_repr(text), f"a whole number {low}..{high} is expected")
     return int(text)
 
 
-def _number(where: TextLine, name: str, text: str) -> float:
+def _parse_number(where: TextLine, name: str, text: str) -> float:
     if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
         hint = " (a decimal comma?)" if "," in text else ""
-        raise _refused(where, name, text, _shown(text), f"a finite number is expected{hint}")
+        raise _value_error(where, name, text, _short_repr(text), f"a finite number is expected{hint}")
     # 0.0 for -0.0, which no other form of a mission keeps.
     return float(text) + 0.0
 
@@ -202,7 +202,7 @@ def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
     return Home(first.lat_deg, first.lon_deg, first.alt), rows[1:]
 
 
-def _warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> list[str]:
+def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> list[str]:
     found: list[str] = []
     if all(row.item.command in _COMMANDS_WITH_OWN_FILES for row in body):
         # A fence or rally file may have a home line, as Mission Planner writes it, or none, as MAVProxy does.
@@ -244,44 +244,44 @@ def waypoints_text(mission: Mission) -> str:
 
     A NaN is written as 0, which is this form's value for "unset". Fences and rally points have files of their own.
     """
-    return _text(mission.home, renumbered(mission).items)
+    return _file_text(mission.home, renumbered(mission).items)
 
 
 def fence_text(mission: Mission) -> str:
-    """Return the fences of a mission as a WPL file: numbered from 0, without a home line.
+    """Return the fences of a mission as a WPL file, numbered from 0 and without a home line.
 
     MAVProxy's `fence load` reads this form.
     """
-    return _lines(mission.fences)
+    return _file_without_home(mission.fences)
 
 
 def rally_text(mission: Mission) -> str:
-    """Return the rally points of a mission as a WPL file: numbered from 0, without a home line."""
-    return _lines(mission.rally)
+    """Return the rally points of a mission as a WPL file, numbered from 0 and without a home line."""
+    return _file_without_home(mission.rally)
 
 
-def _lines(items: tuple[MissionItem, ...]) -> str:
-    return "\n".join([HEADER, *(_line(item, current=False) for item in items)]) + "\n"
+def _file_without_home(items: tuple[MissionItem, ...]) -> str:
+    return "\n".join([HEADER, *(_item_line(item, current=False) for item in items)]) + "\n"
 
 
-def _text(home: Home | None, items: tuple[MissionItem, ...]) -> str:
+def _file_text(home: Home | None, items: tuple[MissionItem, ...]) -> str:
     at = home or Home(0.0, 0.0, 0.0)
     first = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), at.lat_deg, at.lon_deg, at.alt)
-    lines = [HEADER, *(_line(item, current=item is first) for item in (first, *items))]
+    lines = [HEADER, *(_item_line(item, current=item is first) for item in (first, *items))]
     return "\n".join(lines) + "\n"
 
 
-def _line(item: MissionItem, *, current: bool) -> str:
-    numbers = [_decimal(value, 0) for value in item.params]
-    position = [_decimal(item.lat_deg, 8), _decimal(item.lon_deg, 8), _decimal(item.alt, 3)]
+def _item_line(item: MissionItem, *, current: bool) -> str:
+    numbers = [_format_decimal(value, 0) for value in item.params]
+    position = [_format_decimal(item.lat_deg, 8), _format_decimal(item.lon_deg, 8), _format_decimal(item.alt, 3)]
     integers = [str(int(value)) for value in (item.seq, current, item.frame, item.command)]
     return "\t".join([*integers, *numbers, *position, str(int(item.autocontinue))])
 
 
-def _decimal(value: float, places: int) -> str:
+def _format_decimal(value: float, places: int) -> str:
     """Return a number as text that reads back to the same double, without an exponent.
 
-    places: smallest number of decimals.
+    places: minimum number of decimals.
     """
     if math.isnan(value):
         value = 0.0
@@ -290,7 +290,7 @@ def _decimal(value: float, places: int) -> str:
     return f"{whole}.{part}" if part else whole
 
 
-def _shown(text: str) -> str:
+def _short_repr(text: str) -> str:
     return repr(text if len(text) <= 40 else text[:37] + "...")
 
 
@@ -311,7 +311,7 @@ def is_point_list(text: str) -> bool:
     >>> is_point_list("# saved\n36.5 -84.2\n"), is_point_list("QGC WPL 110\n")
     (True, False)
     """
-    lines = _fence_lines(text)
+    lines = _content_lines(text)
     try:
         return bool(lines) and math.isfinite(float(lines[0][1].split()[0]))
     except ValueError:
@@ -319,7 +319,7 @@ def is_point_list(text: str) -> bool:
 
 
 def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
-    r"""Return the items of the polygon in such a file; ``source`` names it in messages.
+    r"""Return the polygon items of a fence file of the older tools; ``source`` names the file in messages.
 
     The return point is not part of the zone and is left out; a file without one, whose first point is its last, is
     accepted. Raise MissionError with file, line, value and allowed values.
@@ -328,7 +328,7 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
     >>> [(item.command, item.params[0], item.lat_deg) for item in parse_fence_points("\n".join(square), "fence.txt")]
     [(5001, 4.0, 36.5), (5001, 4.0, 36.5), (5001, 4.0, 36.51), (5001, 4.0, 36.51)]
     """
-    points = [_point(TextLine(source, number), line) for number, line in _fence_lines(text)]
+    points = [_parse_point(TextLine(source, number), line) for number, line in _content_lines(text)]
     if len(points) > MAX_POINTS:
         raise MissionError(f"{source}: {len(points)} points: at most {MAX_POINTS} are read", file=source)
     ring = points if points[0] == points[-1] else points[1:]
@@ -343,13 +343,13 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
     return numbered([MissionItem(0, command, int(Frame.GLOBAL), none, lat, lon, 0.0) for lat, lon in ring[:-1]])
 
 
-def _fence_lines(text: str) -> list[tuple[int, str]]:
+def _content_lines(text: str) -> list[tuple[int, str]]:
     """Return the lines that are neither empty nor comments, with their numbers."""
     lines = enumerate(text.removeprefix("\ufeff").splitlines(), 1)
     return [(number, line.strip()) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
 
 
-def _point(where: TextLine, line: str) -> tuple[float, float]:
+def _parse_point(where: TextLine, line: str) -> tuple[float, float]:
     try:
         lat, lon = (float(part) for part in line.split())
     except ValueError:

@@ -1,4 +1,4 @@
-"""A simulated aircraft for any autopilot: its start, its ground and wind, and its time limit.
+"""Simulate an aircraft for any autopilot, with its start, ground, wind and time limit.
 
 `flight.simulation.simulate.Flight` steers it by an autopilot's control law, a `flight.autopilots.program.ProgramFlight`
 by a program of its own.
@@ -59,7 +59,7 @@ class Airborne(ABC):
         start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
         gear: Gear | None = None,
     ) -> None:
-        """Load the flight.
+        """Load the aircraft, and start the flight.
 
         local_map: local map of the setup, if another flight of it has fitted one already.
         start_offset: east, north and up from the route's first waypoint to the start of the flight, m.
@@ -75,7 +75,7 @@ class Airborne(ABC):
         self.fdm = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=braking, variation=variation, gear=gear)
 
     def _lay_out(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
-        """Make the workspace for a route, and set the flight's time limit."""
+        """Make the workspace for a route, and set the time limit of the flight."""
         self.setup, self.map = setup, local_map
         # An autopilot with its own turn law does not follow the arcs after waypoints that are flown over.
         follows = setup.autopilot.follows_path and setup.autopilot.keeps_to_arcs
@@ -97,7 +97,7 @@ class Airborne(ABC):
         self._work.settings.middle = self.map.middle
         self._work.settings.battery = setup.battery
         length = self.path.length + _extra_loiter_length(setup, waypoints)
-        patience = PATIENCE * length / _slowest_leg(setup, self._airspeeds) + PATIENCE_SECONDS
+        patience = PATIENCE * length / _min_ground_speed(setup, self._airspeeds) + PATIENCE_SECONDS
         # A loiter for a time lasts as long as its item states, whatever circle is laid out for it.
         timed = waypoints[(waypoints["stays"] > 0.0) & (waypoints["stays"] < math.inf)]
         patience += sum(dict(zip(timed["item"].tolist(), timed["stays"].tolist(), strict=True)).values())
@@ -115,7 +115,7 @@ class Airborne(ABC):
 
     @property
     def position(self) -> Floats:
-        """Position of the aircraft one tick ago: (3,) east, north and up, m."""
+        """Position of the aircraft one tick ago, (3,) east, north and up, m."""
         true = self._work.true
         return np.array([true.east, true.north, true.up])
 
@@ -123,7 +123,7 @@ class Airborne(ABC):
     def _fly(self, count: int) -> int:
         """Fly up to a number of ticks into the workspace's rows; return the last tick's status, 0 to fly on."""
 
-    def _disturb(self, setup: FlightSetup) -> None:
+    def _start_disturbances(self, setup: FlightSetup) -> None:
         """Set the wind, and start turbulence and navigation error."""
         wind, work = setup.scenario.wind, self._work
         to = wind.to_course
@@ -138,12 +138,12 @@ class Airborne(ABC):
         if self._navigation_random is not None:
             start_navigation(self._navigation_random.standard_normal(6), work.navigation)
 
-    def _start(self, setup: FlightSetup) -> Start:
+    def _find_start(self, setup: FlightSetup) -> Start:
         """Return the start of the route. Raise StartError for a place that is not above the terrain."""
         airspeed = float(self._airspeeds[0])
         return find_start(setup, self.map, self._ground, self.fdm.aircraft, airspeed, self._start_offset)
 
-    def _trim(self, source: str, start: Start) -> Trim:
+    def _start_trimmed(self, source: str, start: Start) -> Trim:
         """Start trimmed, in the start's wind. Raise StartError."""
         trimmed = start_trimmed(self.fdm, source, start)
         self._work.commands = tuple(trimmed.commands())
@@ -151,7 +151,7 @@ class Airborne(ABC):
         return trimmed
 
     def block(self, count: int) -> tuple[Rows, str]:
-        """Fly up to ``count`` ticks; return their rows, and how the flight ended ("" if it goes on)."""
+        """Fly up to ``count`` ticks, and return their rows and the reason why the flight ended ("" if it goes on)."""
         parts: list[Rows] = []
         ended = ""
         while count > 0 and not ended:
@@ -177,7 +177,7 @@ class Airborne(ABC):
         return rows, ""
 
     def _timeout_text(self) -> str:
-        """Describe a flight that exceeded its time limit: loitering at an item, or anything else."""
+        """Describe a flight that exceeded its time limit, either in a loiter at an item or elsewhere."""
         route, ahead = self.setup.route, min(int(self.memory.leg) + 1, self.setup.route.legs)
         seconds = f"not finished after {self.max_ticks * self.dt:.0f} s"
         if route.arcs[ahead] > 0.0 and route.return_from < 0:
@@ -188,9 +188,9 @@ class Airborne(ABC):
 def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
     """Return the extra length (m) of loiters too tight for the bank limit, beyond their laid-out length.
 
-    An autopilot that steers to a loiter's center flies around it as wide as the bank limit requires, and once more
-    until the next waypoint lies ahead. Loiters that cannot be flown in this wind add nothing: no time limit is long
-    enough.
+    An autopilot that steers to a loiter's center flies around the center at the radius that the bank limit requires,
+    and once more until the next waypoint lies ahead. Loiters that cannot be flown in this wind add nothing: no time
+    limit is long enough.
 
     waypoints: waypoints of the route, (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     """
@@ -211,7 +211,7 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
     return sum(longer.values())
 
 
-def _slowest_leg(setup: FlightSetup, airspeeds: Floats) -> float:
+def _min_ground_speed(setup: FlightSetup, airspeeds: Floats) -> float:
     """Return the lowest ground speed on any leg in the mean wind at its altitudes, m/s, at least 3."""
     limits: Limits = setup.limits
     points, courses = setup.route.waypoints, leg_courses(setup.route.waypoints)

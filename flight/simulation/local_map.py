@@ -1,4 +1,4 @@
-"""Local map and ground around one flight, in the form that the compiled loop needs.
+"""Make the local map and the ground around one flight, in the form that the compiled loop needs.
 
 JSBSim provides latitudes and longitudes; all other code uses positions on the map.
 """
@@ -37,8 +37,8 @@ class LocalMap:
     def around(setup: FlightSetup) -> "LocalMap":
         """Fit the area and the route with a margin of `MAP_BUFFER`.
 
-        The error is 0.1 mm and 1e-9 rad on areas up to 600 km wide. Raise FlightError if the map cannot be fitted: an
-        area about a pole.
+        The error is 0.1 mm and 1e-9 rad on areas up to 600 km wide. Raise FlightError if the map cannot be fitted, as
+        for an area around a pole.
         """
         origin: GeoOrigin = setup.scenario.origin
         points = np.concatenate([setup.route.waypoints[:, :2], setup.scenario.bounds.T])

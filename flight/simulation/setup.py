@@ -1,4 +1,4 @@
-"""Setup of a flight: every input, fixed before it starts."""
+"""Hold the setup of a flight, which is every input, fixed before the flight starts."""
 
 import copy
 import math
@@ -53,7 +53,7 @@ class MissionStretch:
 
 @dataclass(frozen=True, slots=True)
 class HeightOffset:
-    """Offset of another altitude in the log from the one used, m, at the start of the judged flight."""
+    """Offset of another altitude in the log from the altitude used, m, at the start of the judged flight."""
 
     name: str
     offset: float
@@ -96,7 +96,7 @@ class Damage:
 
 @dataclass(frozen=True, slots=True)
 class RowFaults:
-    """Faults in a log's rows, and their numbers.
+    """Number of faults of each kind in a log's rows.
 
     doubled: duplicate rows.
     unordered: rows out of time order.
@@ -151,14 +151,14 @@ class ImportedLog:
     format: format name for people.
     program: program that flew, "" if the log does not say.
     utc_start: s since 1970 at time 0; NaN if unknown.
-    holds: data that the log contains in addition to times and positions.
+    holds: kinds of data that the log contains in addition to times and positions.
     stretches: the judged stretches; the rest is only shown.
     heights: the altitude that is used.
     wind: source of the wind: "XKF2", "" for none.
     mission: source of the mission: "CMD of the log, at 22.4 s", or a file.
     missing: items of that mission that the log lacks; None if it is judged in full.
     plan_heights: True if the mission states altitudes.
-    aircraft_known: True if the aircraft was named; otherwise its limits are not applied.
+    aircraft_known: True if the aircraft was named; otherwise no limits of an aircraft are applied.
     begins_in_flight: True if the log begins after the flight did.
     gaps: pauses between rows, over all imported data.
     faults: faults of its rows.
@@ -195,11 +195,11 @@ FDM_HZ: Literal[120] = 120
 
 @dataclass(frozen=True, slots=True)
 class FlightSetup:
-    """Inputs of a flight: mission, aircraft, autopilot and world; the log carries all of them.
+    """Inputs of a flight, which are mission, aircraft, autopilot and world; the log stores all of them.
 
-    scenario: the world, and what it asks of the flight.
+    scenario: the world, and the requirements for the flight.
     mission: its items, as read or exported.
-    route: the waypoints that the mission comes to.
+    route: the waypoints that result from the mission.
     limits: of scenario and aircraft together, made where the aircraft is loaded.
     aircraft: its name in the catalog, or its folder.
     battery: energy carried, Wh.
@@ -254,12 +254,12 @@ class FlightSetup:
 
     @property
     def max_bank(self) -> float:
-        """Steepest bank in turns, rad."""
+        """Maximum bank in turns, rad."""
         return self.limits.max_bank
 
     @property
     def ground_ways(self) -> GroundWays:
-        """Take-off and landing that are flown; none for an autopilot that flies neither."""
+        """Take-off and landing that are flown; empty for an autopilot that flies neither."""
         asked = self.scenario.launch is not None or self.scenario.landing is not None
         if self.source is not None or not asked:
             return GroundWays()
@@ -275,7 +275,7 @@ class FlightSetup:
 
     @property
     def slowest_launched(self) -> float:
-        """Lowest speed of level flight at the route's start, m/s: the launch speed if none is stated."""
+        """Minimum level-flight speed at the route's start, m/s, which is the launch speed if none is stated."""
         return self.envelope.level_speeds(float(self.route.waypoints[0, 2]))[0]
 
     @property
@@ -285,7 +285,7 @@ class FlightSetup:
 
     @property
     def started(self) -> str:
-        """Description of the flight's start, and why a launch or a landing of its scenario is not flown."""
+        """Description of the flight's start, and reason why a launch or a landing of its scenario is not flown."""
         ways, started = self.ground_ways, self.route.started
         if ways.take_off is not None:
             started = ways.take_off.described()
@@ -303,7 +303,7 @@ class FlightSetup:
         return moved
 
     def turned_to_other_side(self) -> "FlightSetup":
-        """Return the same flight with its reversals turned to the side of the longer turn."""
+        """Return a copy that turns the long way round at each course reversal."""
         turned = copy.copy(self)
         path = fly_by_path(self.route, self.limits, self.scenario.terrain, swing="long")
         object.__setattr__(turned, "path", path)

@@ -1,4 +1,4 @@
-"""The flight: JSBSim under guidance along a route, over its terrain, until its end or its failure."""
+"""Fly JSBSim under guidance along a route and over its terrain until the flight's end or failure."""
 
 import math
 import struct
@@ -36,12 +36,12 @@ def make_loop(
     run: Callable[[], object],
     steps: int,
 ) -> Callable[[int], int]:
-    """Make what flies up to a number of ticks and returns the last one's status: 0, or how the flight ended.
+    """Return a function that flies up to a number of ticks and returns 0, or a status if the flight ended.
 
-    getters: of the state, by `flight.simulation.tick.READ_FIELDS`.
-    setters: by `flight.simulation.tick.OUTPUT`.
-    tick: the law's, on this workspace.
-    run: steps JSBSim, ``steps`` times a tick.
+    getters: getters of the state, in the order of `flight.simulation.tick.READ_FIELDS`.
+    setters: setters of the outputs, in the order of `flight.simulation.tick.OUTPUT`.
+    tick: the control law's tick, on this workspace.
+    run: function that steps JSBSim; it is called ``steps`` times per tick.
     """
     # Each by its name: going through a list of them takes half as long again.
     (
@@ -142,9 +142,9 @@ GROUND_PATIENCE = 120.0
 class SimulatedFlight:
     """A flight that is over.
 
-    track: as flown.
-    ended: "completed" or why not.
-    path: that it was to follow.
+    track: the flown track.
+    ended: "completed", or the reason why the flight ended earlier.
+    path: the path to follow.
     """
 
     track: Track
@@ -155,9 +155,9 @@ class SimulatedFlight:
 class FlightBlock(NamedTuple):
     """Some rows of a flight, as `simulate` yields them.
 
-    rows: (t,) of `flight.simulation.track.TRACK_ROW`.
-    ended: how the flight ended with these rows, "completed" or the reason why not; "" while it goes on.
-    distance: flown along the path by now, m.
+    rows: `flight.simulation.track.TRACK_ROW` records, (t,).
+    ended: "completed", or the reason why the flight ended with these rows; "" while it goes on.
+    distance: distance flown along the path by now, m.
     """
 
     rows: Rows
@@ -224,7 +224,7 @@ _CARRIED = ("state", "true", "estimated", "commands", "air", "place", "wind", "g
 
 
 class Flight(Airborne):
-    """A flight by the law of an autopilot: `simulate` flies it as fast as possible, the live vehicle in real time."""
+    """A flight by an autopilot's control law, flown as fast as possible by `simulate`, or live in real time."""
 
     def __init__(
         self,
@@ -234,11 +234,11 @@ class Flight(Airborne):
         local_map: LocalMap | None = None,
         start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
-        """Start it from a trimmed state.
+        """Start the flight from a trimmed state.
 
         variation: an aircraft that differs from its model, which guidance does not know.
         local_map: the map of the setup if another flight of it has fitted one already.
-        start_offset: east, north and up from the route's first waypoint to where the flight begins, m.
+        start_offset: east, north and up from the route's first waypoint to the start of the flight, m.
         Raises FlightError for an aircraft that cannot be loaded, and StartError for a flight that cannot start.
         """
         gains = load_gains(aircraft)
@@ -256,14 +256,16 @@ class Flight(Airborne):
         self.memory.max_bank = setup.limits.max_bank + BANK_RESERVE
         law = self._law(setup).law
         law.begin(self.memory, self._workspace.own)
-        self._disturb(setup)
+        self._start_disturbances(setup)
         self._loop = self._make_loop(self.fdm.loop_access(), law.tick)
 
     def divert(self, setup: FlightSetup, local_map: LocalMap) -> None:
-        """Leave the route for another setup's, which begins where the aircraft is; its time begins at 0.
+        """Leave the route for another setup's route, which begins at the aircraft's position; its time begins at 0.
 
-        The aircraft, its wind and what guidance has learnt of them stay; what it kept of the way it was on is gone.
-        setup: of the same aircraft, autopilot, wind and rates.  local_map: the setup's.
+        The aircraft, its wind and the estimates of guidance stay; the state of guidance on the old route is discarded.
+
+        setup: setup with the same aircraft, autopilot, wind and rates.
+        local_map: local map of that setup.
         """
         before, own = self._work, self._workspace.own
         # In the air, whatever the other mission says.
@@ -279,11 +281,11 @@ class Flight(Airborne):
         self._loop = self._make_loop(self.fdm.loop_access(), law.tick)
 
     def _begin(self, setup: FlightSetup, model: Fdm, reference: float) -> None:
-        """Trim the aircraft at the route's start, and guidance's controls with the model.
+        """Trim the aircraft at the route's start, and initialise the controls of guidance with the model.
 
-        reference: airspeed at which the gains hold, m/s.
+        reference: airspeed for which the gains apply, m/s.
         """
-        start = self._start(setup)
+        start = self._find_start(setup)
         if setup.autopilot.equivalent_airspeeds:
             true = start.airspeed * setup.autopilot.airspeed_factor(start.amsl)
             start = replace(start, slope=0.0, airspeed=min(self.fdm.aircraft.airspeed_max, true))
@@ -291,7 +293,7 @@ class Flight(Airborne):
         if level is None:
             reason = f"no level flight at {reference:.1f} m/s and {start.amsl:.0f} m AMSL"
             raise StartError(setup.aircraft, reason, field="airspeed", value=reference)
-        self._trim(setup.mission.source, start)
+        self._start_trimmed(setup.mission.source, start)
         memory = self.memory
         memory.trim_elevator, memory.trim_alpha = level.elevator, level.alpha
         memory.trim_throttle = (straight(model, start.airspeed, start.amsl) or level).throttle
@@ -310,13 +312,13 @@ class Flight(Airborne):
         return self._loop(count)
 
     def _make_loop(self, access: LoopAccess, tick: Tick) -> Callable[[int], int]:
-        """Make what flies a number of ticks into the workspace's rows and returns the last tick's status."""
+        """Return a function that flies a number of ticks into the workspace's rows and returns the last status."""
         work, space = self._work, self._workspace
         work.state_factors = access.factors[0]
         work.scale_above, work.scale_below = (tuple(scales) for scales in zip(*access.scales, strict=True))
         # Not set: gusts in still air, and ground that is not known.
         used = (True, True, True, True, self._windy, self._windy, self._windy, self._ground.known)
-        setters = [setter if use else _ignore for setter, use in zip(access.setters, used, strict=True)]
+        setters = [setter if use else _discard for setter, use in zip(access.setters, used, strict=True)]
         return make_loop(
             [access.getters[field] for field in READ_FIELDS],
             setters,
@@ -327,5 +329,5 @@ class Flight(Airborne):
         )
 
 
-def _ignore(_value: float) -> None:
-    """Set nothing."""
+def _discard(_value: float) -> None:
+    """Ignore the value of an output that is not used."""

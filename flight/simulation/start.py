@@ -1,4 +1,4 @@
-"""Start of a flight: trimmed in the air on its route, or released from a rail, a hand or a runway."""
+"""Start a flight, either trimmed in the air on its route or released from a rail, a hand or a runway."""
 
 import math
 from dataclasses import dataclass
@@ -78,7 +78,7 @@ def find_start(
 
 
 def start_trimmed(fdm: Fdm, source: str, start: Start) -> Trim:
-    """Start trimmed on the start's slope if the aircraft can hold it, else level.
+    """Start trimmed on the slope of the start if the aircraft can hold that slope, otherwise level.
 
     Raise StartError, which names the mission's file, ``source``.
     """
@@ -119,7 +119,7 @@ class Release:
 
 
 def gear_of(ways: GroundWays) -> Gear:
-    """Return the gear for an aircraft whose model has no contacts: wheels if it takes off from a runway."""
+    """Return the gear for an aircraft whose model has no contacts, with wheels if it takes off from a runway."""
     return "wheels" if ways.take_off is not None and ways.take_off.launch.method == "runway" else "belly"
 
 

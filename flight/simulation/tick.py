@@ -1,8 +1,9 @@
-"""Record of a flight for the compiled loop, and the parts of a tick that all autopilots share.
+"""Define the record of a flight for the compiled loop, and the parts of a tick that all autopilots share.
 
 A tick converts the state to SI units and to the map, looks up the ground and adds the navigation error (`begin_tick`);
 then an autopilot's control law fills in the commands; the tick ends with the next wind, a row of the track and the
-outputs to JSBSim (`end_tick`). Every autopilot has a compiled tick of its own, made of these two and its law.
+outputs to JSBSim (`end_tick`). Every autopilot has a compiled tick of its own, which consists of these two parts and
+its control law.
 """
 
 import math
@@ -153,10 +154,12 @@ class Workspace:
         for name, rows in parts.items():
             self.path[name][: len(rows)] = rows
             setattr(self.record.settings, f"{name}s", len(rows))
-        self.readings = self._numbers("state", len(READ_FIELDS))
-        self.output = self._numbers("output", len(field_names(OUTPUT)))
-        self.commands = self._numbers("commands", len(field_names(COMMANDS)))
-        self._true, self._estimated = (self._numbers(name, len(field_names(MOTION))) for name in ("true", "estimated"))
+        self.readings = self._field_numbers("state", len(READ_FIELDS))
+        self.output = self._field_numbers("output", len(field_names(OUTPUT)))
+        self.commands = self._field_numbers("commands", len(field_names(COMMANDS)))
+        self._true, self._estimated = (
+            self._field_numbers(name, len(field_names(MOTION))) for name in ("true", "estimated")
+        )
         # Created once: numpy needs microseconds for each access to a record's field from Python.
         self.ticks_flown: NDArray[np.int64] = self.array["timing"]["tick"]
         self.rows_filled: NDArray[np.int64] = self.array["timing"]["row"]
@@ -169,8 +172,8 @@ class Workspace:
         """Return the estimated minus the true motion, in `flight.guidance.navigation_error.MOTION` order."""
         return (self._estimated - self._true).tolist()
 
-    def _numbers(self, field: str, count: int) -> Floats:
-        """Return the first numbers of a field, as an array that shares its memory."""
+    def _field_numbers(self, field: str, count: int) -> Floats:
+        """Return the first numbers of a field as an array that shares the field's memory."""
         fields: Any = WORKSPACE.fields
         return np.frombuffer(self.array, np.float64, count, fields[field][1])
 
@@ -232,13 +235,13 @@ _OUTPUT_FIELDS = field_names(OUTPUT)
 
 @inner
 def begin_tick(work: Record, heights: Heights) -> bool:
-    """Convert the state from JSBSim's units and estimate the motion; return False if it is not a number.
+    """Convert the state from JSBSim's units, and estimate the motion; return False if a value is not finite.
 
     work: a record of `WORKSPACE`.
     heights: altitudes of the terrain.
     """
     settings, timing = work.settings, work.timing
-    if not _sense(work, heights):
+    if not _read_sensors(work, heights):
         return False
     navigate(
         work.true,
@@ -253,8 +256,8 @@ def begin_tick(work: Record, heights: Heights) -> bool:
 
 
 @inner
-def _sense(work: Record, heights: Heights) -> bool:
-    """Convert the state to SI and to the map, and look up the ground; return False if it is not a number.
+def _read_sensors(work: Record, heights: Heights) -> bool:
+    """Convert the state to SI and to the map, and look up the ground; return False if a value is not finite.
 
     Fill the state, the true motion and the place of a record of `flight.simulation.tick.WORKSPACE`.
     """
@@ -293,9 +296,9 @@ def end_tick(work: Record) -> int:
 
 @inner
 def status_in_air(work: Record) -> int:
-    """Return how a flight in the air has ended: a key of `ENDS`, or 0 to fly on."""
+    """Return a key of `ENDS` if a flight in the air has ended, or 0 to fly on."""
     settings, air = work.settings, work.air
-    return _status(work.state, work.memory, work.place.clearance, settings.slowest, air.energy >= settings.battery)
+    return _air_status(work.state, work.memory, work.place.clearance, settings.slowest, air.energy >= settings.battery)
 
 
 @inner
@@ -319,9 +322,9 @@ def fill_tick(work: Record) -> None:
 def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:
     """Track the progress of a return to launch around its loiter, and end the flight after it.
 
-    For an autopilot that returns by its own control law and need not follow the path: the flight ends at the path's end
-    once the aircraft has arrived at the loiter and flown a full circle at its altitude, and after `longest_circling` at
-    the latest.
+    This is for an autopilot that returns by its own control law and need not follow the path. The flight ends at the
+    path's end once the aircraft has arrived at the loiter and flown a full circle at its altitude, and after
+    `longest_circling` at the latest.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     b: any waypoint of the return, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
@@ -364,7 +367,7 @@ def end_around(motion: Record, memory: Record, dt: float) -> None:
 
 @compiled
 def longest_circling(radius: float) -> float:
-    """Return the time after which a return in its loiter of a radius (m) is over in any case, s."""
+    """Return the timeout of a return in a loiter of the given radius (m), s."""
     return LOITER_TIMEOUT_FACTOR * max(UNLIMITED, 2.0 * math.pi * abs(radius) / _CIRCLING_SPEED_MPS)
 
 
@@ -380,7 +383,7 @@ def _to_si(state: Record, factors: Record) -> bool:
 
 
 @inner
-def _status(state: Record, memory: Record, clearance: float, slowest: float, empty: bool) -> int:
+def _air_status(state: Record, memory: Record, clearance: float, slowest: float, empty: bool) -> int:
     if clearance <= 0.0:
         return GROUND
     if abs(state.roll) > STEEPEST_BANK:
@@ -420,7 +423,7 @@ def _update_wind(
     air: Record,
     dt: float,
 ) -> None:
-    """Set mean wind and the next gust at this altitude, true north, east and down, in ``air``."""
+    """Set ``air`` to the mean wind and the next gust at this altitude, true north, east and down."""
     speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, up)
     # The wind's map course minus the map course of true north.
     cos = wind.cos * turn_cos + wind.sin * turn_sin
@@ -446,7 +449,7 @@ def _fill_row(
     energy: float,
     clearance: float,
 ) -> None:
-    """Fill one row of the track except the wind, a record of `flight.simulation.track.TRACK_ROW`."""
+    """Fill a `flight.simulation.track.TRACK_ROW` record, except for the wind."""
     row.time = time
     # Element by element: assigning a whole array would check shapes.
     position, velocity, attitude, rates = row.position, row.velocity, row.attitude, row.rates

@@ -1,4 +1,4 @@
-"""Track of a flight: one row per guidance tick."""
+"""Store the track of a flight, with one row per guidance tick."""
 
 import csv
 import io
@@ -66,10 +66,10 @@ DIGITS = {
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Track:
-    """Flown track as it is logged.
+    """Flown track, as stored in a log.
 
-    Time and position are float64, all else is float32, so that a log loses nothing. All arrays have t rows. World axes
-    east, north, up; SI and radians.
+    Time and position are float64, and all other values float32, so that a log stores them exactly. All arrays have t
+    rows. World axes east, north, up; SI and radians.
 
     >>> rows = np.zeros(3, TRACK_ROW)
     >>> rows["time"] = 0.0, 0.5, 1.0
@@ -112,7 +112,7 @@ class Track:
         return int(self.time.size)
 
     def rows(self, start: int, stop: int) -> "Track":
-        """Return rows start..stop as a track of their own."""
+        """Return rows start..stop as a separate track."""
         return Track(*(getattr(self, item.name)[start:stop] for item in fields(self)))
 
     def to_pandas(self) -> Any:
@@ -199,13 +199,13 @@ def quantised(rows: Rows) -> Rows:
 
     Rows are rounded as they are flown, so that the verdict and every reader of the log see the same numbers.
     """
-    numbers = _numbers(rows).copy()
+    numbers = _as_matrix(rows).copy()
     _round_to_steps(numbers[:, 1:], _STEPS_PER_UNIT)
     return numbers.view(TRACK_ROW)[:, 0]
 
 
-def _numbers(rows: Rows) -> Floats:
-    """Return the numbers of each row in columns, the time first: a view, (t, columns)."""
+def _as_matrix(rows: Rows) -> Floats:
+    """View rows as a float array (t, columns) without copying; the first column is the time."""
     return rows[:, np.newaxis].view(np.float64)
 
 
@@ -229,7 +229,7 @@ def join_rows(parts: Sequence[Rows]) -> Rows:
     array([4., 5.])
     """
     # As plain numbers: numpy copies a record field by field, which takes a hundred times as long.
-    numbers = np.concatenate([_numbers(part) for part in (_NO_ROWS, *parts)])
+    numbers = np.concatenate([_as_matrix(part) for part in (_NO_ROWS, *parts)])
     # For parts of one row each, numpy returns columns in contiguous memory.
     return np.ascontiguousarray(numbers).view(TRACK_ROW)[:, 0]
 
@@ -379,9 +379,7 @@ _LIMIT_TOLERANCE_FRACTION = 1e-3
 
 
 def control_limits(aircraft: str) -> list[tuple[str, float]]:
-    """Return each control and its limit in either direction.
-
-    In rad; 1 for the throttle; NaN for an unknown aircraft.
+    """Return each control with its limit in either direction, rad; 1 for the throttle, NaN for an unknown aircraft.
 
     >>> for name, limit in control_limits("aerosonde"):
     ...     print(f"{name} {limit:.2f}")
@@ -400,7 +398,7 @@ def control_limits(aircraft: str) -> list[tuple[str, float]]:
 
 
 def held_at_limit(track: Track, k: int, low: float, high: float) -> NDArray[np.bool_]:
-    """Return the rows at which the command of control k (a column of `Track.commands`) is saturated, (t,).
+    """Flag the rows at which the command of control k (a column of `Track.commands`) is saturated, (t,).
 
     low, high: limits of the control; no row is saturated if they are NaN.
 

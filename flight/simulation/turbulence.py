@@ -1,8 +1,8 @@
-"""Dryden turbulence by height above ground (MIL-F-8785C, low-altitude model).
+"""Compute Dryden turbulence by height above ground (MIL-F-8785C, low-altitude model).
 
 JSBSim's own model uses the height above sea level, and leaves a pure east wind unrotated. Above 300 m (1,000 ft) the
-low-altitude scales are kept: there they are isotropic. Rotational gusts are left out: an 11 kg aircraft is small
-relative to the scales.
+low-altitude scales are kept, which are isotropic there. Rotational gusts are left out, because an 11 kg aircraft is
+small relative to the scales.
 """
 
 import math
@@ -56,18 +56,18 @@ def step_gusts(
     speed = max(airspeed, 5.0)
     decay = math.exp(-dt * speed / length_u)
     filters.along = decay * filters.along + math.sqrt(1.0 - decay * decay) * noise[0]
-    filters.across_first, filters.across_second, across = _transverse(
+    filters.across_first, filters.across_second, across = _step_transverse(
         filters.across_first, filters.across_second, noise[1], decay
     )
-    filters.down_first, filters.down_second, down = _transverse(
+    filters.down_first, filters.down_second, down = _step_transverse(
         filters.down_first, filters.down_second, noise[2], math.exp(-dt * speed / length_w)
     )
     return sigma_u * filters.along, sigma_u * across, sigma_w * down
 
 
 @inner
-def _transverse(first: float, second: float, noise: float, decay: float) -> tuple[float, float, float]:
-    """Return both lags after a step, and the gust in standard deviations."""
+def _step_transverse(first: float, second: float, noise: float, decay: float) -> tuple[float, float, float]:
+    """Advance both lags by a step, and return them with the gust in standard deviations."""
     before = first
     first = decay * before + math.sqrt(1.0 - decay * decay) * noise
     second = decay * second + (1.0 - decay) * 0.5 * (before + first)

@@ -1,4 +1,4 @@
-"""Penetration of zones by legs, for the search, and margins of path pieces to zones, for the certificate.
+"""Measure how deep legs penetrate zones, for the search, and how far path pieces are from zones, for the certificate.
 
 A search charges each leg the depth of its penetration times its length, computed from a zone's extent across and along
 the leg; for levels above ground the terrain is sampled. A certificate cuts pieces near a zone so short that the heights
@@ -33,7 +33,7 @@ UNKNOWN = 9000.0
 
 
 class AltitudeBand(NamedTuple):
-    """Vertical range of a part of a path: above mean sea level, and above the ground below it, m."""
+    """Vertical range of a part of a path, above mean sea level and above the ground below the part, m."""
 
     lowest: float
     highest: float
@@ -53,7 +53,7 @@ def zone_excess(
     below: float,
     above: float,
 ) -> float:
-    """Return the depth of the leg a-b in zones enlarged by their margins, integrated over its length: m x km.
+    """Return the depth of the leg a-b in zones enlarged by their margins, integrated over its length, m x km.
 
     pitch: spacing of terrain samples (m), for levels above ground. lateral, below, above: tracking error, m.
     """
@@ -65,7 +65,7 @@ def zone_excess(
         zone = records.zones[z]
         band = altitude_band(a[2], b[2], below, above)
         if zone.floor_above_ground or zone.ceiling_above_ground:
-            band = _sampled_band(heights, to_pixel, pitch, a, b, 0.0, 1.0, below, above)
+            band = _sampled_altitude_band(heights, to_pixel, pitch, a, b, 0.0, 1.0, below, above)
         over = vertical_distance(zone, band) + required[z].vertical
         total += max(0.0, over) * max(line.run, MIN_CHARGED_LENGTH) / 1000.0
     widest = zones.max_horizontal + lateral
@@ -83,7 +83,7 @@ def zone_excess(
         rise = b[2] - a[2]
         band = altitude_band(a[2] + first * rise, a[2] + last * rise, below, above)
         if zone.floor_above_ground or zone.ceiling_above_ground:
-            band = _sampled_band(heights, to_pixel, pitch, a, b, first, last, below, above)
+            band = _sampled_altitude_band(heights, to_pixel, pitch, a, b, first, last, below, above)
         over = required[z].vertical - vertical_distance(zone, band)
         total += max(0.0, min(depth, over)) * max((last - first) * line.run, MIN_CHARGED_LENGTH) / 1000.0
     return total
@@ -109,7 +109,7 @@ def penetration_depth(records: ZoneRecords, z: int, line: MapSegment, wanted: fl
 
 @inner
 def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, wanted: float) -> float:
-    """Return the shortfall from `wanted` (m) of a line's distance inside inclusion z, times its length: m x km."""
+    """Return how much a line's distance inside inclusion z falls short of `wanted` (m), times its length, m x km."""
     reach = view_shape(records, z, line, wanted)
     if reach.inside and reach.distance >= wanted:
         return 0.0
@@ -133,7 +133,7 @@ def altitude_band(up: float, to_up: float, below: float, above: float) -> Altitu
 
 
 @inner
-def _sampled_band(
+def _sampled_altitude_band(
     heights: Heights,
     to_pixel: PolyMapRecord,
     pitch: float,
@@ -144,7 +144,7 @@ def _sampled_band(
     below: float,
     above: float,
 ) -> AltitudeBand:
-    """Return the vertical range of a-b between two fractions of it, with sampled heights above ground."""
+    """Return the vertical range of a-b between two fractions of its length, with sampled heights above ground."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     plain = altitude_band(a[2] + first * dz, a[2] + last * dz, below, above)
     column, row = polymap(to_pixel, a[0] + first * dx, a[1] + first * dy)
@@ -163,10 +163,9 @@ def _sampled_band(
 
 @inlined
 def vertical_distance(zone: Record, band: AltitudeBand) -> float:
-    """Return the distance of a vertical range below a zone's floor or above its ceiling, m.
+    """Return the distance of a vertical range below a zone's floor or above its ceiling, m; negative between them.
 
-    Negative between them.
-    For an exclusion the smallest distance over the range, for an inclusion the largest.
+    The distance is the smallest over the range for an exclusion, and the largest for an inclusion.
     """
     under_low, under_high = band.lowest, band.highest
     if zone.floor_above_ground:
@@ -223,8 +222,8 @@ def measure_zone_margin(
         grounded = zone.floor_above_ground or zone.ceiling_above_ground
         band = altitude_band(a[2], b[2], below, above)
         if grounded:
-            band = _exact_band(heights, depths, to_pixel, a, b, lateral, below, above)
-        away, over = _map_distance(records, z, a, b, far + widest) - widest, vertical_distance(zone, band)
+            band = _exact_altitude_band(heights, depths, to_pixel, a, b, lateral, below, above)
+        away, over = _horizontal_distance(records, z, a, b, far + widest) - widest, vertical_distance(zone, band)
         if _distance_to_violation(zone, away, over) >= far:
             continue
         pieces = max(1, math.ceil(run / CUT))
@@ -236,9 +235,9 @@ def measure_zone_margin(
                 wide[end] = lateral[0] + (lateral[1] - lateral[0]) * (k + end) / pieces
             band = altitude_band(one[2], two[2], below, above)
             if grounded:
-                band = _exact_band(heights, depths, to_pixel, one, two, wide, below, above)
+                band = _exact_altitude_band(heights, depths, to_pixel, one, two, wide, below, above)
             off = max(wide[0], wide[1])
-            away, over = _map_distance(records, z, one, two, far + off) - off, vertical_distance(zone, band)
+            away, over = _horizontal_distance(records, z, one, two, far + off) - off, vertical_distance(zone, band)
             _update_margin(zone, need, z, away, over, margin)
 
 
@@ -266,10 +265,9 @@ def _distance_to_violation(zone: Record, away: float, over: float) -> float:
 
 
 @inner
-def _map_distance(records: ZoneRecords, z: int, a: Floats, b: Floats, within: float) -> float:
-    """Return the smallest horizontal distance of a-b outside an exclusion or inside an inclusion, m.
+def _horizontal_distance(records: ZoneRecords, z: int, a: Floats, b: Floats, within: float) -> float:
+    """Return the smallest horizontal distance of a-b outside an exclusion or inside an inclusion, m; else negative.
 
-    Otherwise negative.
     Distances above `within` may be inf.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
@@ -284,7 +282,7 @@ def _map_distance(records: ZoneRecords, z: int, a: Floats, b: Floats, within: fl
 
 
 @inner
-def _exact_band(
+def _exact_altitude_band(
     heights: Heights,
     depths: Heights,
     to_pixel: PolyMapRecord,
@@ -294,7 +292,7 @@ def _exact_band(
     below: float,
     above: float,
 ) -> AltitudeBand:
-    """Return the vertical range along a-b, also above the ground below it and `lateral` (2,) m to both sides."""
+    """Return the vertical range along a-b, also above the ground on a-b and within `lateral` (2,) m to both sides."""
     plain = altitude_band(a[2], b[2], below, above)
     run = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
     ux, uy = (b[0] - a[0]) / run, (b[1] - a[1]) / run

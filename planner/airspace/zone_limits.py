@@ -1,4 +1,4 @@
-"""Zones as arrays for compiled code: margins, the airspace of a problem, and distances of lines from shapes.
+"""Represent zones as arrays for compiled code, with their margins, and measure distances of lines from shapes.
 
 Each zone has a horizontal and a vertical margin. A fixed end that violates a margin reduces it for its zone. Exclusions
 are sorted from west to east, so that a kernel visits only those near a leg. Distances are computed in the axes of the
@@ -53,7 +53,7 @@ class ZoneMargins(NamedTuple):
 
 
 def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, margins: ZoneMargins) -> ZonesWithMargins:
-    """Return zones with these margins, reduced for zones with a fixed end within the margin.
+    """Return zones with the given margins, which are smaller for zones that have a fixed end within the margin.
 
     ends: (k, 3) m. An end inside an exclusion, or outside an inclusion, makes its margin 0.
 
@@ -82,7 +82,7 @@ def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, ma
 def _reduce_margins(records: ZoneRecords, ends: Floats, grounds: Floats, share: float, required: Records) -> None:
     """Reduce margins to a fraction of the distances of the ends (k, 3).
 
-    Grounds: (k,) ground heights there, m.
+    grounds: (k,) ground heights at the ends, m.
     """
     for z in range(required.shape[0]):
         zone, need = records.zones[z], required[z]
@@ -258,7 +258,7 @@ def _view_circle(along: float, off: float, radius: float, run: float) -> ShapeVi
 
 @inlined
 def _edge_distance2(along: float, off: float, to_along: float, to_off: float, run: float) -> float:
-    """Return the squared distance of the line from an edge that does not cross it: at an end of one of them."""
+    """Return the squared distance between the line and an edge that does not cross it, which is at an end of either."""
     gap = along - min(run, max(0.0, along))
     nearest = gap * gap + off * off
     gap = to_along - min(run, max(0.0, to_along))

@@ -3,7 +3,7 @@
 A search adds to a path's scores how deep its legs penetrate zones (bounds) and how far they exceed the maximum height
 above ground (terrain), both in m x km; the paper's scores count pieces of legs instead. Each leg is first tested as a
 whole with the largest lateral deviation of the flight, corners included, and cut into parts only where that test fails.
-A certificate measures every piece of the path: its distance from each zone and its greatest height above ground.
+A certificate measures the distance from each zone and the maximum height above ground of every piece of the path.
 """
 
 import math
@@ -43,8 +43,10 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 @compiled
 def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `AIRSPACE_PIECE` records of the legs of a path (w, 3) and then of its corners."""
-    pieces = tracked_pieces(data, waypoints) if data.tracking.has_error else _exact_pieces(data, waypoints)
+    """Return `AIRSPACE_PIECE` records for the legs of a path (w, 3), followed by those for its corners."""
+    pieces = (
+        tracked_pieces(data, waypoints) if data.tracking.has_error else _pieces_without_tracking_error(data, waypoints)
+    )
     out = np.zeros(pieces.size, dtype=AIRSPACE_PIECE)
     space, lateral = data.airspace, np.zeros(2)
     for k in range(pieces.size):
@@ -71,8 +73,8 @@ def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
 
 
 @inner
-def _exact_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `TRACKED_PIECE` records of a path flown without tracking error: its legs, then the chords of its arcs."""
+def _pieces_without_tracking_error(data: ProblemArrays, waypoints: Floats) -> Records:
+    """Return `TRACKED_PIECE` records for a path without tracking error, first its legs, then the chords of its arcs."""
     last, radii = waypoints.shape[0] - 1, fly_by_radii(data, waypoints)
     out = np.zeros(last + last * _MAX_PIECES, dtype=TRACKED_PIECE)
     for i in range(last):
@@ -101,10 +103,7 @@ def _exact_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _greatest_height(data: ProblemArrays, piece: Record) -> float:
-    """Return the greatest height above ground along a piece and on both sides of it, m.
-
-    NaN off the terrain.
-    """
+    """Return the maximum height above ground along a piece and on both sides of it, m, or NaN off the terrain."""
     dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
     run, greatest = max(1e-9, math.hypot(dx, dy)), -math.inf
     a, b = np.empty(3), np.empty(3)
@@ -149,74 +148,77 @@ def add_airspace_violations(
         before, after = float(flown[i].fly_by_offset), float(flown[i + 1].fly_by_offset)
         below, above = float(lags[i].max_below), -float(lags[i].min_below)
         if topped:
-            violations.terrain += _excess_height(data, required, path[i], path[i + 1], legs[i], lags[i], across)
+            violations.terrain += _leg_excess_height(data, required, path[i], path[i + 1], legs[i], lags[i], across)
         wide = max(before, after)
-        if zoned and _zone_excess(data, path[i], path[i + 1], across + wide, below, above) > 0.0:
+        if zoned and _leg_zone_penetration(data, path[i], path[i + 1], across + wide, below, above) > 0.0:
             first = min(1.0, ENDS / max(legs[i].run, 1e-6)) if i == 0 else 0.0
             final = max(first, 1.0 - ENDS / max(legs[i].run, 1e-6)) if i == last else 1.0
             for share, until, lateral in ((0.0, first, 0.0), (first, final, across), (final, 1.0, 0.0)):
                 if until > share:
-                    _cut(path[i], path[i + 1], share, until, a, b)
-                    violations.bounds += _zone_excess(data, a, b, lateral, below, above)
+                    _cut_segment(path[i], path[i + 1], share, until, a, b)
+                    violations.bounds += _leg_zone_penetration(data, a, b, lateral, below, above)
         else:
             wide = 0.0
         for width, length, share in ((before, corners[i].after, 0.0), (after, corners[i + 1].before, 1.0)):
             if width <= 0.0:
                 continue
             part = min(1.0, length / max(legs[i].run, 1e-6))
-            _cut(path[i], path[i + 1], max(0.0, share - part), min(1.0, share + part), a, b)
+            _cut_segment(path[i], path[i + 1], max(0.0, share - part), min(1.0, share + part), a, b)
             if zoned and wide > 0.0:
-                violations.bounds += _zone_excess(data, a, b, across + width, below, above)
+                violations.bounds += _leg_zone_penetration(data, a, b, across + width, below, above)
             if topped:
                 more = max(0.0, -lag_at(lags[i], share), -lag_at(lags[i], abs(share - part)))
-                violations.terrain += _excess_height_around(data, required, a, b, across + width, more, math.inf)
+                violations.terrain += _swath_excess_height(data, required, a, b, across + width, more, math.inf)
 
 
 @inner
 def airspace_excess(data: ProblemArrays, a: Floats, b: Floats, below: float, above: float, enough: float) -> float:
-    """Return the zone penetration and excess height above ground of a single leg, integrated along it: m x km.
+    """Return the zone penetration and the excess height above ground of a leg, each integrated along the leg, m x km.
 
-    below, above: vertical tracking error, m. enough: what exceeds it is not integrated further.
+    below, above: vertical tracking error, m.
+    enough: value beyond which the integration stops.
     """
     total, across = 0.0, float(data.tracking.across)
     if data.airspace.zones.required.shape[0] > 0:
-        total += _zone_excess(data, a, b, across, below, above)
+        total += _leg_zone_penetration(data, a, b, across, below, above)
     if data.airspace.max_height < math.inf:
-        total += _excess_height_around(data, required_headroom(data), a, b, across, above, enough - total)
+        total += _swath_excess_height(data, required_headroom(data), a, b, across, above, enough - total)
     return total
 
 
 @inner
-def _zone_excess(data: ProblemArrays, a: Floats, b: Floats, lateral: float, below: float, above: float) -> float:
+def _leg_zone_penetration(
+    data: ProblemArrays, a: Floats, b: Floats, lateral: float, below: float, above: float
+) -> float:
     zones = data.airspace.zones
     return zone_excess(zones, data.heights, data.to_pixel, data.sample_pitch, a, b, lateral, below, above)
 
 
 @inner
-def _excess_height(
+def _leg_excess_height(
     data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, leg: Record, lag: Record, across: float
 ) -> float:
-    """Return the excess over the maximum height above ground along a leg, with its height lag: m x km."""
+    """Return a leg's excess over the maximum height above ground, height lag included, m x km."""
     if not data.tracking.has_error:
-        return _excess_height_around(data, required, a, b, 0.0, 0.0, math.inf)
+        return _swath_excess_height(data, required, a, b, 0.0, 0.0, math.inf)
     total, one, two = 0.0, np.empty(3), np.empty(3)
     for k in range(len(_LAG_CUTS)):
         share = min(1.0, _LAG_CUTS[k] / max(1e-9, lag.decay))
         until = min(1.0, _LAG_CUTS[k + 1] / max(1e-9, lag.decay)) if k + 1 < len(_LAG_CUTS) else 1.0
         if until > share:
-            _cut(a, b, share, until, one, two)
+            _cut_segment(a, b, share, until, one, two)
             above = max(0.0, -lag_at(lag, share), -lag_at(lag, until))
-            total += _excess_height_around(data, required, one, two, across, above, math.inf)
+            total += _swath_excess_height(data, required, one, two, across, above, math.inf)
     return total
 
 
 @inner
-def _excess_height_around(
+def _swath_excess_height(
     data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, lateral: float, above: float, enough: float
 ) -> float:
-    """Return the largest excess over the maximum height of a line and the lines offset to both sides: m x km.
+    """Return the largest excess over the maximum height, among a line and the lines offset to both sides, m x km.
 
-    A lower bound on it where it exceeds `enough`.
+    If the excess is larger than `enough`, return a lower bound that is larger than `enough`, too.
     """
     run = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
     east, north = lateral * (b[1] - a[1]) / run, -lateral * (b[0] - a[0]) / run
@@ -235,15 +237,17 @@ def _excess_height_around(
 
 
 @inlined
-def _cut(a: Floats, b: Floats, share: float, until: float, one: Floats, two: Floats) -> None:  # pragma: no cover
-    """Fill the ends of the part of a-b between two fractions of it."""
+def _cut_segment(
+    a: Floats, b: Floats, share: float, until: float, one: Floats, two: Floats
+) -> None:  # pragma: no cover
+    """Fill `one` and `two` with the ends of the part of a-b between two fractions of its length."""
     for axis in range(3):
         one[axis] = a[axis] + share * (b[axis] - a[axis])
         two[axis] = a[axis] + until * (b[axis] - a[axis])
 
 
 def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
-    """Return the number of leg pieces, six per leg, of paths (n, w, 3) that violate a zone or the maximum height; (n,).
+    """Count the leg pieces, six per leg, that violate a zone or the maximum height in each path (n, w, 3), (n,).
 
     The paper counts points, six per leg, and has no zones; a path could pass through a zone between two points, so
     pieces are tested along their full length.

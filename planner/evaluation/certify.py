@@ -1,9 +1,9 @@
-"""Certificate of a finished path: every constraint checked continuously along legs and turns.
+"""Certify a finished path by checking every constraint continuously along legs and turns.
 
-The scores of a search sample the path. A certificate measures it exactly: turns, lengths of legs against the turns they
-hold, slopes of legs and arcs, clearance above the bilinear terrain, map bounds, missile spheres, zones and the maximum
-height above ground. With an autopilot's tracking error, distances are those of the flight, not of the legs. Compiled
-measurements are in `planner.evaluation.certify_kernels`.
+The scores of a search sample the path. A certificate measures the path exactly: turns, lengths of legs against the
+lengths of their turns, slopes of legs and arcs, clearance above the bilinear terrain, map bounds, missile spheres,
+zones and the maximum height above ground. With an autopilot's tracking error, distances are those of the flight, not of
+the legs. Compiled measurements are in `planner.evaluation.certify_kernels`.
 """
 
 import math
@@ -41,21 +41,18 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     # A copy: compiled code has one type for arrays that are locked, as a plan's, and one for others.
     waypoints = np.array(waypoints, dtype=np.float64)
     problems: list[str] = []
-    turn = _turns(data, waypoints, problems)
-    available_length = _turn_lengths(data, waypoints, problems)
-    slope = float(min(_arc_slopes(data, waypoints, problems), _leg_slopes(data, waypoints, problems)))
-    clearance = _clearance(data, waypoints, problems)
-    bounds = _bounds(data, waypoints, problems)
+    turn = _turn_margin(data, waypoints, problems)
+    available_length = _leg_length_margin(data, waypoints, problems)
+    slope = float(min(_arc_slope_margin(data, waypoints, problems), _leg_slope_margin(data, waypoints, problems)))
+    clearance = _clearance_margin(data, waypoints, problems)
+    bounds = _bounds_margin(data, waypoints, problems)
     distance = kill_distance(data, waypoints)
-    zones, headroom = _airspace(problem, waypoints, problems)
+    zones, headroom = _airspace_margins(problem, waypoints, problems)
     return Certificate(turn, available_length, slope, clearance, bounds, distance, tuple(problems), zones, headroom)
 
 
 def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
-    """Return the distance from the path to the nearest missile sphere, m.
-
-    Negative inside, inf without any.
-    """
+    """Return the distance from the path to the nearest missile sphere, m; negative inside, or inf without missiles."""
     return float(missile_distance(data, np.array(waypoints, dtype=np.float64)))
 
 
@@ -66,7 +63,7 @@ _NAMED = 6
 
 
 def _worst_and_others(found: list[_Fault]) -> list[str]:
-    """Return the faults of one kind as one line: the worst, and the other places; empty without a fault."""
+    """Return a list with one line on the faults of one kind, the worst and its other places, or an empty list."""
     if not found:
         return []
     (_, where, what), *others = sorted(found, key=lambda one: one[0])
@@ -75,8 +72,8 @@ def _worst_and_others(found: list[_Fault]) -> list[str]:
     return [f"{where}: {what}" + (f" (also {named}{more})" if others else "")]
 
 
-def _turns(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest margin of a turn to its limit, rad."""
+def _turn_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
+    """Return the smallest margin of a turn to its limit, rad, and append turns that are too sharp to `problems`."""
     allowed = data.max_turn if data.legs_hold_turns else data.max_turn + ANGLE_MARGIN
     wanted = 0.0 if data.legs_hold_turns else ANGLE_MARGIN
     margins = allowed - turning_angles(with_courses(data, waypoints))
@@ -91,10 +88,10 @@ def _turns(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float
     return float(margins.min(initial=math.inf))
 
 
-def _turn_lengths(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest length of a leg that remains between its turns, m.
+def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
+    """Return the smallest length of a leg that remains between its turns, m, and append too short legs to `problems`.
 
-    Inf where legs need not hold their turns.
+    Return inf if legs need not be as long as their turns.
     """
     problems += _worst_and_others(
         [
@@ -120,11 +117,15 @@ def _turn_lengths(data: ProblemArrays, waypoints: Floats, problems: list[str]) -
     return smallest
 
 
-def _arc_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest slope margin along the arcs, rad, which are shorter, hence steeper, than the legs."""
+def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
+    """Return the smallest slope margin on the turn arcs, rad, and append arcs that are too steep to `problems`.
+
+    An arc is shorter than the two pieces of leg that it replaces, so the same height change makes it steeper. Return
+    inf if the arcs need no check.
+    """
     smallest = math.inf
-    by_numbers = not (math.isnan(data.max_climb) or math.isnan(data.max_dive))
-    if not data.legs_hold_turns or data.fly_over or by_numbers:
+    limits_are_fixed = not (math.isnan(data.max_climb) or math.isnan(data.max_dive))
+    if not data.legs_hold_turns or data.fly_over or limits_are_fixed:
         return smallest
     radii, tangents = fly_by_radii(data, waypoints), turn_tangents(data.aircraft, waypoints)
     rises = np.tan(leg_slopes(waypoints))
@@ -140,14 +141,14 @@ def _arc_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> 
             inside = min(climb - slope, dive + slope)
             smallest = min(smallest, inside + data.angle_margin)
             if inside < -_EPSILON:
-                found.append((inside, f"turn at waypoint {i}", _too_steep(slope, climb, dive, " along its arc")))
+                found.append((inside, f"turn at waypoint {i}", _slope_fault_text(slope, climb, dive, " along its arc")))
                 break
     problems += _worst_and_others(found)
     return smallest
 
 
-def _leg_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest slope margin of the legs, rad."""
+def _leg_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
+    """Return the smallest slope margin of the legs, rad, and append legs that are too steep to `problems`."""
     smallest = math.inf
     limits = leg_slope_limits(data, waypoints)
     found: list[_Fault] = []
@@ -155,18 +156,21 @@ def _leg_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> 
         inside = min(climb - slope, dive + slope)
         smallest = min(smallest, inside + data.angle_margin)
         if inside < -_EPSILON:
-            found.append((inside, f"leg {i}", _too_steep(slope, climb, dive)))
+            found.append((inside, f"leg {i}", _slope_fault_text(slope, climb, dive)))
     problems += _worst_and_others(found)
     return smallest
 
 
-def _too_steep(slope: float, climb: float, dive: float, where: str = "") -> str:
+def _slope_fault_text(slope: float, climb: float, dive: float, where: str = "") -> str:
     verb, limit = ("climbs", climb) if slope > 0 else ("sinks", dive)
     return f"{verb} {math.degrees(abs(slope)):.1f} deg{where}, allowed {math.degrees(limit):.1f} deg"
 
 
-def _clearance(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest height above the required clearance, m; NaN if the path leaves the terrain."""
+def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
+    """Return the smallest height above the required clearance, m, and append violations to `problems`.
+
+    Return NaN if the path leaves the terrain.
+    """
     smallest = math.inf
     low: dict[str, float] = {}
     for piece in heights_above_ground(data, waypoints):
@@ -188,8 +192,11 @@ def _clearance(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> f
     return smallest
 
 
-def _bounds(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest distance of a waypoint from the edge of the map, the floor or the ceiling, m."""
+def _bounds_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
+    """Return the smallest distance of a waypoint from the edge of the map, the floor or the ceiling, m.
+
+    Append violations to `problems`.
+    """
     low = np.array([data.west, data.south, data.floor])
     high = np.array([data.east, data.north, data.ceiling])
     margins = np.minimum(waypoints - low, high - waypoints).min(axis=1)
@@ -202,10 +209,10 @@ def _bounds(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> floa
     return float(margins.min())
 
 
-def _airspace(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple[float, float]:
-    """Return the smallest distance from zones and smallest headroom below the maximum height, m.
+def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple[float, float]:
+    """Return the smallest distance to a zone and the smallest headroom below the maximum height, m; inf without limits.
 
-    Inf without zones or maximum.
+    Append violations to `problems`.
     """
     data, space = problem.certified, problem.certified.airspace
     if not is_limited(space):
@@ -224,7 +231,11 @@ def _airspace(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple
             high[name] = min(high.get(name, math.inf), left)
     for zone in dict.fromkeys(z for _, z in near.values()):
         problems += _worst_and_others(
-            [(distance, name, _too_near(problem, distance, z)) for name, (distance, z) in near.items() if z == zone]
+            [
+                (distance, name, _zone_fault_text(problem, distance, z))
+                for name, (distance, z) in near.items()
+                if z == zone
+            ]
         )
     wanted = f"{space.max_height:g} m allowed, {space.buffer:.1f} m in reserve wanted"
     problems += _worst_and_others(
@@ -236,7 +247,7 @@ def _airspace(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple
     return float(pieces["zones"]["nearest"].min()), headroom
 
 
-def _too_near(problem: Problem, distance: float, z: int) -> str:
+def _zone_fault_text(problem: Problem, distance: float, z: int) -> str:
     """Return the message for a piece at this distance (m) from zone z, in the kernels' numbering."""
     required = problem.certified.airspace.zones.required[z]
     zone = problem.scenario.zones[int(required["number"])]

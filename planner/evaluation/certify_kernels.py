@@ -56,7 +56,7 @@ ENDS = 100.0
 
 @inner
 def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `TRACKED_PIECE` records of the legs of a path (w, 3) and then of its corners."""
+    """Return `TRACKED_PIECE` records for the legs of a path (w, 3), followed by those for its corners."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     lags, wind, across = np.zeros(count - 1, dtype=HEIGHT_LAG), downwind(data.aircraft), data.tracking.across
@@ -66,18 +66,18 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     out = np.zeros((count - 1) * (len(_CUTS) + 3) + 2 * count, dtype=TRACKED_PIECE)
     made = 0
     for i in range(count - 1):
-        cuts, share = _cuts(lags[i].decay, legs[i].run), 0.0
+        cuts, share = _piece_ends(lags[i].decay, legs[i].run), 0.0
         for after in cuts:
             if after <= share:
                 continue
             piece = out[made]
-            _cut(waypoints[i], waypoints[i + 1], share, after, piece)
+            _cut_piece(waypoints[i], waypoints[i + 1], share, after, piece)
             piece.number = i
             piece.lateral_begin, piece.lateral_end = (
                 _lateral_deviation(data, piece.begin, across),
                 _lateral_deviation(data, piece.end, across),
             )
-            _set_below(lags[i], share, after, piece)
+            _set_deviations(lags[i], share, after, piece)
             piece.lateral = max(piece.lateral_begin, piece.lateral_end)
             share = after
             made += 1
@@ -88,20 +88,20 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
         wide = across + corners[i].excursion
         for k in range(2):
             piece = out[made]
-            _cut(about[k], about[k + 1], 0.0, 1.0, piece)
+            _cut_piece(about[k], about[k + 1], 0.0, 1.0, piece)
             piece.of_corner, piece.number = True, i
             piece.lateral_begin, piece.lateral_end, piece.lateral = wide, wide, wide
             if k == 0:
                 share = 1.0 - min(1.0, corners[i].before / max(1e-6, legs[i - 1].run))
-                _set_below(lags[i - 1], share, 1.0, piece)
+                _set_deviations(lags[i - 1], share, 1.0, piece)
             else:
-                _set_below(lags[i], 0.0, min(1.0, corners[i].after / max(1e-6, legs[i].run)), piece)
+                _set_deviations(lags[i], 0.0, min(1.0, corners[i].after / max(1e-6, legs[i].run)), piece)
             made += 1
     return out[:made]
 
 
 @inner
-def _cuts(decay: float, run: float) -> Floats:
+def _piece_ends(decay: float, run: float) -> Floats:
     """Return the fractions of a leg at which its pieces end, increasing; the last is 1."""
     cuts = np.ones(len(_CUTS) + 3)
     for k in range(len(_CUTS)):
@@ -113,23 +113,23 @@ def _cuts(decay: float, run: float) -> Floats:
 
 
 @inner
-def _cut(a: Floats, b: Floats, share: float, after: float, piece: Record) -> None:
-    """Fill the ends of the part of a-b between two fractions of it."""
+def _cut_piece(a: Floats, b: Floats, share: float, after: float, piece: Record) -> None:
+    """Fill the ends of a piece with the part of a-b between two fractions of its length."""
     for axis in range(3):
         piece.begin[axis] = a[axis] + share * (b[axis] - a[axis])
         piece.end[axis] = a[axis] + after * (b[axis] - a[axis])
 
 
 @inner
-def _set_below(lag: Record, share: float, after: float, piece: Record) -> None:
-    """Fill the deviations below and above of the piece between two fractions of a leg."""
+def _set_deviations(lag: Record, share: float, after: float, piece: Record) -> None:
+    """Fill the deviations below and above the leg of the piece between two fractions of the leg."""
     one, two = lag_at(lag, share), lag_at(lag, after)
     piece.below, piece.above = max(0.0, one, two), max(0.0, -one, -two)
 
 
 @inner
 def _lateral_deviation(data: ProblemArrays, place: Floats, across: float) -> float:
-    """Return the lateral deviation of the flight at a point of the path, m: reduced near the fixed ends."""
+    """Return the lateral deviation of the flight at a point of the path, which is smaller near the fixed ends, m."""
     away = min(
         math.hypot(place[0] - data.start[0], place[1] - data.start[1]),
         math.hypot(place[0] - data.destination[0], place[1] - data.destination[1]),
@@ -150,10 +150,9 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 @compiled
 def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
-    """Return the distance of the flight of a path (w, 3) from the nearest missile sphere, m.
+    """Return the distance between the flight of a path (w, 3) and the nearest missile sphere, m; inf without missiles.
 
-    Inf without missiles.
-    The flight is on the legs and arcs, or within the tracking error of them.
+    The flight is on the legs and arcs, or deviates from them by up to the tracking error.
     """
     nearest = math.inf
     if data.tracking.has_error:
@@ -194,9 +193,9 @@ def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) ->
 
 @compiled
 def with_courses(data: ProblemArrays, path: Floats) -> Floats:
-    """Return the path with distant points before the start and after the destination on the prescribed courses.
+    """Add a distant point on the prescribed course before the start of a path, and another after its destination.
 
-    Without a prescribed course the point is on the extension of the leg, so that there is no turn.
+    Without a prescribed course the point is on the extension of the leg, so that no turn results.
     """
     count = path.shape[0]
     out = np.empty((count + 2, 3))
@@ -218,7 +217,7 @@ def with_courses(data: ProblemArrays, path: Floats) -> Floats:
 
 @compiled
 def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return the lengths of each leg (w - 1,) taken by its turns, and by the roll from one turn into the other, m."""
+    """Return the lengths that each leg's turns, and the roll from one turn into the other, take up, (w - 1,) m each."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     turns, rolls = np.zeros(count - 1), np.zeros(count - 1)
@@ -235,7 +234,7 @@ def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Float
 
 @compiled
 def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:
-    """Return the steepest climb and dive of each leg (w - 1,), rad."""
+    """Return the maximum climb and dive angles of each leg, (w - 1,) rad each."""
     count = waypoints.shape[0] - 1
     climbs, dives = np.empty(count), np.empty(count)
     for i in range(count):
@@ -245,7 +244,7 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 
 @compiled
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `CERTIFIED_PIECE` records of the legs of a path (w, 3) and then of its fly-by arcs or corners."""
+    """Return `CERTIFIED_PIECE` records for the legs of a path (w, 3), followed by those for its arcs or corners."""
     if data.tracking.has_error:
         return _tracked_heights(data, tracked_pieces(data, waypoints))
     last = waypoints.shape[0] - 1
@@ -264,7 +263,7 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
-    """Return `CERTIFIED_PIECE` records of `TRACKED_PIECE` records: smallest heights along them and to both sides."""
+    """Return `CERTIFIED_PIECE` records with the minimum heights along `TRACKED_PIECE` records and to both sides."""
     out = np.zeros(pieces.size, dtype=CERTIFIED_PIECE)
     for k in range(pieces.size):
         piece = pieces[k]
@@ -296,9 +295,12 @@ def _measure_piece(data: ProblemArrays, a: Floats, b: Floats, of_arc: bool, numb
 def required_buffer(
     data: ProblemArrays, buffer: float, end_buffers: tuple[float, float], a: Floats, b: Floats
 ) -> float:
-    """Return the buffer required on a piece, m: smaller near a fixed end, growing with the distance from it.
+    """Return the buffer required on a piece, m, which grows with the distance from a fixed end.
 
-    buffer: m, away from the ends. end_buffers: at the start and the destination, m. The buffer grows half as fast as in
+    buffer: away from the ends, m.
+    end_buffers: at the start and the destination, m.
+
+    The buffer grows half as fast as in
     a search, which allows for the ground between the search's samples.
     """
     for end, end_buffer in ((data.start, end_buffers[0]), (data.destination, end_buffers[1])):

@@ -1,4 +1,4 @@
-"""Legs and corners of a path: lengths, turn geometry, and the flown shape of a corner.
+"""Measure the legs and corners of a path, and the shape in which a corner is flown.
 
 Legs and corners are measured once per path and shared by all scores. A turn takes a length of the legs before and after
 it: the tangent of its fly-by arc, or more where the autopilot needs it. As flown, a corner is an arc with parabolas
@@ -85,7 +85,7 @@ def measure_corner(
 ) -> None:
     """Fill the `CORNER` record of a turn between the unit courses u and v.
 
-    Zeros if `turning` is false (no turn).
+    All values are 0 if `turning` is False.
     """
     tangent, radius, excursion = 0.0, 0.0, 0.0
     if turning:
@@ -103,10 +103,7 @@ def measure_corner(
 
 @inlined
 def courses_at(data: ProblemArrays, legs: Records, i: int) -> tuple[float, float, float, float]:
-    """Return the unit courses before and after waypoint i.
-
-    At the ends the prescribed course, otherwise the leg's own.
-    """
+    """Return the unit courses of the legs before and after waypoint i, or at an end the prescribed course."""
     last = legs.shape[0]
     after, before = min(i, last - 1), max(i - 1, 0)
     ux, uy, vx, vy = legs[before].east, legs[before].north, legs[after].east, legs[after].north
@@ -119,18 +116,18 @@ def courses_at(data: ProblemArrays, legs: Records, i: int) -> tuple[float, float
 
 @compiled_inline
 def settling_length(need: float, run: float) -> float:
-    """Return the length of a leg (m) kept straight between its turns so that the first settles.
+    """Return the straight length of a leg in which its first turn settles before the second turn begins, m.
 
-    Need: length of both turns.
+    need: length of both turns, m.
     """
     return SETTLING_SHARE * run + min(SETTLING_LENGTH, need)
 
 
 @inlined
 def turn_length(fly_over: bool, corners: Records, i: int) -> float:
-    """Return the length of leg i taken by its two turns, m.
+    """Return the length of leg i that its two turns take up, m.
 
-    Of fly-over turns only the first, whose track returns to the leg.
+    A fly-over turn takes up only the leg after it, where its track returns to the leg.
     """
     if not fly_over:
         return corners[i].after + corners[i + 1].before
@@ -144,10 +141,7 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:
 
 @inner
 def roll_length(aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind) -> float:
-    """Return the length of leg i taken by rolling from its first turn into its second, m.
-
-    0 if both turn the same way.
-    """
+    """Return the length of leg i that rolling between its two turns takes up, m; 0 if both turn the same way."""
     if i == 0 or i == legs.shape[0] - 1 or corners[i].tangent <= 0.0 or corners[i + 1].tangent <= 0.0:
         return 0.0
     ux, uy = legs[i].east, legs[i].north
@@ -178,11 +172,11 @@ def fly_by_vertices(aircraft: PerformanceTable, before: Floats, at: Floats, afte
 
 @inner
 def blended_vertices(blend: float, before: Floats, at: Floats, after: Floats, radius: float) -> Floats:
-    """Return vertices (k, 3) of the flown path past the waypoint `at`, nowhere higher than the flight.
+    """Return vertices (k, 3) of a path past the waypoint `at` that is nowhere higher than the flight.
 
-    They are: a point on the leg where the blend of slopes begins, the fly-by arc of this radius from tangent point to
-    tangent point, and a point on the next leg where the blend ends. Height is linear along the arc; where the slope
-    decreases, a parabola cuts the crest by change x half-length / 4, and the vertices are lowered by that.
+    The vertices are a point on the leg where the blend of slopes begins, the fly-by arc of this radius from tangent
+    point to tangent point, and a point on the next leg where the blend ends. Height is linear along the arc; where the
+    slope decreases, a parabola cuts the crest by change x half-length / 4, and the vertices are lowered by that.
     Without a radius, or where a leg is shorter than the tangent, the arc is the waypoint itself.
 
     blend: from `half_blend_length`.
@@ -210,22 +204,22 @@ def blended_vertices(blend: float, before: Floats, at: Floats, after: Floats, ra
     deviation_in = 0.25 * max(0.0, slope_in - slope) * half_in
     deviation_out = 0.25 * max(0.0, slope - slope_out) * half_out
     out = np.empty((chords + 3, 3))
-    _set(out, 0, at[0] - ux * (tangent + half_in), at[1] - uy * (tangent + half_in), low - half_in * slope_in)
+    _set_vertex(out, 0, at[0] - ux * (tangent + half_in), at[1] - uy * (tangent + half_in), low - half_in * slope_in)
     side = 1.0 if ux * vy - uy * vx >= 0.0 else -1.0
     for k in range(chords + 1):
         f = k / chords if chords > 0 else 0.0
         ahead, aside = radius * math.sin(f * turn) - tangent, side * radius * (1.0 - math.cos(f * turn))
         lowered = deviation_in + f * (deviation_out - deviation_in)
         east, north = at[0] + ux * ahead - uy * aside, at[1] + uy * ahead + ux * aside
-        _set(out, k + 1, east, north, low + f * (high - low) - lowered)
+        _set_vertex(out, k + 1, east, north, low + f * (high - low) - lowered)
     away = tangent + half_out
-    _set(out, chords + 2, at[0] + vx * away, at[1] + vy * away, high + half_out * slope_out)
+    _set_vertex(out, chords + 2, at[0] + vx * away, at[1] + vy * away, high + half_out * slope_out)
     return out
 
 
 @inner
 def legs_about(before: Floats, at: Floats, after: Floats, length_before: float, length_after: float) -> Floats:
-    """Return the parts of the legs before and after the waypoint `at` of these lengths (m), as vertices (3, 3)."""
+    """Return the parts of both legs next to the waypoint `at`, of the given lengths (m), as vertices (3, 3)."""
     out = np.empty((3, 3))
     for row, other, length in ((0, before, length_before), (2, after, length_after)):
         run = math.hypot(at[0] - other[0], at[1] - other[1])
@@ -237,7 +231,7 @@ def legs_about(before: Floats, at: Floats, after: Floats, length_before: float, 
 
 
 @inlined
-def _set(out: Floats, row: int, east: float, north: float, up: float) -> None:
+def _set_vertex(out: Floats, row: int, east: float, north: float, up: float) -> None:
     out[row, 0] = east
     out[row, 1] = north
     out[row, 2] = up
@@ -245,9 +239,8 @@ def _set(out: Floats, row: int, east: float, north: float, up: float) -> None:
 
 @compiled
 def fly_by_radii(data: ProblemArrays, path: Floats) -> Floats:
-    """Return the radius (m) of the fly-by arc at each waypoint (w,).
+    """Return the radius of the fly-by arc at each waypoint, (w,) m; 0 at the ends and where the path goes straight on.
 
-    0 at the ends and where the path goes straight on.
     Where a number alone limits turns, a leg may be shorter than its two turns. Such arcs cannot be flown and have
     radius 0: the corners are evaluated as drawn, and the simulated flight shows what the aircraft makes of them. A
     fly-over turn passes outside its corner and has radius 0 too.

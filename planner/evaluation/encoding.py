@@ -1,4 +1,4 @@
-"""Encodings: how a vector in a box becomes the waypoints of a path.
+"""Encode the waypoints of a path as a vector in a box, and decode them.
 
 `rotated` is the encoding proposed by Yang, Tang and Lozano (CEC 2014, section III, eq. 12): an axis along the direction
 of the path, with one interval of it for each waypoint, which deviates across. `cartesian` and `polar` are the encodings
@@ -44,7 +44,7 @@ class WaypointFrames(NamedTuple):
     edges: Floats
 
     def restore(self, points: ArrayLike) -> Floats:
-        """Return world positions (..., n, 3) of points in along, across, up.
+        """Return the world positions of points (..., n, 3) in along, across, up.
 
         >>> frames = frames_along(np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0]]))
         >>> frames.restore([[60.0, 5.0, 9.0], [120.0, 5.0, 9.0]]).round(6).tolist()
@@ -59,7 +59,7 @@ class WaypointFrames(NamedTuple):
         return out
 
     def rotate(self, points: ArrayLike) -> Floats:
-        """Return points in along, across, up of world positions (..., n, 3): the inverse of `restore`."""
+        """Return world positions (..., n, 3) as points in along, across, up; the inverse of `restore`."""
         points = np.asarray(points, dtype=np.float64)
         east, north = points[..., 0] - self.east, points[..., 1] - self.north
         return np.stack(
@@ -129,14 +129,14 @@ class RotatedFrame(NamedTuple):
     length: float
 
     def rotate(self, points: ArrayLike) -> Floats:
-        """Return points in along, across, up of world positions (..., 3) (eq. 12)."""
+        """Return world positions (..., 3) as points in along, across, up (eq. 12)."""
         points = np.asarray(points, dtype=np.float64)
         east, north = points[..., 0] - self.east, points[..., 1] - self.north
         c, s = self.cosine, self.sine
         return np.stack([c * east + s * north, c * north - s * east, points[..., 2]], axis=-1)
 
     def restore(self, points: ArrayLike) -> Floats:
-        """Return world positions (..., 3) of points in along, across, up: the inverse of `rotate`."""
+        """Return the world positions of points (..., 3) in along, across, up; the inverse of `rotate`."""
         points = np.asarray(points, dtype=np.float64)
         along, across = points[..., 0], points[..., 1]
         c, s = self.cosine, self.sine
@@ -165,7 +165,7 @@ class Encoding:
     waypoints: w, of a path, start and destination included.
     lower, upper: (d,) box, d = 3(w - 2), three numbers per waypoint in flying order.
     decode: (n, d) -> (n, w, 3) world m, start and destination included.
-    frames: those in which vectors are along, across and up of each inner waypoint; None for other encodings.
+    frames: frames in which vectors are along, across and up of each inner waypoint; None for other encodings.
 
     >>> space = Space(np.zeros(3), np.array([3000.0, 4000.0, 0.0]), np.array([[0, 3000], [0, 4000]]), (0.0, 500.0))
     >>> encoding = rotated(space, 4)
@@ -197,7 +197,7 @@ class Space:
     start, destination: (3,) fixed ends.
     bounds: (2, 2) map.
     up: lowest and highest waypoint.
-    across: half-width of the box on either side of the straight line, or None for that of the map.
+    across: half-width of the box on either side of the straight line, or None for the width of the map.
     """
 
     start: Floats
@@ -207,22 +207,22 @@ class Space:
     across: float | None = None
 
 
-def _with_ends(space: Space, inner: Floats) -> Floats:
+def _add_ends(space: Space, inner: Floats) -> Floats:
     out = np.empty((len(inner), inner.shape[1] + 2, 3))
     out[:, 0], out[:, 1:-1], out[:, -1] = space.start, inner, space.destination
     return out
 
 
 def rotated(space: Space, waypoints: int) -> Encoding:
-    """Make the rotated encoding: inner waypoint i is in the i-th of w - 2 intervals of the axis (section III)."""
+    """Make the rotated encoding, with inner waypoint i in the i-th of w - 2 intervals of the axis (section III)."""
     frame = rotated_frame(space.start, space.destination)
     edges = np.linspace(0.0, frame.length, waypoints - 1)
-    left, right = _across_spans(frame, space, edges)
+    left, right = _across_limits(frame, space, edges)
     lower = np.column_stack([edges[:-1], left, np.full(waypoints - 2, space.up[0])])
     upper = np.column_stack([edges[1:], right, np.full(waypoints - 2, space.up[1])])
 
     def decode(vectors: Floats) -> Floats:
-        return _with_ends(space, frame.restore(vectors.reshape(len(vectors), waypoints - 2, 3)))
+        return _add_ends(space, frame.restore(vectors.reshape(len(vectors), waypoints - 2, 3)))
 
     frames = straight_frames(*frame[:4], edges)
     return Encoding("rotated", waypoints, lower.ravel(), upper.ravel(), decode, frames)
@@ -240,7 +240,7 @@ def route_encoding(space: Space, route: Floats) -> Encoding:
     upper = np.column_stack([frames.edges[1:], np.full(waypoints - 2, aside), np.full(waypoints - 2, space.up[1])])
 
     def decode(vectors: Floats) -> Floats:
-        return _with_ends(space, frames.restore(vectors.reshape(len(vectors), waypoints - 2, 3)))
+        return _add_ends(space, frames.restore(vectors.reshape(len(vectors), waypoints - 2, 3)))
 
     return Encoding("route", waypoints, lower.ravel(), upper.ravel(), decode, frames)
 
@@ -258,10 +258,10 @@ def rotated_vectors(space: Space, encoding: Encoding, paths: Floats) -> Floats:
     return np.clip(inner.reshape(len(paths), -1), encoding.lower, encoding.upper)
 
 
-def _across_spans(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Floats, Floats]:
-    """Return the limits across (k,), (k,) of the map between consecutive edges (k + 1,) along.
+def _across_limits(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Floats, Floats]:
+    """Return the lower and upper limits across, (k,) each, of the map between consecutive edges (k + 1,) along.
 
-    They are -across and across if the space states a half-width.
+    The limits are -across and across if the space states a half-width.
     """
     if space.across is not None:
         return np.full(edges.size - 1, -space.across), np.full(edges.size - 1, space.across)
@@ -279,29 +279,29 @@ def _across_spans(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Flo
 
 
 def cartesian(space: Space, waypoints: int) -> Encoding:
-    """Return absolute east, north, up of each inner waypoint, anywhere on the map."""
+    """Make an encoding of each inner waypoint as absolute east, north, up, anywhere on the map."""
     low = np.array([space.bounds[0, 0], space.bounds[1, 0], space.up[0]])
     high = np.array([space.bounds[0, 1], space.bounds[1, 1], space.up[1]])
 
     def decode(vectors: Floats) -> Floats:
-        return _with_ends(space, vectors.reshape(len(vectors), waypoints - 2, 3))
+        return _add_ends(space, vectors.reshape(len(vectors), waypoints - 2, 3))
 
     return Encoding("cartesian", waypoints, np.tile(low, waypoints - 2), np.tile(high, waypoints - 2), decode)
 
 
 def polar(space: Space, waypoints: int) -> Encoding:
-    """Return each inner waypoint as a step from the previous one: r, theta, up (section III.A).
+    """Make an encoding of each inner waypoint as a step r, theta, up from the previous one (section III.A).
 
     theta: "the turning angle at each waypoint", relative to the previous leg, of the first to the direction
     start-destination; within +-180 degrees, positive to the left. r: from 5 % to 200 % of the straight distance over
     the number of legs. The paper states neither range; `polar-45` allows no turn beyond the paper's limit.
     """
-    return _steps("polar", space, waypoints, math.pi, turning=True)
+    return _step_encoding("polar", space, waypoints, math.pi, turning=True)
 
 
 def polar_45(space: Space, waypoints: int) -> Encoding:
     """Make an encoding like `polar`, with theta within +-45 degrees, the sharpest turn that the paper allows."""
-    return _steps("polar-45", space, waypoints, math.pi / 4.0, turning=True)
+    return _step_encoding("polar-45", space, waypoints, math.pi / 4.0, turning=True)
 
 
 def bearing(space: Space, waypoints: int) -> Encoding:
@@ -309,11 +309,15 @@ def bearing(space: Space, waypoints: int) -> Encoding:
 
     Not in the paper: changing one waypoint shifts the following ones but does not turn them.
     """
-    return _steps("bearing", space, waypoints, math.pi, turning=False)
+    return _step_encoding("bearing", space, waypoints, math.pi, turning=False)
 
 
-def _steps(name: str, space: Space, waypoints: int, widest: float, *, turning: bool) -> Encoding:
-    """Make steps r, theta, up, theta within +-widest (rad), from the previous step if `turning`, else the line."""
+def _step_encoding(name: str, space: Space, waypoints: int, widest: float, *, turning: bool) -> Encoding:
+    """Make an encoding by steps r, theta, up.
+
+    widest: limit of theta to either side, rad.
+    turning: True if theta is relative to the previous step, False if relative to the direct line.
+    """
     frame = rotated_frame(space.start, space.destination)
     mean = frame.length / (waypoints - 1)
     low, high = np.array([_SHORTEST * mean, -widest, space.up[0]]), np.array([2.0 * mean, widest, space.up[1]])
@@ -323,7 +327,7 @@ def _steps(name: str, space: Space, waypoints: int, widest: float, *, turning: b
         course = np.cumsum(steps[..., 1], axis=1) if turning else steps[..., 1]
         along = np.cumsum(steps[..., 0] * np.cos(course), axis=1)
         across = np.cumsum(steps[..., 0] * np.sin(course), axis=1)
-        return _with_ends(space, frame.restore(np.stack([along, across, steps[..., 2]], axis=-1)))
+        return _add_ends(space, frame.restore(np.stack([along, across, steps[..., 2]], axis=-1)))
 
     return Encoding(name, waypoints, np.tile(low, waypoints - 2), np.tile(high, waypoints - 2), decode)
 

@@ -1,7 +1,8 @@
-"""Values that compare the plans of a front: length, exposure to radars, height above ground, time and energy.
+"""Compute the values by which the plans of a front are compared.
 
 Exposure is the paper's detection density (eq. 10 of Yang, Tang and Lozano, CEC 2014), integrated over the time of
-flight in the mean wind: seconds at full density. The least height above ground is that at samples of each leg.
+flight in the mean wind, in seconds at full density. The minimum height above ground is taken at samples of each leg.
+The other values are length, time and energy.
 """
 
 import math
@@ -36,10 +37,9 @@ class Value(IntEnum):
 
 
 def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) -> Floats:
-    """Return the values (n, 5) of paths (n, w, 3) by `Value`: m, s, m, s, J.
+    """Return the values of paths (n, w, 3) in the order of `Value`, (n, 5) m, s, m, s, J.
 
-    Energy NaN if `energy` is None.
-    energy: the cost of energy, with whatever weight (`make_travel_cost`).
+    energy: the cost of energy, with any weight (`make_travel_cost`); if None, energy is NaN.
     """
     out = np.zeros((len(paths), len(Value)))
     joules = SECONDS if energy is None else energy._replace(length=0.0, time=0.0, energy=1.0)
@@ -59,15 +59,15 @@ def _fill(data: ProblemArrays, of_time: TravelCost, joules: TravelCost, paths: F
             dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
             seconds = leg_cost(of_time, data.aircraft, a, b)
             out[n, _LENGTH] += math.sqrt(dx * dx + dy * dy + dz * dz)
-            out[n, _EXPOSURE] += seconds * _detection(data, a, dx, dy, dz)
-            lowest = _lowest(data, a, dx, dy, dz, lowest)
+            out[n, _EXPOSURE] += seconds * _mean_detection(data, a, dx, dy, dz)
+            lowest = _min_height(data, a, dx, dy, dz, lowest)
             out[n, _TIME] += seconds
             out[n, _ENERGY] += leg_cost(joules, data.aircraft, a, b)
         out[n, _CLEARANCE] = lowest
 
 
 @inner
-def _detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float) -> float:
+def _mean_detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float) -> float:
     """Return the mean detection density along the leg d from a."""
     total, length2 = 0.0, dx * dx + dy * dy + dz * dz
     if length2 < 1e-12:
@@ -91,11 +91,11 @@ def _detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float) 
 
 
 @inner
-def _lowest(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float, lowest: float) -> float:
-    """Return the least height above ground at samples of the leg d from a and of legs before it, m.
+def _min_height(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float, lowest: float) -> float:
+    """Return the minimum height above ground at samples of leg d from a and of earlier legs, m; -inf off the terrain.
 
-    -inf off the terrain.
-    lowest: of the legs before. Samples are passed over that the ground's steepest slope hereabouts keeps above it.
+    lowest: minimum height of the legs before, m. Samples are skipped where, by the steepest slope nearby, the ground
+        cannot be closer.
     """
     run = math.sqrt(dx * dx + dy * dy)
     count = 1 + int(run / data.sample_pitch)

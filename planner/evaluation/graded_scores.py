@@ -1,4 +1,4 @@
-"""Graded scores: the amount by which a path violates each constraint along its whole length, and its kill exposure.
+"""Score the amount by which a path violates each constraint along its whole length, and its kill exposure.
 
 Where the paper counts violations at six points per leg, these scores measure them along every leg, so that a search can
 descend them. Corners are evaluated as flown, with arcs and parabolas or with the autopilot's tracking error, wherever
@@ -59,7 +59,7 @@ MISSILE_GAP = np.dtype([("at_beginning", np.float64), ("at_end", np.float64)], a
 
 
 class PathScratch(NamedTuple):
-    """Scratch for evaluating paths of w waypoints one after another.
+    """Scratch memory for evaluating paths of w waypoints one after another.
 
     legs: `LEG` records (w - 1,). corners: `CORNER` records (w,).
     flown: `FLOWN_CORNER` records (w,).
@@ -119,7 +119,7 @@ def score_legs(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Evaluate the first part, without ground, missiles and zones. Each part only adds to violations.
+    """Evaluate the first part, without ground, missiles and zones, and add its violations, as the later parts do.
 
     objectives: the length ratio is filled; the kill exposure is 0 until `score_missiles`.
     """
@@ -132,7 +132,7 @@ def score_legs(
         measure_lags(data.tracking, aircraft, limits.wind, path, legs, lags)
         _measure_tracked(corners, flown, extents)
     else:
-        _measure_exact(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown, extents)
+        _measure_arcs(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown, extents)
     length = 0.0
     for i in range(legs.shape[0]):
         length += legs[i].length
@@ -198,7 +198,7 @@ def score_missiles(
             continue
         if has_error:
             vertices = legs_about(path[i - 1], path[i], path[i + 1], corners[i].before, corners[i].after)
-            below, above = _lag_about(lags[i], legs[i], corners[i])
+            below, above = _max_lag_near(lags[i], legs[i], corners[i])
             more, spare = below + bounds.steepest * aside, margin + aside
         else:
             vertices = fly_by_vertices(aircraft, path[i - 1], path[i], path[i + 1], flown[i].radius)
@@ -206,7 +206,7 @@ def score_missiles(
         if low:
             violations.terrain += _corner_depth(heights, bounds, to_pixel, required, more, vertices)
         if close:
-            kill += _corner_kill(missiles, spare, vertices, below, above)
+            kill += _corner_exposure(missiles, spare, vertices, below, above)
     objectives.kill_exposure = kill * POINTS * (count - 1) / length
 
 
@@ -221,9 +221,9 @@ def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
     """Return graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3), along legs and flown corners.
 
     Violations by `planner.plan.Violation`: rad and 100 m of leg; m per m; m x km; m. Objectives by
-    `planner.plan.Objective`: length ratio and kill exposure, which is the mean density along the path times the paper's
-    number of points, to be comparable with the paper's sum. Detection and height stay 0: they would only decide between
-    paths of exactly equal length.
+    `planner.plan.Objective`: length ratio, and kill exposure as the mean density along the path times the paper's
+    number of points, which is comparable with the paper's sum. Detection and height stay 0: they would only decide
+    between paths of exactly equal length.
     """
     violations, objectives = np.zeros(len(paths), dtype=VIOLATIONS), np.zeros(len(paths), dtype=OBJECTIVES)
     # A plan's own path cannot be written, which would make all of this another kernel.
@@ -241,10 +241,10 @@ def _score_paths(data: ProblemArrays, paths: Floats, violations: Records, object
 
 @inlined
 def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) -> float:
-    """Return the radius of the arc at waypoint i.
+    """Return the radius of the arc at waypoint i, m.
 
-    0 where a number alone limits turns and a leg is too short for its two turns.
-    The ends have no arc. `planner.evaluation.corners.fly_by_radii` gives the radii of a whole path.
+    The radius is 0 if a number alone limits turns and a leg is too short for its two turns. The ends have no arc.
+    `planner.evaluation.corners.fly_by_radii` gives the radii of a whole path.
     """
     radius: float = corners[i].radius
     if math.isinf(corners[i].tangent):
@@ -259,7 +259,7 @@ def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) 
 
 
 @inner
-def _measure_exact(
+def _measure_arcs(
     aircraft: PerformanceTable,
     legs_hold_turns: bool,
     fly_over: bool,
@@ -292,10 +292,10 @@ def _measure_exact(
 
 
 @inlined
-def _lag_about(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:
-    """Return the largest deviation of the flight below and above the legs near a corner, m.
+def _max_lag_near(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:
+    """Return the largest deviations of the flight below and above the legs near a corner, m.
 
-    Lag, leg: of the leg after it.
+    lag, leg: records of the leg after the corner.
     """
     here, settled = lag_at(lag, 0.0), lag_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
     return max(0.0, here, settled), max(0.0, -here, -settled)
@@ -320,7 +320,7 @@ def _corner_depth(
     more: float,
     vertices: Floats,
 ) -> float:
-    """Return the depth below the required clearance plus `more` (m) along a flown corner (k, 3), m x km."""
+    """Return the depth below the required clearance plus `more` (m), integrated along a flown corner (k, 3), m x km."""
     total = 0.0
     for k in range(vertices.shape[0] - 1):
         x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]
@@ -331,10 +331,10 @@ def _corner_depth(
 
 
 @inner
-def _corner_kill(missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float) -> float:
+def _corner_exposure(missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float) -> float:
     """Return the kill density x length along a flown corner (k, 3).
 
-    Below, above: vertical tracking error, m.
+    below, above: vertical tracking error, m.
     """
     total = 0.0
     for k in range(vertices.shape[0] - 1):

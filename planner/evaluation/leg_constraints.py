@@ -1,4 +1,4 @@
-"""Constraints on waypoints and legs that all scores share: turns and the leg length they take, slopes, map bounds.
+"""Check the constraints on waypoints and legs that all scores share: turns and their lengths, slopes, map bounds.
 
 The first part holds the scratch with which the paper's scores evaluate blocks of paths side by side. The second part
 derives limits that hold for all paths of a problem (`PrecomputedLimits`) and adds the violations of one path, as counts
@@ -24,15 +24,15 @@ from world.kernels import Record, Records, compiled, inlined, inner
 BLOCK = 128
 
 
-def _rows(kind: type[np.generic], *names: str) -> list[tuple[str, type[np.generic], tuple[int]]]:
+def _block_rows(kind: type[np.generic], *names: str) -> list[tuple[str, type[np.generic], tuple[int]]]:
     return [(name, kind, (BLOCK,)) for name in names]
 
 
 # One point of each path: position (m) and pixel.
-_POINT = np.dtype(_rows(np.float64, "east", "north", "up", "column", "row"), align=True)
+_POINT = np.dtype(_block_rows(np.float64, "east", "north", "up", "column", "row"), align=True)
 # Sums along each path.
 _SUMS = np.dtype(
-    _rows(np.float64, "below", "height", "kill", "detection", "turns", "slopes", "outside", "length"), align=True
+    _block_rows(np.float64, "below", "height", "kill", "detection", "turns", "slopes", "outside", "length"), align=True
 )
 BLOCK_SCRATCH = np.dtype(
     [
@@ -42,16 +42,16 @@ BLOCK_SCRATCH = np.dtype(
         ("step", _POINT),
         ("point", _POINT),
         # A leg's run, and the east, north and run of the previous leg, m.
-        *_rows(np.float64, "run", "east_before", "north_before", "run_before"),
+        *_block_rows(np.float64, "run", "east_before", "north_before", "run_before"),
         ("sums", _SUMS),
         # Ground height at a point and the clearance required there, m.
-        *_rows(np.float64, "ground", "need"),
+        *_block_rows(np.float64, "ground", "need"),
         # Position within a pixel; position within the map, from -1 to 1; and one row of a polynomial.
-        *_rows(np.float64, "u", "v", "x", "y", "inner"),
+        *_block_rows(np.float64, "u", "v", "x", "y", "inner"),
         # Heights of the four pixels around a point.
-        *_rows(np.float32, "top_left", "top_right", "low_left", "low_right"),
+        *_block_rows(np.float32, "top_left", "top_right", "low_left", "low_right"),
         # Index of a pixel or cell; first entry and number of entries of a cell's units; paths still to be processed.
-        *_rows(np.int64, "index", "first", "count", "active"),
+        *_block_rows(np.int64, "index", "first", "count", "active"),
     ],
     align=True,
 )
@@ -97,7 +97,7 @@ def divide_legs(begin: Record, step: Record, share: float, size: int, out: Recor
 
 @inlined
 def load_waypoints(to_pixel: PolyMapRecord, paths: Floats, begin: int, i: int, size: int, block: Record) -> None:
-    """Fill waypoint i of each path and its pixel: `polymap`, for all paths at once."""
+    """Fill waypoint i of each path, and its pixel as `polymap` computes it, for all paths at once."""
     end, x, y, inner = block.end, block.x, block.y, block.inner
     east, north, up = end.east, end.north, end.up
     for b in range(size):
@@ -165,11 +165,11 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
     climb, dive = data.max_climb, data.max_dive
     by_aircraft = math.isnan(climb) or math.isnan(dive)
     if math.isnan(climb):
-        climb = _slope_everywhere(data, data.aircraft.climb)
+        climb = _min_slope_limit(data, data.aircraft.climb)
     if math.isnan(dive):
-        dive = _slope_everywhere(data, data.aircraft.descent)
+        dive = _min_slope_limit(data, data.aircraft.descent)
         # Where it cannot fly level no leg may lead, whatever its slope.
-        if data.aircraft.equivalent > 0.0 and _slope_everywhere(data, data.aircraft.climb) < 0.0:
+        if data.aircraft.equivalent > 0.0 and _min_slope_limit(data, data.aircraft.climb) < 0.0:
             dive = -1.0
     return PrecomputedLimits(
         # No turn exceeds half a circle; -2 is below any rounded cosine.
@@ -184,10 +184,9 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
 
 
 @inlined
-def _slope_everywhere(data: ProblemArrays, air_angles: Floats) -> float:
-    """Return the slope (rad) that the aircraft can fly on every course between floor and ceiling.
+def _min_slope_limit(data: ProblemArrays, air_angles: Floats) -> float:
+    """Return the slope that the aircraft can fly on every course between floor and ceiling, rad; -1 if there is none.
 
-    -1 if there is none.
     air_angles: (h,) flight-path angles relative to the air at the table's heights. The slope over the ground is
     smallest with the strongest tailwind.
     """
@@ -209,10 +208,10 @@ def _straight_distance(start: Floats, destination: Floats) -> float:
 
 
 @inlined
-def _slope_limits_on(
+def _course_slope_limits(
     data: ProblemArrays, ux: float, uy: float, low: float, high: float, wind: Wind
 ) -> tuple[float, float]:
-    """Return the steepest climb and dive, rad, on the unit course u between two heights."""
+    """Return the climb and dive limits on the unit course u between two altitudes, rad."""
     climb, dive = data.max_climb, data.max_dive
     if math.isnan(climb) or math.isnan(dive):
         wx, wy = wind
@@ -229,37 +228,35 @@ def _slope_limits_on(
 
 @compiled
 def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, float]:
-    """Return the slope limits of the leg a-b, rad: smallest over its ends and middle altitude, minus the margin."""
+    """Return the climb and dive limits of the leg a-b, the smallest at three of its altitudes minus the margin, rad."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     run = math.sqrt(dx * dx + dy * dy)
     ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 1.0)
-    return _slope_limits_on(data, ux, uy, a[2], b[2], downwind(data.aircraft))
+    return _course_slope_limits(data, ux, uy, a[2], b[2], downwind(data.aircraft))
 
 
 @inlined
 def slope_excess(
     data: ProblemArrays, limits: PrecomputedLimits, ux: float, uy: float, run: float, low: float, high: float
 ) -> float:
-    """Return the amount by which a leg is too steep, in m of height per m of run.
+    """Return how much a leg exceeds its slope limit, in m of height per m of run; 0 if it does not (eq. 3-4).
 
-    0 if it is not (eq. 3-4).
-    u: its unit course. run: m. low, high: heights of its ends, m.
+    ux, uy: unit vector along the leg's course.
+    run: horizontal length, m.
+    low, high: altitudes of its start and end, m.
     """
     rise = high - low
     over = max(0.0, rise - limits.climb_slope * run, -rise - limits.dive_slope * run)
     outside = min(low, high) < data.floor or max(low, high) > data.ceiling
     if limits.slopes_by_aircraft and (over > 0.0 or outside):
-        climb, dive = _slope_limits_on(data, ux, uy, low, high, limits.wind)
+        climb, dive = _course_slope_limits(data, ux, uy, low, high, limits.wind)
         over = max(0.0, rise - math.tan(climb) * run, -rise - math.tan(dive) * run)
     return over / max(run, 1.0)
 
 
 @inlined
 def _turn_excess(cosine: float, largest: float, ux: float, uy: float, vx: float, vy: float) -> float:
-    """Return the amount by which the turn between two unit courses exceeds the largest, rad.
-
-    0 if it does not (eq. 1-2).
-    """
+    """Return how much the turn between two unit courses exceeds the limit, rad; 0 if it does not (eq. 1-2)."""
     dot = ux * vx + uy * vy
     if dot >= cosine or (ux == 0.0 and uy == 0.0) or (vx == 0.0 and vy == 0.0):
         return 0.0
@@ -294,23 +291,23 @@ def add_leg_violations(
         over = max(0.0, rise - limits.climb_slope * run, -rise - limits.dive_slope * run) / max(run, 1.0)
         if limits.slopes_by_aircraft:
             over = slope_excess(data, limits, legs[i].east, legs[i].north, run, path[i, 2], path[i + 1, 2])
-        violations.slope += _violation(over, graded)
+        violations.slope += _amount_or_count(over, graded)
     if limits.slopes_by_aircraft and data.legs_hold_turns and not data.fly_over:
         for i in range(1, legs.shape[0]):
-            violations.slope += _violation(_arc_excess(data, limits, path, i, legs, corners), graded)
+            violations.slope += _amount_or_count(_arc_slope_excess(data, limits, path, i, legs, corners), graded)
 
 
 @inlined
 def _add_turns(data: ProblemArrays, limits: PrecomputedLimits, legs: Records, graded: bool, violations: Record) -> None:
-    """Add the turns that are too sharp, last those from and to the courses prescribed at the ends."""
+    """Add the turns that are too sharp, and lastly the turns from and to the courses prescribed at the ends."""
     largest, last = data.max_turn, legs.shape[0]
     for i in range(1, last):
         ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
-        violations.turn += _violation(_turn_excess(limits.cos_max_turn, largest, ux, uy, vx, vy), graded)
+        violations.turn += _amount_or_count(_turn_excess(limits.cos_max_turn, largest, ux, uy, vx, vy), graded)
     for i, prescribed in ((0, data.start_course), (last, data.destination_course)):
         if not math.isnan(prescribed):
             ux, uy, vx, vy = courses_at(data, legs, i)
-            violations.turn += _violation(_turn_excess(limits.cos_max_turn, largest, ux, uy, vx, vy), graded)
+            violations.turn += _amount_or_count(_turn_excess(limits.cos_max_turn, largest, ux, uy, vx, vy), graded)
 
 
 @inlined
@@ -323,7 +320,7 @@ def _add_bounds(data: ProblemArrays, path: Floats, corners: Records, graded: boo
         aside = corners[i].excursion
         outside = max(0.0, west - x + aside, x - east + aside, south - y + aside, y - north + aside)
         outside = max(outside, floor - z, z - ceiling)
-        violations.bounds += _violation(outside, graded)
+        violations.bounds += _amount_or_count(outside, graded)
 
 
 @inlined
@@ -336,21 +333,21 @@ def _add_turn_lengths(
     graded: bool,
     violations: Record,
 ) -> None:
-    """Add legs shorter than their turns, the roll between them and settling require, in units of 100 m."""
+    """Add legs that are too short for their turns, the roll between the turns, and settling, in units of 100 m."""
     for i in range(legs.shape[0]):
         need, run = turn_length(data.fly_over, corners, i), legs[i].run
         short = need + settling_length(need, run) - run if need > 0.0 else 0.0
         if short > -MAX_ROLL and not data.fly_over:
             up = min(path[i, 2], path[i + 1, 2])
             short += roll_length(data.aircraft, legs, corners, i, up, limits.wind)
-        violations.turn += _violation(min(10.0, max(0.0, short / 100.0)), graded)
+        violations.turn += _amount_or_count(min(10.0, max(0.0, short / 100.0)), graded)
 
 
 @inlined
-def _arc_excess(
+def _arc_slope_excess(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, i: int, legs: Records, corners: Records
 ) -> float:
-    """Return the excess of the arc's slope at waypoint i over the aircraft's limit on either course, m per m."""
+    """Return how much the slope of the arc at waypoint i exceeds the aircraft's limits on both courses, m per m."""
     rise_in = (path[i, 2] - path[i - 1, 2]) / max(legs[i - 1].run, 1.0)
     rise_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1.0)
     slope = arc_slope(rise_in, rise_out, corners[i].tangent, corners[i].radius)
@@ -358,13 +355,13 @@ def _arc_excess(
         return 0.0
     over = 0.0
     for leg in (i - 1, i):
-        climb, dive = _slope_limits_on(data, legs[leg].east, legs[leg].north, path[i, 2], path[i, 2], limits.wind)
+        climb, dive = _course_slope_limits(data, legs[leg].east, legs[leg].north, path[i, 2], path[i, 2], limits.wind)
         over = max(over, slope - math.tan(climb), -slope - math.tan(dive))
     return over
 
 
 @inlined
-def _violation(over: float, graded: bool) -> float:
+def _amount_or_count(over: float, graded: bool) -> float:
     """Return the violation added for an excess `over`: the excess itself if graded, otherwise 1."""
     if graded:
         return over

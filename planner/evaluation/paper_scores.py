@@ -73,7 +73,7 @@ def _score_paths(
     """
     number, block = paths.shape[0], scratch[0]
     limits = precompute_limits(data)
-    by_numbers = _by_numbers(data, limits)
+    by_numbers = _are_limits_fixed(data, limits)
     for begin in range(0, number, BLOCK):
         size = min(BLOCK, number - begin)
         _score_block(data, limits, paths, begin, size, block)
@@ -96,8 +96,8 @@ def _score_paths(
 
 
 @inlined
-def _by_numbers(data: ProblemArrays, limits: PrecomputedLimits) -> bool:
-    """Return True if only numbers limit turns and slopes, and no course is prescribed at the ends."""
+def _are_limits_fixed(data: ProblemArrays, limits: PrecomputedLimits) -> bool:
+    """Return True if turns and slopes have fixed limits, and no course is prescribed at the ends."""
     courses = math.isnan(data.start_course) and math.isnan(data.destination_course)
     return courses and not data.legs_hold_turns and not limits.slopes_by_aircraft
 
@@ -113,11 +113,11 @@ def _score_block(
     last = paths.shape[1] - 1
     clear_sums(block.sums)
     load_waypoints(data.to_pixel, paths, begin, 0, size, block)
-    _add_outside(data, size, block.end, block.sums)
+    _add_bounds(data, size, block.end, block.sums)
     for i in range(last):
         copy_point(block.end, block.begin, size)
         load_waypoints(data.to_pixel, paths, begin, i + 1, size, block)
-        _add_outside(data, size, block.end, block.sums)
+        _add_bounds(data, size, block.end, block.sums)
         subtract_points(block.end, block.begin, size, block.step)
         _add_leg(limits, size, i == 0, block)
         # Departure from the paper: eq. 6 never reaches the destination, which is the seventh point of the last leg
@@ -126,13 +126,13 @@ def _score_block(
             divide_legs(block.begin, block.step, j * (1.0 / POINTS), size, block.point)
             _find_ground(data.heights, size, block)
             _add_terrain(limits.required, size, j < POINTS, block)
-            _find_units(data.threat_cells, size, block)
+            _find_nearby_units(data.threat_cells, size, block)
             _add_exposures(data.spheres, data.threat_cells.units, size, block)
 
 
 @inlined
 def _find_ground(heights: Heights, size: int, block: Record) -> None:
-    """Fill the ground height at the points; the same as `pixel_height`."""
+    """Fill the ground height at the points, as `pixel_height` computes it."""
     rows, columns = heights.shape
     flat = heights.reshape(heights.size)
     last_column, last_row = columns - 2.0, rows - 2.0
@@ -186,8 +186,8 @@ def _add_terrain(required: RequiredClearance, size: int, inner: bool, block: Rec
 
 
 @inlined
-def _find_units(threat_cells: ThreatCells, size: int, block: Record) -> None:
-    """Fill first entry and length of the list of units near each point."""
+def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> None:
+    """Fill the first entry and the length of each point's list of nearby units."""
     # A cell is not bounded in height; it notes the heights its units reach.
     west, south, per_metre = threat_cells.west, threat_cells.south, 1.0 / threat_cells.side
     columns, rows, cells = threat_cells.columns, threat_cells.rows, threat_cells.cells
@@ -210,8 +210,8 @@ def _find_units(threat_cells: ThreatCells, size: int, block: Record) -> None:
 def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> None:
     """Add kill and detection exposure of the points to the units found near them (eq. 9, 10).
 
-    Round k takes the k-th unit of every list that has one. No branch within a round depends on the contents of a list,
-    which branch prediction could not follow.
+    Round k takes the k-th unit of every list that has one. Within a round no branch depends on the contents of a list,
+    because branch prediction would fail.
     """
     east, north, up = block.point.east, block.point.north, block.point.up
     kill, detection = block.sums.kill, block.sums.detection
@@ -244,7 +244,7 @@ def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> 
 
 @inlined
 def _add_leg(limits: PrecomputedLimits, size: int, first: bool, block: Record) -> None:
-    """Add a leg's length, and whether its slope and the turn into it exceed their limits (eq. 1-4, 8)."""
+    """Add a leg's length, and count its slope and the turn into the leg if they exceed their limits (eq. 1-4, 8)."""
     climb, dive, cosine = limits.climb_slope, limits.dive_slope, limits.cos_max_turn
     east, north, up, runs = block.step.east, block.step.north, block.step.up, block.run
     east_before, north_before, run_before = block.east_before, block.north_before, block.run_before
@@ -268,8 +268,8 @@ def _add_leg(limits: PrecomputedLimits, size: int, first: bool, block: Record) -
 
 
 @inlined
-def _add_outside(data: ProblemArrays, size: int, place: Record, sums: Record) -> None:
-    """Add whether a waypoint is off the map, below the floor or above the ceiling (eq. 7)."""
+def _add_bounds(data: ProblemArrays, size: int, place: Record, sums: Record) -> None:
+    """Count a waypoint that is off the map, below the floor or above the ceiling (eq. 7)."""
     west, east, south, north = data.west, data.east, data.south, data.north
     floor, ceiling = data.floor, data.ceiling
     xs, ys, zs, outside = place.east, place.north, place.up, sums.outside

@@ -1,4 +1,4 @@
-"""A scenario and its limits as a planning problem: arrays for compiled code, and the search space of encodings.
+"""Represent a scenario and its limits as a planning problem of arrays for compiled code and a search space.
 
 `make_problem` makes two sets of arrays. `certified` has the margins that a certificate requires, which cover the errors
 of a flight. `search` has larger margins, which also cover what lies between the samples of the search. Near fixed ends
@@ -90,7 +90,7 @@ class ProblemArrays(NamedTuple):
     slope_bounds: of the ground.
     tracking: a record of `aircraft.tracking.TRACKING`, the autopilot's tracking error.
     airspace: zones and the maximum height above ground.
-    travel: what shortening makes small: the length of a path, its time or its energy.
+    travel: the cost that shortening reduces, which is a path's length, time or energy.
     """
 
     heights: Heights
@@ -196,18 +196,18 @@ class RequiredClearance(NamedTuple):
 @inner
 def required_clearance(data: ProblemArrays) -> RequiredClearance:
     """Return the clearance that a problem requires."""
-    return _required(data, data.clearance, data.buffer, data.start_buffer, data.destination_buffer)
+    return _make_required_clearance(data, data.clearance, data.buffer, data.start_buffer, data.destination_buffer)
 
 
 @inner
 def required_headroom(data: ProblemArrays) -> RequiredClearance:
     """Return the maximum height above ground as a required clearance, with the heights of path and ground negated."""
     space = data.airspace
-    return _required(data, -space.max_height, space.buffer, space.start_buffer, space.destination_buffer)
+    return _make_required_clearance(data, -space.max_height, space.buffer, space.start_buffer, space.destination_buffer)
 
 
 @inlined
-def _required(
+def _make_required_clearance(
     data: ProblemArrays, clearance: float, buffer: float, start_buffer: float, destination_buffer: float
 ) -> RequiredClearance:
     same_everywhere = min(start_buffer, destination_buffer) >= buffer
@@ -232,7 +232,7 @@ def _required(
 def clearance_at(required: RequiredClearance, east: float, north: float) -> float:
     """Return the required height above ground at a point, m.
 
-    The buffer grows away from fixed ends with less.
+    The buffer grows with the distance from an end that has less than the full buffer.
     """
     # Without branches, so that loops over many points become vector instructions: an end with the full buffer never
     # reduces it.
@@ -297,7 +297,7 @@ class Problem:
 
 
 def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Problem:
-    """Return a scenario as arrays for compiled code. Raises ScenarioError if no path can be planned on it.
+    """Make the planning problem of a scenario. Raises ScenarioError if no path can be planned in the scenario.
 
     attempt: number of searches that have failed; each increases the clearance of the next.
     """
@@ -321,7 +321,7 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
     airspace = _search_airspace(scenario, certified, attempt, up, limits)
     if airspace.max_height < math.inf:
         buffer = min(buffer, _max_buffer(certified, certified.buffer))
-    search = _inset(
+    search = _shrink(
         certified._replace(
             buffer=buffer,
             airspace=airspace,
@@ -332,7 +332,7 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
         MAP_MARGIN,
         HEIGHT_MARGIN,
     )
-    return Problem(scenario, limits, search, certified, _space(scenario, search))
+    return Problem(scenario, limits, search, certified, _make_space(scenario, search))
 
 
 def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> ProblemArrays:
@@ -342,14 +342,14 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
     tracking = no_tracking() if limits.tracking is None else limits.tracking.record
     vertical, share = CERTIFIED_BUFFER + float(tracking.up), CERTIFIED_END_SHARE
     buffer, beside = vertical + limits.reserve_height, vertical + limits.reserve_threats
-    aircraft = _performance(scenario, limits)
+    aircraft = _reduced_performance(scenario, limits)
     arrays = ProblemArrays(
         heights=terrain.heights,
         to_pixel=terrain.to_pixel.record,
         threats=units,
         spheres=sphere_records(units),
         aircraft=aircraft,
-        **_edges(scenario.bounds),
+        **_map_edges(scenario.bounds),
         start=scenario.start,
         destination=scenario.destination,
         floor=float(scenario.floor),
@@ -371,7 +371,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         buffer_growth=_buffer_growth(scenario, limits, aircraft),
         threat_cells=make_threat_cells(scenario.threats.position, radius, scenario.bounds),
         missiles=make_missile_index(units),
-        slope_bounds=_slope_bounds(terrain),
+        slope_bounds=_make_slope_bounds(terrain),
         tracking=tracking,
         airspace=make_airspace(
             scenario,
@@ -380,7 +380,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         ),
         travel=LENGTH,
     )
-    return _inset(arrays, float(tracking.across), float(tracking.up)) if tracking.has_error else arrays
+    return _shrink(arrays, float(tracking.across), float(tracking.up)) if tracking.has_error else arrays
 
 
 def _search_airspace(
@@ -395,16 +395,15 @@ def _search_airspace(
 
 
 def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, share: float) -> ZoneMargins:
-    """Return the margins of zones, m, changed by the scenario's `zone_margin_m`; in height never reduced."""
+    """Return the zone margins, m, changed by the scenario's `zone_margin_m`, which never reduces vertical margins."""
     asked = scenario.planner.zone_margin_m
     more = 0.0 if asked is None else asked - CERTIFIED_ZONE_MARGIN
     return ZoneMargins(horizontal + more, vertical + max(0.0, more), share)
 
 
 def _max_buffer(certified: ProblemArrays, at_edge: float) -> float:
-    """Return the largest margin of a search to an edge of a band of heights above ground, m.
+    """Return a search's largest margin to an edge of a band of heights above ground, m; inf without a maximum height.
 
-    Inf without a maximum height.
     at_edge: margin of the certificate, m.
     """
     space = certified.airspace
@@ -412,7 +411,7 @@ def _max_buffer(certified: ProblemArrays, at_edge: float) -> float:
     return at_edge + BAND_SHARE * max(0.0, between)
 
 
-def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
+def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
     """Return the aircraft's performance, reduced for turbulence and within the rates that the autopilot demands."""
     share, tracking = TURBULENCE_SHARE[scenario.wind.turbulence], limits.tracking
     if tracking is None:
@@ -423,7 +422,7 @@ def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
 
 
 def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:
-    """Return the growth of the buffer away from an end without it that the aircraft can follow, m per m."""
+    """Return how fast the buffer may grow with the distance from an end, so that the aircraft can follow, m per m."""
     if not (limits.reserve_height or limits.reserve_above):
         return BUFFER_GROWTH
     slopes = [
@@ -434,7 +433,7 @@ def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTabl
     return min(BUFFER_GROWTH, GROWTH_SHARE * max(0.0, math.tan(min(slopes))))
 
 
-def _edges(bounds: Floats) -> dict[str, float]:
+def _map_edges(bounds: Floats) -> dict[str, float]:
     """Return the edges of a map with these bounds (2, 2) by name."""
     (west, east), (south, north) = bounds.tolist()
     return {"west": west, "east": east, "south": south, "north": north}
@@ -451,7 +450,7 @@ def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, 
     return buffer if left >= buffer else share * max(0.0, left)
 
 
-def _slope_bounds(terrain: Terrain) -> SlopeBounds:
+def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
     slopes = steepest_slopes(terrain.heights, terrain.spacing)
     steepest = float(slopes.max())
     # Each tile with its neighbours, so that the bound holds within a tile's side of any of its points.
@@ -462,8 +461,8 @@ def _slope_bounds(terrain: Terrain) -> SlopeBounds:
     return SlopeBounds(steepest, around, TILE * terrain.spacing)
 
 
-def _inset(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:
-    """Return the arrays with map and heights shrunk by these margins (m), but never excluding the fixed ends."""
+def _shrink(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:
+    """Return the arrays with map and heights shrunk by these margins (m), but with both fixed ends still inside."""
     ends = np.stack([data.start, data.destination])
     low, high = ends.min(axis=0), ends.max(axis=0)
     return data._replace(
@@ -476,8 +475,8 @@ def _inset(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:
     )
 
 
-def _space(scenario: Scenario, data: ProblemArrays) -> Space:
-    """Search space; heights start at the lowest height that the ground allows."""
+def _make_space(scenario: Scenario, data: ProblemArrays) -> Space:
+    """Return the search space; its heights begin at the minimum height that the ground allows."""
     ends = min(scenario.start[2], scenario.destination[2])
     low = min(max(data.floor, float(np.nanmin(data.heights)) + data.clearance), ends)
     high = max(data.ceiling, low + 1.0)

@@ -1,4 +1,4 @@
-"""Ask-and-tell interface of a population-based search in a box, shared by all optimisers."""
+"""Define the ask-and-tell interface that all optimisers share, a population-based search in a box."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable

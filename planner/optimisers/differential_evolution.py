@@ -38,21 +38,21 @@ class DifferentialEvolution(BoxSearch):
         if not len(self.scores):
             self.samples, self.scores = self._asked.copy(), np.array(scores)
         else:
-            rows = self._targets()
+            rows = self._target_rows()
             order = self._rank(np.concatenate([self.scores, scores]))
             better = order[len(self.samples) :] <= order[rows]
             self.samples[rows[better]] = self._asked[better]
             self.scores[rows[better]] = scores[better]
             self._turn += 1
-        self._asked = self._trial_vectors(self._targets())
+        self._asked = self._trial_vectors(self._target_rows())
 
-    def _targets(self) -> Ints:
-        """Return the target rows of this generation: the halves of the population alternate."""
+    def _target_rows(self) -> Ints:
+        """Return the target rows of this generation, which is one half of the population in turn."""
         count = len(self.samples)
         return np.arange(self._half) if self._turn % 2 == 0 else np.arange(count - self._half, count)
 
     def _trial_vectors(self, rows: Ints) -> Floats:
-        """Return trial vectors: a + F (b - c) in most variables, the target's own value in the others."""
+        """Return trial vectors, with a + F (b - c) in most variables and the target's own value in the others."""
         count, size = self.samples.shape
         picked = self._rng.integers(0, count, (3, rows.size))
         a, b, c = (self.samples[index] for index in picked)

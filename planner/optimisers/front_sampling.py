@@ -106,12 +106,12 @@ class FrontSampling:
         self._kinds = kinds = self._rng.integers(len(Kind), size=self._population)
         samples = self.vectors[means]
         near, in_block, noisy = kinds == Kind.NEAR, kinds >= Kind.BLOCK, kinds != Kind.BLOCK
-        samples[near] += self._nearest_departures(means[near])
-        samples[in_block] += self._block_departures(means[in_block])
-        samples[noisy] += self._noise(self._scales[kinds[noisy], None])
+        samples[near] += self._draw_near_departures(means[near])
+        samples[in_block] += self._draw_block_departures(means[in_block])
+        samples[noisy] += self._draw_noise(self._scales[kinds[noisy], None])
         return np.clip(samples, self._lower, self._upper)
 
-    def _nearest_departures(self, means: Ints) -> Floats:
+    def _draw_near_departures(self, means: Ints) -> Floats:
         """Draw departures (n, d) from means, with the covariance of the nearest solutions, relative to the box."""
         number = min(NEIGHBOURS, len(self.vectors) - 1)
         out = np.zeros((len(means), self._lower.size))
@@ -124,7 +124,7 @@ class FrontSampling:
             out += weights[:, k, None] * (self.vectors[near[:, k]] - self.vectors[means])
         return out
 
-    def _block_departures(self, means: Ints) -> Floats:
+    def _draw_block_departures(self, means: Ints) -> Floats:
         """Draw departures (n, d) of a block of points towards their positions in another solution."""
         rng, count, points = self._rng, len(means), self._lower.size // self._axes
         others = rng.integers(len(self.vectors), size=count)
@@ -138,8 +138,8 @@ class FrontSampling:
         moved = (within[:, :, None] & taken).reshape(count, -1)
         return np.asarray(shares * moved * (self.vectors[others] - self.vectors[means]))
 
-    def _noise(self, scales: Floats) -> Floats:
-        """Draw noise (n, d) along a few directions each, at scales (n, 1) times a random factor per sample."""
+    def _draw_noise(self, scales: Floats) -> Floats:
+        """Draw noise (n, d) along a few directions per sample, at scales (n, 1) times a random factor per sample."""
         rng, count, total = self._rng, len(scales), len(self._directions)
         used = min(USED_DIRECTIONS, total)
         picked = rng.integers(total, size=(count, used))
@@ -166,7 +166,7 @@ class FrontSampling:
             self._scales[kind] = np.clip(self._scales[kind] * (GROW if grows else SHRINK), MIN_SCALE, MAX_SCALE)
 
     def _archive_rows(self, values: Floats) -> Ints:
-        """Return the rows of objectives (n, m) to archive: distinct, non-dominated, and covering most hypervolume."""
+        """Return the distinct non-dominated rows of objectives (n, m) that cover most of the hypervolume."""
         level = Level(tuple(range(values.shape[1])), (NO_GOAL,) * values.shape[1])
         front = np.flatnonzero(ranks(values, (level,)) == 0)
         _, first = np.unique(values[front], axis=0, return_index=True)

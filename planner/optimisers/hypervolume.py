@@ -50,7 +50,7 @@ def _non_dominated(points: Floats) -> Floats:
 
 
 def covering_order(points: Floats, reference: Floats, count: int, rng: np.random.Generator | None = None) -> Ints:
-    """Return up to `count` rows of points (n, m) below a reference (m,): the best of each objective, then greedily.
+    """Return up to `count` rows of points (n, m) below a reference (m,): the best of each objective, then greedy ones.
 
     Each further point adds most to the covered volume, counted at random probes between the points' best values and the
     reference. Points that add nothing are last, in their order.
@@ -85,9 +85,9 @@ def _covered(points: Floats, probes: Floats) -> Marks:
 
 @compiled
 def _greedy(covered: Marks, firsts: Ints, count: int) -> Ints:
-    """Return rows (count,) of marks (n, p): `firsts`, then the row that covers most uncovered probes.
+    """Return rows of marks (n, p), (count,), first `firsts` and then always the row that covers most uncovered probes.
 
-    Of equal rows the first is taken.
+    Among equal rows, the first is taken.
     The gain of a row only decreases as others are chosen, so that its last count is an upper bound, and few rows are
     counted again (Minoux, Optimization Techniques, Lecture Notes in Control and Information Sciences 7, 1978).
     """
@@ -97,7 +97,7 @@ def _greedy(covered: Marks, firsts: Ints, count: int) -> Ints:
     for number in range(count):
         row = firsts[number] if number < firsts.size else np.argmax(gains)
         while number >= firsts.size and counted[row] < number:
-            gains[row], counted[row] = _overlap(covered[row], left), number
+            gains[row], counted[row] = _count_common_marks(covered[row], left), number
             row = np.argmax(gains)
         chosen[number] = row
         gains[row] = -1
@@ -107,8 +107,8 @@ def _greedy(covered: Marks, firsts: Ints, count: int) -> Ints:
 
 
 @inner
-def _overlap(some: Marks, others: Marks) -> int:
-    """Return the number of places (p,) at which both have a mark."""
+def _count_common_marks(some: Marks, others: Marks) -> int:
+    """Return the number of places (p,) at which both arrays have a mark."""
     total = 0
     for p in range(some.size):
         total += some[p] & others[p]

@@ -11,7 +11,10 @@ from world.kernels import compiled, inner
 
 @compiled
 def covariance(rows: Floats, first: int, second: int, size: int) -> Floats:
-    """Return the covariance (size, size) of two groups of columns of centred rows (n, d), by their first columns."""
+    """Return the covariance (size, size) of two groups of columns of centred rows (n, d).
+
+    first, second: first column of each group.
+    """
     out = np.zeros((size, size))
     for n in range(rows.shape[0]):
         for i in range(size):
@@ -56,7 +59,7 @@ def times_lower(rows: Floats, factor: Floats) -> Floats:
 
 @compiled
 def times_sparse(rows: Floats, basis: Floats) -> Floats:
-    """Multiply rows (n, d) by a basis (d, k) of which most entries are 0."""
+    """Multiply rows (n, d) by a basis (d, k) whose entries are mostly 0."""
     turned = rows.T.copy()
     out = np.zeros((basis.shape[1], rows.shape[0]))
     for k in range(basis.shape[1]):

@@ -35,10 +35,7 @@ class MarkovChain(Umda):
     GROUP = 3
 
     def _sample(self, count: int) -> Floats:
-        """Draw samples group by group, each conditional on the previous.
-
-        Redrawn and finally clipped to the box.
-        """
+        """Draw samples group by group, each conditional on the previous group, and keep them inside the box."""
         mean = self.samples.mean(axis=0)
         width = self.upper - self.lower
         slope, spread = fit_chain(np.ascontiguousarray((self.samples - mean) / width), self.GROUP, RIDGE)

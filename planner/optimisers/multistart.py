@@ -1,6 +1,5 @@
-"""Many searches with one Gaussian each, from starts of many widths and places.
+"""Run many searches with one Gaussian each, from starts of many widths and places; only promising ones continue.
 
-Only the promising ones continue.
 A single Gaussian follows one valley.  If a narrow gap leads to a better valley, a wider Gaussian does not find the gap,
 but a start as wide as the gap does.  The width of the gap is unknown, so that starts are drawn with widths of all
 orders of magnitude.  Each start is searched for a slice of evaluations, and continues as long as it is among the better
@@ -176,40 +175,40 @@ class Multistart(BoxSearch):
         self._spent = {False: 0, True: 0}
         self._search: Gaussian | None = None
         if initial is None:
-            self._search = self._start()
+            self._search = self._start_search()
             self._draw(self._search)
 
     def tell(self, scores: Floats) -> None:
         """Take the scores (n, c) of the last samples of `ask`, and draw the next generation."""
         ranks, noise = self._rank(scores), self._rng.random(len(scores))
         order = np.lexsort((noise, ranks))
-        self._keep(self._asked[order], scores[order])
+        self._store_generation(self._asked[order], scores[order])
         if self._search is None:
-            half = self._unit(self._asked[order[: self._half]])
+            half = self._to_unit_box(self._asked[order[: self._half]])
             self._middle, spread = half.mean(axis=0), np.maximum(half.std(axis=0), WIDTHS[0])
             self._scale = spread / math.sqrt(float((spread**2).mean()))
-            self._search = self._start()
+            self._search = self._start_search()
         else:
             self._search.learn(self._asked_in_unit_box, scores, self._rank, noise)
             if self._search.done or self._search.evaluations - self._slice_start >= SLICE * self.lower.size:
-                self._search = self._next(self._search)
+                self._search = self._next_search(self._search)
         self._draw(self._search)
 
-    def _keep(self, points: Floats, scores: Floats) -> None:
+    def _store_generation(self, points: Floats, scores: Floats) -> None:
         """Store a generation, best first, after the best sample of all."""
         if len(self.scores) and self._rank(np.stack([self.scores[0], scores[0]]))[0] == 0:
             points, scores = np.concatenate([self.samples[:1], points]), np.concatenate([self.scores[:1], scores])
         self.samples, self.scores = points, scores
 
-    def _unit(self, points: Floats) -> Floats:
+    def _to_unit_box(self, points: Floats) -> Floats:
         return (points - self.lower) / (self.upper - self.lower)
 
     def _draw(self, search: Gaussian) -> None:
         self._asked_in_unit_box = search.draw(self._rng)
         self._asked = np.clip(self.lower + self._asked_in_unit_box * (self.upper - self.lower), self.lower, self.upper)
 
-    def _next(self, search: Gaussian) -> Gaussian:
-        """Return the search of the next slice, after a slice of this one."""
+    def _next_search(self, search: Gaussian) -> Gaussian:
+        """Return the search that gets the next slice, after a slice of `search`."""
         self._spent[self._continued] += search.evaluations - self._slice_start
         chosen = search if self._may_continue(search) else self._choose()
         self._slice_start = chosen.evaluations
@@ -240,10 +239,10 @@ class Multistart(BoxSearch):
         self._continued = bool(waiting) and self._spent[True] <= self._spent[False]
         if self._continued:
             return waiting[int(np.argmin(self._rank(np.stack([search.curve[-1][1] for search in waiting]))))]
-        return self._start()
+        return self._start_search()
 
-    def _start(self) -> Gaussian:
-        """Start a new search: the first from the centre with a typical width, later ones of any width."""
+    def _start_search(self) -> Gaussian:
+        """Start a new search, the first from the centre with a typical width, later ones with any width."""
         size = self.lower.size
         least = min(self._population, 4 + int(3.0 * math.log(size)))
         if not self._searches:

@@ -38,7 +38,7 @@ class Level:
 
 
 def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
-    """Return for each row of scores (n, c) the number of rows preferred to it, (n,), counted level by level.
+    """Return the number of rows that are preferred to each row of scores (n, c), counted level by level, (n,).
 
     With every component raised to its goal, "u dominates v on U, or is equal there and v violates a goal outside U" is
     Pareto dominance on the level, and only rows equal on it proceed to the next: a component outside U is at its goal,
@@ -79,7 +79,7 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:
             distinct += 1
             if end - begin == 1:
                 continue
-            _sort(table, column, width, order, scratch, begin, end)
+            _merge_sort(table, column, width, order, scratch, begin, end)
             for c in range(width):
                 for k in range(begin, end):
                     sorted_[c, k] = table[column + c, order[k]]
@@ -104,13 +104,13 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:
 
 
 @inner
-def _sort(table: Floats, column: int, width: int, order: Ints, scratch: Ints, begin: int, end: int) -> None:
+def _merge_sort(table: Floats, column: int, width: int, order: Ints, scratch: Ints, begin: int, end: int) -> None:
     """Sort order[begin:end] lexicographically by `width` columns of the table: a stable merge sort."""
     for k in range(begin + 1, end):
         # Insertion sort of short runs.
         low = begin + (k - begin) // INSERTION_RUN * INSERTION_RUN
         row, at = order[k], k
-        while at > low and _before(table, column, width, row, order[at - 1]):
+        while at > low and _precedes(table, column, width, row, order[at - 1]):
             order[at] = order[at - 1]
             at -= 1
         order[at] = row
@@ -118,11 +118,11 @@ def _sort(table: Floats, column: int, width: int, order: Ints, scratch: Ints, be
     while size < end - begin:
         for low in range(begin, end - size, 2 * size):
             middle, high = low + size, min(low + 2 * size, end)
-            if not _before(table, column, width, order[middle], order[middle - 1]):
+            if not _precedes(table, column, width, order[middle], order[middle - 1]):
                 continue
             left, right = low, middle
             for k in range(low, high):
-                if right >= high or (left < middle and not _before(table, column, width, order[right], order[left])):
+                if right >= high or (left < middle and not _precedes(table, column, width, order[right], order[left])):
                     scratch[k] = order[left]
                     left += 1
                 else:
@@ -134,7 +134,7 @@ def _sort(table: Floats, column: int, width: int, order: Ints, scratch: Ints, be
 
 
 @inner
-def _before(table: Floats, column: int, width: int, a: int, b: int) -> bool:
+def _precedes(table: Floats, column: int, width: int, a: int, b: int) -> bool:
     """Return True if row a precedes row b, column by column."""
     for c in range(column, column + width):
         if table[c, a] != table[c, b]:
@@ -157,19 +157,19 @@ def _count_any(rows: Floats, width: int, begin: int, end: int, order: Ints, belo
             dominators = k - begin
             # No earlier row is larger in the first column.
             if width == 2:
-                dominators = _at_most(rows[1, begin:k], rows[1, k])
+                dominators = _count_at_most(rows[1, begin:k], rows[1, k])
             elif width > 2:
                 less = below[: k - begin]
                 for j in range(less.size):
                     less[j] = 1
                 for c in range(1, width):
-                    _and_at_most(rows[c, begin:k], rows[c, k], less)
+                    _clear_above(rows[c, begin:k], rows[c, k], less)
                 dominators = _count_marks(less)
         total[order[k]] += dominators
 
 
 @inner
-def _at_most(values: Floats, limit: float) -> int:
+def _count_at_most(values: Floats, limit: float) -> int:
     """Count the values not above the limit, without branches, so that the loop is vectorised."""
     count = 0
     for k in range(values.size):
@@ -178,7 +178,7 @@ def _at_most(values: Floats, limit: float) -> int:
 
 
 @inner
-def _and_at_most(values: Floats, limit: float, marks: Ints) -> None:
+def _clear_above(values: Floats, limit: float, marks: Ints) -> None:
     """Clear the marks of values above the limit."""
     for k in range(values.size):
         marks[k] &= 1 if values[k] <= limit else 0
@@ -194,7 +194,7 @@ def _count_marks(marks: Ints) -> int:
 
 
 @inner
-def _places(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
+def _rank_places(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
     """Return the places of a group's rows in the order of the second column, from 1, and the number of places.
 
     Equal values have the same place.
@@ -203,7 +203,7 @@ def _places(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
     order, places = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
     for k in range(count):
         order[k] = begin + k
-    _sort(rows, 1, 1, order, places, 0, count)
+    _merge_sort(rows, 1, 1, order, places, 0, count)
     place = 0
     for k in range(count):
         if k == 0 or rows[1, order[k]] != rows[1, order[k - 1]]:
@@ -218,7 +218,7 @@ def _count_pairs(rows: Floats, begin: int, end: int, order: Ints, total: Ints) -
 
     Uses a Fenwick tree over the second of two columns.
     """
-    places, number = _places(rows, begin, end)
+    places, number = _rank_places(rows, begin, end)
     tree = np.zeros(number + 1, dtype=np.int64)
     k = begin
     while k < end:

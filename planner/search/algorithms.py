@@ -1,4 +1,4 @@
-"""Planning algorithms by name, and the limits that each of them plans within.
+"""List the planning algorithms by name, and choose the limits that each algorithm plans within.
 
 An `Algorithm` combines an encoding, a kind of scores, seeding and an optimiser; `ALGORITHMS` lists all that a scenario
 or a command may name.
@@ -137,7 +137,7 @@ DEFAULT = "fda-seeded"
 
 
 def algorithm_lines() -> str:
-    """Return name and summary of the algorithms, one line each.
+    """Return the names and summaries of the algorithms, one line per algorithm.
 
     >>> print(algorithm_lines().splitlines()[3])
       umda-smooth     UMDA in the rotated frame, graded violations, sampled in a smooth basis, no seeds
@@ -162,8 +162,5 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
 
 
 def limits_for(algorithm: Algorithm, limits: "Limits") -> "Limits":
-    """Return the limits for an algorithm.
-
-    With the paper's violation counts they ignore the tracking error.
-    """
+    """Return the limits for an algorithm; they ignore the tracking error if it counts violations as the paper does."""
     return limits if algorithm.graded else replace(limits, tracking=None)

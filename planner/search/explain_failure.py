@@ -1,4 +1,4 @@
-"""Explain a search without a feasible path: obstacles that block all routes, and limits of the method.
+"""Explain why a search found no feasible path, by obstacles that block all routes and limits of the method.
 
 `explain_failure` collects lines for the user. It searches for lines across the map where ground and clearance reach the
 ceiling, or missiles cover the remaining heights; for zones that separate the start from the destination on a coarse
@@ -50,7 +50,7 @@ class SeparatingZones(NamedTuple):
 
 
 def separating_zones(scenario: Scenario) -> SeparatingZones | None:
-    """Return the zones that separate start and destination; None without any, or if the ground alone does.
+    """Return the zones that separate start and destination, or None if no zones do, or if the ground alone does.
 
     A gap narrower than a cell is treated as closed. Missiles and the aircraft's climb are ignored.
 
@@ -71,14 +71,14 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
     cells = np.full((HEIGHTS, *ground.shape), _OPEN_CELL, dtype=np.int64)
     cells[:, ~(low <= top)] = _GROUND_CELL
     ends = [_cell_of(scenario, end, pitch, low, top) for end in (scenario.start, scenario.destination)]
-    if not _connected(cells, ends):
+    if not _are_connected(cells, ends):
         return None
     _close_cells(zone_records(scenario.zones), east, north, ground, low, top, cells)
     for end in ends:
         cells[end] = _OPEN_CELL
-    if _connected(cells, ends):
+    if _are_connected(cells, ends):
         return None
-    adjacent = [_grown(_reached(cells == _OPEN_CELL, end)) for end in ends]
+    adjacent = [_grow_cells(_reachable_cells(cells == _OPEN_CELL, end)) for end in ends]
     both = [set(cells[edge].tolist()) for edge in adjacent]
     found = (both[0] & both[1]) or (both[0] | both[1])
     return SeparatingZones(tuple(scenario.zones[z].name for z in sorted(found) if z >= 0), pitch)
@@ -92,26 +92,23 @@ def _cell_of(scenario: Scenario, end: Floats, pitch: float, low: Floats, top: Fl
     return int(np.clip(round(share * (HEIGHTS - 1)), 0, HEIGHTS - 1)), row, column
 
 
-def _connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
+def _are_connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
     """Return True if open cells connect the two ends."""
-    return bool(_reached(cells == _OPEN_CELL, ends[0])[ends[1]])
+    return bool(_reachable_cells(cells == _OPEN_CELL, ends[0])[ends[1]])
 
 
-def _reached(is_open: Flags, start: tuple[int, int, int]) -> Flags:
-    """Return the open cells that can be reached from a cell through their sides.
-
-    None if the cell is not open.
-    """
+def _reachable_cells(is_open: Flags, start: tuple[int, int, int]) -> Flags:
+    """Return the open cells that can be reached from a cell through their sides, or None if the cell is not open."""
     reached = np.zeros_like(is_open)
     reached[start] = is_open[start]
     count = -1
     while count != (count := int(reached.sum())):
-        reached = _grown(reached) & is_open
+        reached = _grow_cells(reached) & is_open
     return reached
 
 
-def _grown(cells: Flags) -> Flags:
-    """Return the cells and all cells that share a side with one of them."""
+def _grow_cells(cells: Flags) -> Flags:
+    """Return the given cells, and all cells that share a side with a given cell."""
     grown = cells.copy()
     for axis in range(cells.ndim):
         whole, one = np.moveaxis(grown, axis, 0), np.moveaxis(cells, axis, 0)
@@ -144,7 +141,7 @@ def _close_cells(
 
 
 def closed_bands(problem: Problem) -> list[str]:
-    """Return a line for each vertical band of the limits or of an inclusion that the required margins close.
+    """Return a line for each band of altitudes, of the limits or of an inclusion, that the required margins close.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -180,7 +177,7 @@ def closed_bands(problem: Problem) -> list[str]:
 
 
 def max_altitude(problem: Problem) -> tuple[float, str]:
-    """Return the highest altitude of a plan, m AMSL, and the limit that sets it: the ceiling or an inclusion's ceiling.
+    """Return the maximum altitude of a plan, m AMSL, and the limit that sets it, the ceiling or an inclusion's ceiling.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -231,15 +228,15 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     """
     scenario = plan.scenario
     chosen = ALGORITHMS.get(plan.algorithm)
-    lines = _walls(scenario)
+    lines = _describe_walls(scenario)
     if limits is not None:
         problem = make_problem(scenario, limits if chosen is None else limits_for(chosen, limits))
         found = certify(problem, plan.waypoints)
         if found.ok and found.kill_distance > 0.0 and not plan.violations.any():
             # The search has found a path; the fault concerns the autopilot, and the certificate states it.
             return []
-        lines += closed_bands(problem) or ([] if lines else _margin_walls(problem))
-        lines += _closing(problem)
+        lines += closed_bands(problem) or ([] if lines else _describe_margin_walls(problem))
+        lines += _proven_closure_text(problem)
     closed = separating_zones(scenario)
     if closed is not None:
         names = ", ".join(closed.zones[:MAX_NAMES]) + (" and more" if len(closed.zones) > MAX_NAMES else "")
@@ -263,7 +260,7 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     return lines
 
 
-def _walls(scenario: Scenario) -> list[str]:
+def _describe_walls(scenario: Scenario) -> list[str]:
     """Describe lines across the whole map where the ground reaches the ceiling, or missiles cover every height."""
     terrain = scenario.terrain
     if terrain is None:
@@ -279,7 +276,7 @@ def _walls(scenario: Scenario) -> list[str]:
                 f"the clearance take {np.nanmin(lowest):.0f} m, the ceiling is {scenario.ceiling:.0f} m"
             )
             break
-        if not _outside_missiles(scenario, points[gaps > 0.0], lowest[gaps > 0.0]):
+        if not _leaves_a_gap(scenario, points[gaps > 0.0], lowest[gaps > 0.0]):
             line = f"terrain and missiles together block every route {along:.0f} m from the start, at every height"
             lines.append(line)
             break
@@ -287,7 +284,7 @@ def _walls(scenario: Scenario) -> list[str]:
 
 
 def _lines_across(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
-    """Yield lines across the map between the ends: distance from the start, m, and points (n, 2) on each."""
+    """Yield lines across the map between the ends, each as its distance from the start, m, and points (n, 2)."""
     frame = rotated_frame(scenario.start, scenario.destination)
     widest = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
     across = np.linspace(-widest, widest, ACROSS)
@@ -298,7 +295,7 @@ def _lines_across(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
             yield float(along), points[inside]
 
 
-def _margin_walls(problem: Problem) -> list[str]:
+def _describe_margin_walls(problem: Problem) -> list[str]:
     """Describe lines across the whole map where ground, clearance and required margins leave no height."""
     scenario, data = problem.scenario, problem.certified
     if scenario.terrain is None:
@@ -319,7 +316,7 @@ def _margin_walls(problem: Problem) -> list[str]:
     return []
 
 
-def _outside_missiles(scenario: Scenario, points: np.ndarray, lowest: np.ndarray) -> bool:
+def _leaves_a_gap(scenario: Scenario, points: np.ndarray, lowest: np.ndarray) -> bool:
     """Return True if any height above any of the points (n, 2) is outside every kill sphere."""
     threats = scenario.threats
     armed = threats.kill_radius > 0.0
@@ -335,8 +332,8 @@ def _outside_missiles(scenario: Scenario, points: np.ndarray, lowest: np.ndarray
     return math.isinf(scenario.ceiling)
 
 
-def _closing(problem: Problem) -> list[str]:
-    """Return a line that names the missiles, or the altitude, that leave no path at all, if that can be proven."""
+def _proven_closure_text(problem: Problem) -> list[str]:
+    """Return a line that names the missiles, or the altitude, that block every path, if that can be proven."""
     data, ceiling = problem.certified, "the ceiling"
     found, top = closing_missiles(data), highest_level_flight(data)
     if found is None:
@@ -357,7 +354,7 @@ def _closing(problem: Problem) -> list[str]:
 
 
 def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
-    """Return the names of the zones that a path (w, 3) violates: exclusions that it enters, inclusions that it leaves.
+    """Return the names of the exclusions that a path (w, 3) enters and of the inclusions that it leaves.
 
     >>> from world.scenario import load_scenario
     >>> violated_zones(load_scenario("tight"), np.zeros((2, 3)))

@@ -14,7 +14,7 @@ from world.arrays import Floats
 
 
 def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
-    """Return a safe plan without the waypoints that its safety does not need; the plan gets no longer.
+    """Remove the waypoints that a plan's safety does not need, and return the plan, which is no longer than before.
 
     The waypoints with the smallest detours are removed first. Distances to missiles stay at the distance that plans
     keep, or at the plan's own distance if that is smaller.
@@ -32,7 +32,7 @@ def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
     scenario = plan.scenario
     problem = make_problem(scenario, limits_for(find_algorithm(plan.algorithm, scenario.name), limits))
     nearest = min(plan.certificate.kill_distance, CERTIFIED_KILL_MARGIN)
-    while (certified := _without_one(problem, plan.waypoints, nearest)) is not None:
+    while (certified := _drop_one_waypoint(problem, plan.waypoints, nearest)) is not None:
         waypoints, certificate = certified
         counts, objectives = paper_scores(problem.certified, waypoints[None])
         plan = replace(
@@ -41,10 +41,9 @@ def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
     return plan
 
 
-def _without_one(problem: Problem, waypoints: Floats, nearest: float) -> tuple[Floats, Certificate] | None:
-    """Remove one waypoint of a path (w, 3), and return the path with its certificate.
+def _drop_one_waypoint(problem: Problem, waypoints: Floats, nearest: float) -> tuple[Floats, Certificate] | None:
+    """Remove one waypoint of a path (w, 3), and return the path with its certificate, or None if this is impossible.
 
-    None if none can be removed.
     The path must be certified, and no nearer to a missile than `nearest` (m). The waypoint with the smallest detour is
     tried first.
     """

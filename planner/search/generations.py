@@ -1,4 +1,4 @@
-"""Generations of two kinds of evolutionary search: over whole paths, and over single waypoints.
+"""Run generations of two kinds of evolutionary search, over whole paths and over single waypoints.
 
 `path_generations` runs an optimiser on vectors of whole paths, ranked by the preference between their scores.
 
@@ -49,7 +49,7 @@ def path_generations(search: Search, population: int, generations: int, starts: 
     starts: vectors (s, d) around which the first population is sampled.
     """
     encoding, algorithm = search.encoding, search.algorithm
-    levels, before = _levels(search), search.evaluations
+    levels, before = _preference_levels(search), search.evaluations
     initial = (
         first_samples(search.problem.space, encoding, population, starts, search.rng) if algorithm.smooth else None
     )
@@ -62,7 +62,7 @@ def path_generations(search: Search, population: int, generations: int, starts: 
         if search.must_end() or search.first_safe_found():
             break
         share = SAFE_SHARE if search.best_is_safe() else SEARCH_SHARE
-        if algorithm.seeded and (_stagnant(bests) or search.evaluations >= before + share * whole):
+        if algorithm.seeded and (_is_stagnant(bests) or search.evaluations >= before + share * whole):
             break
         optimiser.tell(search.evaluate(optimiser.ask()))
         search.record()
@@ -72,7 +72,7 @@ def path_generations(search: Search, population: int, generations: int, starts: 
     return np.asarray(optimiser.samples[best_first(optimiser.scores)[0]])
 
 
-def _levels(search: Search) -> tuple[Level, ...]:
+def _preference_levels(search: Search) -> tuple[Level, ...]:
     """Return the preference levels for ranking, with the goals of the scenario, if any."""
     goals = search.problem.scenario.planner.goals
     length = NO_GOAL if goals.length_ratio is None else goals.length_ratio
@@ -102,7 +102,7 @@ def _make_optimiser(
     return Umda(lower, upper, rank, population, search.rng, initial=initial, basis=basis)
 
 
-def _stagnant(bests: list[Floats]) -> bool:
+def _is_stagnant(bests: list[Floats]) -> bool:
     """Return True if the last generations gained almost nothing."""
     if len(bests) <= STALLED_GENERATIONS:
         return False
@@ -160,7 +160,7 @@ REPAIR_EVALUATIONS = 100
 
 
 def waypoint_generations(search: Search, population: int, generations: int) -> None:
-    """Run the factorised distribution algorithm; the archive takes the paths found.
+    """Run the factorised distribution algorithm, and insert the paths that it finds into the archive.
 
     population: candidates per interval in the first generation. generations: limited to `MAX_GENERATIONS`, or
     `SEEDED_GENERATIONS` with seeds.
@@ -171,20 +171,20 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
     lower, upper = encoding.lower.reshape(inner, 3), encoding.upper.reshape(inner, 3)
     data = search.problem.search
     sampling = NicheSampling(lower, upper, lambda rows, _: free_points(data, frame.restore(rows)), search.rng)
-    seeded, first = search.algorithm.seeded, _first_candidates(search, population)
-    later = _later_candidates(first)
+    seeded, first = search.algorithm.seeded, _first_candidate_count(search, population)
+    later = _later_candidate_count(first)
     interval = frame.length / inner
     deviation = np.array([FIRST_ALONG * interval, FIRST_ACROSS * interval, FIRST_UP])
     rows = sampling.first(first, np.array([0.0, 0.0, ABOVE_CEILING]))
     if not len(search.archive.vectors):
         # The archive must contain a path whenever the search is stopped.
         search.evaluate(_as_vectors(rows[:, :1]))
-    steps = _generations(search, generations)
+    steps = _limit_generations(search, generations)
     slack_at_first = SEEDED_SLACK if seeded else FIRST_SLACK
     for step in range(steps):
         rows[:, 0] = search.archive.vectors[0].reshape(inner, 3)
         slack = slack_at_first * (LAST_SLACK / slack_at_first) ** (step / max(1, steps - 1))
-        chains = _join(search, encoding.decode(_as_vectors(rows)), slack)
+        chains = _join_candidates(search, encoding.decode(_as_vectors(rows)), slack)
         rows = rows[:, : chains.cost.shape[1]]
         search.legs += chains.legs
         search.evaluations += math.ceil(chains.legs / (inner + 1))
@@ -201,19 +201,19 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
             deviation = SHRINK * deviation
 
 
-def _first_candidates(search: Search, population: int) -> int:
+def _first_candidate_count(search: Search, population: int) -> int:
     """Return the number of candidates per interval in the first generation of this population."""
     most = int(math.sqrt(MAX_LEGS / (search.encoding.waypoints - 1)))
     return max(2, min(int(population * (SEEDED_SHARE if search.algorithm.seeded else 1.0)), most))
 
 
-def _later_candidates(first: int) -> int:
+def _later_candidate_count(first: int) -> int:
     """Return the number of candidates per interval in later generations."""
     return min(first, max(MIN_POPULATION, int(LATER_SHARE * first)))
 
 
-def _generations(search: Search, generations: int) -> int:
-    """Return the number of generations over waypoints: the requested number, limited to the maximum."""
+def _limit_generations(search: Search, generations: int) -> int:
+    """Return the requested number of generations over waypoints, limited to the maximum."""
     return min(generations, SEEDED_GENERATIONS if search.algorithm.seeded else MAX_GENERATIONS)
 
 
@@ -233,18 +233,18 @@ def may_try_again(search: Search) -> bool:
 def _legs_of_attempt(search: Search) -> int:
     """Return the number of legs between all candidates of all generations of the first attempt."""
     table = search.problem.scenario.planner
-    first = _first_candidates(search, table.population)
-    squares = first**2 + max(0, _generations(search, table.generations) - 1) * _later_candidates(first) ** 2
+    first = _first_candidate_count(search, table.population)
+    squares = first**2 + max(0, _limit_generations(search, table.generations) - 1) * _later_candidate_count(first) ** 2
     return (search.encoding.waypoints - 1) * squares
 
 
 def _as_vectors(rows: Floats) -> Floats:
-    """Convert candidates (i, k, 3) of intervals to vectors (k, 3 i) of the k-th candidate of each."""
+    """Convert k candidates per interval, (i, k, 3), to k vectors of one candidate per interval, (k, 3 i)."""
     return rows.transpose(1, 0, 2).reshape(rows.shape[1], -1)
 
 
-def _join(search: Search, paths: Floats, slack: float) -> WaypointChains:
-    """Find the best paths through the candidates of paths (k, w, 3), bounded relative to the best path if any.
+def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointChains:
+    """Find the best paths through the waypoints of paths (k, w, 3), with a bound relative to the best known path.
 
     Without a bound almost every leg is evaluated; if few legs are left, only the first candidates are joined.
     """
@@ -268,7 +268,7 @@ def _join(search: Search, paths: Floats, slack: float) -> WaypointChains:
 
 
 def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None:
-    """Evaluate whole paths through some of the best candidates, and repair one as long as none is feasible."""
+    """Evaluate whole paths through some of the best candidates, and repair one path as long as no path is feasible."""
     chosen = set()
     for i in range(1, len(chains.cost) - 1, EVERY):
         for k in np.argsort(chains.cost[i], kind="stable")[:BEST_PER_INTERVAL]:

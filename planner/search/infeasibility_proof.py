@@ -1,4 +1,4 @@
-"""Prove that no path exists for any waypoints: ground, ceiling and missiles block every path on the map.
+"""Prove that no path exists, because ground, ceiling and missiles block every path on the map.
 
 In thin air an aircraft may not be able to hold its altitude at its cruise speed; no leg may begin or end there, so that
 the lowest such altitude acts as a ceiling.
@@ -39,7 +39,7 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
     """Return True if no path stays above the clearance, below the ceiling and outside all missiles.
 
     missiles: (m,) True for the `data.threats` that are considered; None for all. margin: distance from their spheres,
-    m. False if nothing is proven.
+    m. Return False if nothing is proven.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -56,9 +56,9 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
 
 
 def highest_level_flight(data: ProblemArrays) -> float:
-    """Return the altitude above which the aircraft sinks in level flight, so that no waypoint may exceed it, m.
+    """Return the altitude above which the aircraft cannot hold its altitude, so that no waypoint may exceed it, m.
 
-    Returns inf without such an altitude, and in winds in which a course cannot be held. As in
+    Return inf without such an altitude, and in winds in which a course cannot be held. As in
     `planner.evaluation.leg_constraints`, if both slope limits are the aircraft's own.
     """
     table = data.aircraft
@@ -86,7 +86,7 @@ def highest_level_flight(data: ProblemArrays) -> float:
 def closing_missiles(data: ProblemArrays) -> list[int] | None:
     """Return the indices of a minimal set of missiles that block every path together with ground and ceiling.
 
-    Returns None if `is_closed` proves nothing; empty if ground and ceiling suffice.
+    Return None if `is_closed` proves nothing, and no indices if ground and ceiling suffice.
     """
     if not is_closed(data):
         return None
@@ -95,7 +95,7 @@ def closing_missiles(data: ProblemArrays) -> list[int] | None:
         first = 0
         while first < len(kept):
             without = np.delete(kept, slice(first, first + size))
-            if is_closed(data, _flags(without, len(data.threats))):
+            if is_closed(data, _index_mask(without, len(data.threats))):
                 kept = without
             else:
                 first += size
@@ -103,7 +103,7 @@ def closing_missiles(data: ProblemArrays) -> list[int] | None:
     return [int(k) for k in kept]
 
 
-def _flags(indices: Ints, count: int) -> Flags:
+def _index_mask(indices: Ints, count: int) -> Flags:
     flags = np.zeros(count, dtype=np.bool_)
     flags[indices] = True
     return flags
@@ -111,7 +111,7 @@ def _flags(indices: Ints, count: int) -> Flags:
 
 @compiled
 def _is_closed(data: ProblemArrays, missiles: Flags, side: float, margin: float) -> bool:
-    """Implement `is_closed`; side: side of a column, m."""
+    """Implement `is_closed` for columns of the given side, m."""
     columns, rows = (
         max(1, math.ceil((data.east - data.west) / side)),
         max(1, math.ceil((data.north - data.south) / side)),
@@ -128,7 +128,7 @@ def _is_closed(data: ProblemArrays, missiles: Flags, side: float, margin: float)
             missile = data.threats[k]
             place = missile.east - data.west, missile.north - data.south
             _close_sphere(place[0], place[1], missile.up, missile.kill_radius + margin, side, low, high, count)
-    return not _reaches(data, side, low, high, count)
+    return not _reaches_destination(data, side, low, high, count)
 
 
 @inner
@@ -159,7 +159,7 @@ def _close_sphere(
 ) -> None:
     """Close the altitudes at which a whole column is inside a sphere.
 
-    East, north: from the map's corner, m.
+    east, north: distances from the map's corner, m.
     """
     columns, rows = count.shape
     first, last = max(0, math.floor((east - radius) / side)), min(columns - 1, math.floor((east + radius) / side))
@@ -199,7 +199,7 @@ def _close_range(low: Floats, high: Floats, count: Ints, j: int, begin: float, e
 
 
 @inner
-def _reaches(data: ProblemArrays, side: float, low: Floats, high: Floats, count: Ints) -> bool:
+def _reaches_destination(data: ProblemArrays, side: float, low: Floats, high: Floats, count: Ints) -> bool:
     """Return True if the destination can be reached from the start through open altitudes of adjacent columns.
 
     Open range s of a column is above its closed range s.

@@ -49,7 +49,9 @@ class _Task(NamedTuple):
 
 
 def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
-    """Call the kernels of one part of planning, one of `PARTS` or `FRONT`, on a scenario that should be small.
+    """Run the kernels of one part of planning, in `PARTS` or `FRONT`, once, so that they are compiled.
+
+    Use a small scenario, because the result is discarded.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -79,19 +81,19 @@ def _shorten(task: _Task) -> None:
 
 
 def _route(task: _Task) -> None:
-    data, (frame, span) = task.problem.search, _across(task)
+    data, (frame, span) = task.problem.search, _frame_and_span(task)
     found = grid_route(data, frame, make_grid(data, frame, span, STAGES))
     for route in [found] if isinstance(found, GridRoute) else []:
         fit_waypoints(data, frame, route.points, WAYPOINTS)
 
 
 def _pass_sides(task: _Task) -> None:
-    data, (frame, span) = task.problem.search, _across(task)
+    data, (frame, span) = task.problem.search, _frame_and_span(task)
     grid = optimistic_grid(data, frame, span, STAGES, shrink=0.5, spread=0.2, ratio=0.5)
     side_routes(data, frame, grid, 2.0 * frame.length, MAX_ROUTES)
 
 
-def _across(task: _Task) -> tuple[RotatedFrame, tuple[float, float]]:
+def _frame_and_span(task: _Task) -> tuple[RotatedFrame, tuple[float, float]]:
     """Return the frame of the direct line, and the range of waypoints across it, m."""
     space, lower, upper = task.problem.space, task.encoding.lower, task.encoding.upper
     return rotated_frame(space.start, space.destination), (float(lower[1::3].min()), float(upper[1::3].max()))

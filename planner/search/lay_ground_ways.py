@@ -116,10 +116,11 @@ class FinalLaw(NamedTuple):
 
 
 def with_ground_ways(plan: Plan, limits: Limits, final: FinalLaw, climbed: ClimbOut | None = None) -> Plan:
-    """Return the plan with the departure and approach that its scenario requires, or with the reason without them.
+    """Add the departure and approach that a plan's scenario requires, or the reason why they are missing.
 
     The scenario requires them by `[launch]` and `[landing]`; a plan without either table is returned unchanged.
-    limits: limits of the plan.  climbed: the departure of a plan whose first legs are flown, which is kept.
+    limits: limits of the plan.
+    climbed: the departure to keep of a plan whose first legs are flown already.
     """
     scenario = plan.scenario
     if scenario.home is None or scenario.terrain is None or (scenario.launch is None and scenario.landing is None):
@@ -130,10 +131,10 @@ def with_ground_ways(plan: Plan, limits: Limits, final: FinalLaw, climbed: Climb
     if plan.flown_legs:
         climb = climbed
     elif scenario.launch is not None:
-        climb, why = _climb_out(site, scenario.launch)
+        climb, why = _find_climb_out(site, scenario.launch)
         problems += [f"climb-out: {why}"] if why else []
     if scenario.landing is not None:
-        descent, why = _descent(site, scenario.landing, final)
+        descent, why = _find_descent(site, scenario.landing, final)
         problems += [f"landing: {why}"] if why else []
     certificate = replace(plan.certificate, problems=(*plan.certificate.problems, *problems))
     return replace(plan, ways=GroundWays(climb, descent), certificate=certificate)
@@ -175,7 +176,7 @@ class _Site:
         return found[0], found[1]
 
     def least_length(self, rise: float, side: int) -> float:
-        """Return the shortest path that gains or loses a height, m; side: 0 for a climb, 1 for a descent."""
+        """Return the length of the shortest path that gains (side 0) or loses (side 1) a height, m."""
         up = float(max(self.scenario.start[2], self.scenario.destination[2]))
         steepest = max(self.slopes(course, up)[side] for course in np.arange(8) * (math.pi / 4.0))
         return max(0.0, abs(rise)) / steepest if steepest > 0.0 else math.inf
@@ -183,7 +184,8 @@ class _Site:
     def certificate(self, chain: Floats, near: tuple[Floats, Floats]) -> Certificate:
         """Return the certificate of a chain (n, 3).
 
-        near: two places, (3,) m, near which less height above ground is required if they have less themselves.
+        near: two places, (3,) m; if a place is closer to the ground than required, less height is required near the
+            place.
         """
         data = self.problem.certified
         start, end = (min(data.buffer, 0.75 * max(0.0, self.above(place) - data.clearance - 0.01)) for place in near)
@@ -223,42 +225,42 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
     if (tracking := within.tracking) is not None:
         # An estimate, as ground speeds depend on the course; the certificate decides.
         share = 1.0 + _WIND_FRACTION * scenario.wind.speed / within.airspeed
-        before, after = (_at_speed(table, share) for table in (tracking.before, tracking.after))
+        before, after = (_turn_lengths_at(table, share) for table in (tracking.before, tracking.after))
         turning = TurnLengths(*(tuple(map(max, own, arcs)) for own, arcs in zip((before, after), turning, strict=True)))
     return _Site(plan, within, home, terrain, problem, low, radius, turning)
 
 
-def _at_speed(table: Floats, share: float) -> list[float]:
+def _turn_lengths_at(table: Floats, share: float) -> list[float]:
     """Interpolate a tracking error's table, (t,) m, at a ground speed as a fraction of the airspeed."""
     return [float(np.interp(share, SPEED_SHARES, row)) for row in table]
 
 
 def _read_only(place: Floats) -> Floats:
-    """Return a read-only copy of a place: a writable array would compile the kernels again."""
+    """Return a read-only copy of a place, because a writable array would make the kernels compile again."""
     out = np.array(place, dtype=np.float64)
     out.setflags(write=False)
     return out
 
 
-def _points(spots: Sequence[Spot], heights: Floats) -> Floats:
+def _chain(spots: Sequence[Spot], heights: Floats) -> Floats:
     return np.column_stack([np.array(spots), heights])
 
 
-def _profile(terrain: Terrain, begin: Spot, course: float, last: float) -> tuple[Floats, Floats]:
-    """Return distances from a place on a course, m, and the ground heights there, NaN if not known."""
+def _ground_profile(terrain: Terrain, begin: Spot, course: float, last: float) -> tuple[Floats, Floats]:
+    """Return distances from a place along a course, m, and the ground heights at those distances, m, NaN if unknown."""
     run = np.arange(0.0, last + _GROUND_SPACING_M, _GROUND_SPACING_M)
     east, north = begin[0] + run * math.sin(course), begin[1] + run * math.cos(course)
     return run, terrain.height(east, north)
 
 
 class _BestRefused:
-    """Best of the refused paths, and their number."""
+    """Best of the refused paths, and the number of refused paths."""
 
     def __init__(self) -> None:
         self.tried, self._margin, self.problem = 0, -math.inf, ""
 
     def add(self, found: Certificate | None) -> None:
-        """Include the certificate of a refused path, if any; without a problem it is inside a missile's reach."""
+        """Include the certificate, if any, of a refused path; a path without a problem is in a missile's range."""
         if found is None:
             return
         self.tried += 1
@@ -272,19 +274,19 @@ class _BestRefused:
 # Departure.
 
 
-def _climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
-    """Return the shortest accepted departure; None and the reason without one."""
+def _find_climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
+    """Return the shortest accepted departure, or None and the reason."""
     data, target = site.problem.certified, site.plan.waypoints[0]
     ground, goal = float(site.home[2]), float(target[2])
     over = max(_MIN_TAKEOFF_HEIGHT_M, data.clearance + data.buffer + _CLEARANCE_EXCESS_M)
     up = ground + over
-    launches, why = _launches(site, launch, over, max(up, goal))
+    launches, why = _find_launches(site, launch, over, max(up, goal))
     if not launches:
         return None, why
     nearest = _BestRefused()
     for laps in _lap_counts(site, goal - ground, 0):
-        for _, course, spots in sorted(_departures(site, launches, laps), key=lambda one: one[0]):
-            found = _certified_climb(site, course, spots, up)
+        for _, course, spots in sorted(_departure_paths(site, launches, laps), key=lambda one: one[0]):
+            found = _certify_climb_out(site, course, spots, up)
             if isinstance(found, ClimbOut):
                 return found, ""
             nearest.add(found)
@@ -298,8 +300,8 @@ def _climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
     return None, f"none of {nearest.tried} ways launched {courses} is free; the nearest: {nearest.problem}"
 
 
-def _certified_climb(site: _Site, course: float, spots: list[Spot], up: float) -> ClimbOut | Certificate | None:
-    """Return the departure over these corners, or its certificate if refused, or None if it cannot be flown.
+def _certify_climb_out(site: _Site, course: float, spots: list[Spot], up: float) -> ClimbOut | Certificate | None:
+    """Return the departure over these corners, its certificate if it is refused, or None if it cannot be flown.
 
     up: altitude that the take-off climbs to, m AMSL.
     """
@@ -310,7 +312,7 @@ def _certified_climb(site: _Site, course: float, spots: list[Spot], up: float) -
         heights = risen(spots, float(site.home[2]), partial(_scaled_slope, site, share, 0, top), up, goal)
         if heights[-1] < goal - 1e-6:
             break
-        chain = np.concatenate([_points(spots, heights), onward])
+        chain = np.concatenate([_chain(spots, heights), onward])
         found = site.certificate(chain, (target, chain[0]))
         if found.ok and found.kill_distance > 0.0:
             return ClimbOut(site.home, course, up, chain[1 : len(spots) - 1], site.slopes(course, top)[0])
@@ -325,10 +327,11 @@ class _Start(NamedTuple):
     end: Spot
 
 
-def _launches(site: _Site, launch: Launch, over: float, high: float) -> tuple[list[_Start], str]:
-    """Return launches that climb free of ground, missiles and zones; or the reason without any.
+def _find_launches(site: _Site, launch: Launch, over: float, high: float) -> tuple[list[_Start], str]:
+    """Return the launches that climb clear of ground, missiles and zones, or the reason why there are none.
 
-    over: height over home to climb to straight ahead.  high: altitude of the climb performance, m AMSL.
+    over: height above home up to which the launch climbs straight ahead, m.
+    high: altitude of the climb performance, m AMSL.
     """
     courses = (
         [2.0 * math.pi * k / _LAUNCH_COURSE_COUNT for k in range(_LAUNCH_COURSE_COUNT)]
@@ -343,7 +346,7 @@ def _launches(site: _Site, launch: Launch, over: float, high: float) -> tuple[li
         least = over / climb * _FIRST_LEG_FACTOR_AND_M[0] + _FIRST_LEG_FACTOR_AND_M[1]
         for longer in _FIRST_LEG_FACTORS:
             last = least * longer
-            run, low = _profile(site.terrain, home, course, last)
+            run, low = _ground_profile(site.terrain, home, course, last)
             height = climb * run
             needed = np.minimum(site.problem.certified.clearance, _CLIMB_CLEARANCE_FRACTION * height)
             room = (site.home[2] + height - low - needed)[run > _LAUNCH_RUN_M]
@@ -369,8 +372,8 @@ def _launches(site: _Site, launch: Launch, over: float, high: float) -> tuple[li
     return found, f"{whose} {no}free of ground, missiles and zones at {SHARE:.0%} of the steepest climb: {best[1]}"
 
 
-def _departures(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[tuple[float, float, list[Spot]]]:
-    """Yield departures from home to the plan's first waypoint: cost, launch course, and corners."""
+def _departure_paths(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[tuple[float, float, list[Spot]]]:
+    """Yield the cost, launch course and corners of departures from home to the plan's first waypoint."""
     first, asked = site.plan.waypoints[0], site.scenario.start_course
     onward = float(leg_courses(site.plan.waypoints[:2])[0]) if asked is None else asked
     end, home = (float(first[0]), float(first[1])), (float(site.home[0]), float(site.home[1]))
@@ -386,10 +389,7 @@ def _departures(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[
 
 
 def _lap_counts(site: _Site, rise: float, side: int) -> list[int]:
-    """Return the numbers of laps to try to gain or lose a height, m, fewest first.
-
-    Side: 0 for climb, 1 for descent.
-    """
+    """Return the numbers of laps with which to try to gain (side 0) or lose (side 1) a height, m, fewest first."""
     most = math.ceil(site.least_length(rise, side) / _SLOPE_FACTORS[-1] / (4.0 * LAP_SIDE * site.radius))
     return list(range(min(MAX_LAPS, most) + 1))
 
@@ -408,8 +408,8 @@ class _Final(NamedTuple):
     point: Floats
 
 
-def _descent(site: _Site, strip: LandingStrip, final: FinalLaw) -> tuple[Descent | None, str]:
-    """Return the first accepted approach; None and the reason without one."""
+def _find_descent(site: _Site, strip: LandingStrip, final: FinalLaw) -> tuple[Descent | None, str]:
+    """Return the first accepted approach, or None and the reason."""
     field = float(site.terrain.height(strip.east, strip.north))
     point = np.array([strip.east, strip.north, field])
     into = strip.into(site.scenario.wind, field)
@@ -424,7 +424,7 @@ def _descent(site: _Site, strip: LandingStrip, final: FinalLaw) -> tuple[Descent
         if rough:
             reasons.append(rough)
             continue
-        made, why = _finals(site, strip, course, point, final)
+        made, why = _find_finals(site, strip, course, point, final)
         finals += made
         reasons += [why] if not made else []
     if not finals:
@@ -434,7 +434,7 @@ def _descent(site: _Site, strip: LandingStrip, final: FinalLaw) -> tuple[Descent
         corners, why = _path_to_line_up(site, one)
         if corners is None:
             continue
-        go_around = _go_around(site, one)
+        go_around = _min_go_around_height(site, one)
         if go_around is None:
             why = f"no height would do for a go-around on {round(math.degrees(one.course)) % 360}°"
             continue
@@ -453,8 +453,10 @@ def _strip_fault(terrain: Terrain, strip: LandingStrip, course: float) -> str:
     return ""
 
 
-def _finals(site: _Site, strip: LandingStrip, course: float, point: Floats, law: FinalLaw) -> tuple[list[_Final], str]:
-    """Return free, flyable finals on a course, the gentlest and shortest first; or the reason without any."""
+def _find_finals(
+    site: _Site, strip: LandingStrip, course: float, point: Floats, law: FinalLaw
+) -> tuple[list[_Final], str]:
+    """Return the unobstructed flyable finals on a course, the shallowest and shortest first, or the reason for none."""
     field = float(point[2])
     tail = site.scenario.wind.along(course, field)[0]
     able = GLIDE_SHARE * math.tan(site.limits.slopes(course, field, law.airspeed(tail, field))[1])
@@ -469,8 +471,8 @@ def _finals(site: _Site, strip: LandingStrip, course: float, point: Floats, law:
             steep, most = math.degrees(math.atan(flown)), math.degrees(math.atan(able))
             why = max(why, (-1e6, f"a glide of {steep:.1f}° is steeper than the {most:.1f}° that can be flown there"))
             continue
-        made = _Final(course, length, height, _line_up(site, point, course, length, height), point)
-        margin, blocked = _obstacle_to(site, made)
+        made = _Final(course, length, height, _line_up_points(site, point, course, length, height), point)
+        margin, blocked = _obstacle_on(site, made)
         if blocked:
             why = max(why, (margin, f"a final of {length:.0f} m at {math.degrees(slope):.1f}° {blocked}"))
         else:
@@ -478,19 +480,16 @@ def _finals(site: _Site, strip: LandingStrip, course: float, point: Floats, law:
     return found, f"on {round(math.degrees(course)) % 360}° {why[1]}"
 
 
-def _line_up(site: _Site, point: Floats, course: float, length: float, height: float) -> Floats:
+def _line_up_points(site: _Site, point: Floats, course: float, length: float, height: float) -> Floats:
     away = np.array([length + max(_MIN_LINE_UP_M, _LINE_UP_RADII * site.radius), length])
     east, north = point[0] - away * math.sin(course), point[1] - away * math.cos(course)
     return np.column_stack([east, north, np.full(2, point[2] + height)])
 
 
-def _obstacle_to(site: _Site, final: _Final) -> tuple[float, str]:
-    """Return the margin (m, negative if blocked) and description of an obstacle to a final.
-
-    "" if it is free.
-    """
+def _obstacle_on(site: _Site, final: _Final) -> tuple[float, str]:
+    """Return a final's margin to its obstacle, m, negative if blocked, and the obstacle's description, or ""."""
     begin, point = final.line_up[1], final.point
-    run, low = _profile(site.terrain, (float(begin[0]), float(begin[1])), final.course, final.length)
+    run, low = _ground_profile(site.terrain, (float(begin[0]), float(begin[1])), final.course, final.length)
     over = final.height * (1.0 - run / final.length)
     room = float(point[2]) + over - low - np.minimum(_MAX_GLIDE_CLEARANCE_M, _GLIDE_CLEARANCE_FRACTION * over)
     asked = room[run <= final.length - _GROUND_CONTACT_ZONE_M]
@@ -511,7 +510,7 @@ def _obstacle_to(site: _Site, final: _Final) -> tuple[float, str]:
 
 
 def _path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
-    """Return corners (n, 3) of the shortest path from the plan's end to a line-up; or None and the reason."""
+    """Return corners (n, 3) of the shortest path from the plan's end to a line-up, or None and the reason."""
     path, goal = site.plan.waypoints, float(final.line_up[0, 2])
     last, high = path[-1], float(path[-1, 2])
     asked = site.scenario.destination_course
@@ -535,7 +534,7 @@ def _path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
                 heights = _approach_altitudes(site, spots, share, high, goal)
                 if abs(heights[0] - high) > 1e-6 or abs(heights[-1] - goal) > 1e-6:
                     break
-                chain = np.concatenate([before, _points(spots, heights), final.line_up[1:], above[None]])
+                chain = np.concatenate([before, _chain(spots, heights), final.line_up[1:], above[None]])
                 found = site.certificate(chain, (last, last))
                 if found.ok and found.kill_distance > 0.0:
                     return chain[len(before) + 1 : len(before) + len(spots) - 1], ""
@@ -550,7 +549,7 @@ def _path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
 
 
 def _approach_altitudes(site: _Site, spots: list[Spot], share: float, high: float, goal: float) -> Floats:
-    """Return the altitudes (n,) m of a path between two altitudes, m AMSL, at a fraction of its slope limits."""
+    """Return the altitudes of a path between two altitudes at a fraction of its slope limits, (n,) m AMSL."""
     top = max(high, goal)
     climb, dive = (partial(_scaled_slope, site, share, side, top) for side in (0, 1))
     return fallen(spots, high, climb, dive, goal)
@@ -561,8 +560,8 @@ def _scaled_slope(site: _Site, share: float, side: int, amsl: float, course: flo
     return share * site.slopes(course, amsl)[side]
 
 
-def _go_around(site: _Site, final: _Final) -> float | None:
-    """Return the lowest height over home (m) of a go-around that returns to the line-up, or None without one.
+def _min_go_around_height(site: _Site, final: _Final) -> float | None:
+    """Return the minimum height above home of a go-around that returns to the line-up, m, or None if none does.
 
     It climbs straight ahead from the landing point at `SHARE` of the steepest climb, then flies back to the line-up.
     """
@@ -581,20 +580,20 @@ def _go_around(site: _Site, final: _Final) -> float | None:
         climb = site.slopes(final.course, top)[0]
         if climb <= 0.0:
             return None
-        run, low = _profile(
+        run, low = _ground_profile(
             site.terrain, (float(final.point[0]), float(final.point[1])), final.course, (top - field) / climb
         )
         room = (field + climb * run - low)[run > _LAUNCH_RUN_M]
         turned = np.array(
             [final.point[0] + run[-1] * math.sin(final.course), final.point[1] + run[-1] * math.cos(final.course), top]
         )
-        if (room >= 0.0).all() and _back_room(site, turned, target) >= _GO_AROUND_CLEARANCE_M:
+        if (room >= 0.0).all() and _return_clearance(site, turned, target) >= _GO_AROUND_CLEARANCE_M:
             return float(height)
     return None
 
 
-def _back_room(site: _Site, turned: Floats, target: Floats) -> float:
-    """Return the lowest height above ground from a go-around back to the line-up, m; -inf if not known."""
+def _return_clearance(site: _Site, turned: Floats, target: Floats) -> float:
+    """Return the minimum height above ground on the way from a go-around back to the line-up, m; -inf if unknown."""
     run = float(leg_runs(np.stack([turned, target]))[0])
     share = np.linspace(0.0, 1.0, max(2, math.ceil(run / _GROUND_SPACING_M)))
     east, north = (turned[k] + share * (target[k] - turned[k]) for k in range(2))

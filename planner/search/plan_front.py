@@ -101,7 +101,7 @@ class FrontPlan:
 
 @dataclass(frozen=True, slots=True)
 class Front:
-    """Plans of which none is better than another in every objective, the shortest first.
+    """Plans, the shortest first; no plan is better than another plan in every objective.
 
     Of any two plans at least one gains more than `noticed_amounts` over the other in some objective.
 
@@ -123,10 +123,10 @@ class Front:
 
     def objectives(self) -> Floats:
         """Return the objectives (n, 4) of the plans; smaller is better for all of them."""
-        return np.array([_row(one, self.fourth) for one in self.plans]).reshape(-1, 4)
+        return np.array([_objective_row(one, self.fourth) for one in self.plans]).reshape(-1, 4)
 
 
-def _row(one: FrontPlan, fourth: str) -> list[float]:
+def _objective_row(one: FrontPlan, fourth: str) -> list[float]:
     return [one.length, one.exposure, -one.clearance, one.time if fourth == "time" else one.energy]
 
 
@@ -174,7 +174,7 @@ def plan_front(
     size = max(ARCHIVE, KEPT * count)
     search = make_sampling(task, len(path), reference, size, stream(seed, PLANNER))
     evaluations = _search(task, search, path, progress, stop, generations)
-    chosen, refused = _certified(task, search, count, first, replace(default, evaluations=evaluations), finish)
+    chosen, refused = _certify_distinct(task, search, count, first, replace(default, evaluations=evaluations), finish)
     plans = tuple(sorted(chosen, key=lambda one: one.length))
     return Front(plans, count, task.fourth, first, reference, evaluations, refused)
 
@@ -203,9 +203,9 @@ class FrontTask(NamedTuple):
         return front_values(self.problem.search, self.energy, paths)
 
     def scores(self, paths: Floats) -> tuple[Floats, Floats]:
-        """Return objectives (n, 4), and violations (n, 5): four graded constraints and the exposure to missiles.
+        """Return objectives (n, 4), and violations (n, 5) of four graded constraints and of the exposure to missiles.
 
-        Objectives are infinite if a constraint is not met: they take most of the time, and are not needed then.
+        Objectives are infinite if a constraint is violated: they are not needed then, and take most of the time.
         """
         violations, graded = graded_scores(self.scored, paths)
         every = np.concatenate([violations, graded[:, Objective.KILL_EXPOSURE, None]], axis=1)
@@ -214,7 +214,7 @@ class FrontTask(NamedTuple):
         return out, every
 
     def objectives(self, values: Floats) -> Floats:
-        """Return the objectives (n, 4) of values (n, 5): length, exposure, negated clearance, and time or energy."""
+        """Convert values (n, 5) to the objectives length, exposure, negated clearance, and time or energy, (n, 4)."""
         fourth = Value.TIME if self.fourth == "time" else Value.ENERGY
         out = values[:, [Value.LENGTH, Value.EXPOSURE, Value.CLEARANCE, fourth]]
         out[:, 2] *= -1.0
@@ -254,7 +254,7 @@ def _with_margins(problem: Problem, share: float) -> ProblemArrays:
 
 
 def fitted_task(task: FrontTask, default: Floats) -> FrontTask:
-    """Return the task with margins that the default path (w, 3) keeps, so that others may pass equally narrow gaps."""
+    """Return the task with margins that the default path (w, 3) has, so that others may pass equally narrow gaps."""
     for share in MARGINS:
         task = task._replace(scored=_with_margins(task.problem, share))
         if (task.scores(default[None])[1] <= 0.0).all():
@@ -263,11 +263,11 @@ def fitted_task(task: FrontTask, default: Floats) -> FrontTask:
 
 
 def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
-    """Return the reference point of the hypervolume (4,), beyond which plans are ignored.
+    """Return the reference point of the hypervolume, beyond which plans are ignored, (4,).
 
-    1.5 times the default plan's length, exposure and time or energy, and the required clearance.
+    It is 1.5 times the default plan's length, exposure and time or energy, and the required clearance.
     """
-    length, exposure, _, fourth = _row(default, task.fourth)
+    length, exposure, _, fourth = _objective_row(default, task.fourth)
     most = max(LEAST_EXPOSURE, MOST_EXPOSURE * exposure)
     required = -task.problem.certified.clearance
     return np.array([MOST_LENGTH * length, most, required, MOST_LENGTH * fourth])
@@ -289,7 +289,7 @@ def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
     yield default
     count = len(default)
     routes = [default, *(resample(route, count) for route in _routes(task, default))]
-    for wanted in _preferences(task):
+    for wanted in _preferred_problems(task):
         for route in routes:
             path, _ = shorten_path(wanted, route)
             # Shorten again from equal legs, as for the default plan.
@@ -298,10 +298,7 @@ def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
 
 
 def _routes(task: FrontTask, default: Floats) -> list[Floats]:
-    """Return routes (k, 3) on other sides of the obstacles.
-
-    Empty if there are zones, which the routes ignore.
-    """
+    """Return routes (k, 3) on other sides of the obstacles, or no routes among zones, which routes ignore."""
     data, frame = task.problem.search, task.frame
     if is_limited(data.airspace):
         return []
@@ -311,8 +308,8 @@ def _routes(task: FrontTask, default: Floats) -> list[Floats]:
     return [frame.restore(route.points) for route in side_routes(data, frame, grid, bound, MAX_ROUTES)]
 
 
-def _preferences(task: FrontTask) -> Iterator[ProblemArrays]:
-    """Yield the problem with more required clearance, with radars to keep out of, and with another cost."""
+def _preferred_problems(task: FrontTask) -> Iterator[ProblemArrays]:
+    """Yield variants of the problem with a larger clearance, with radars as obstacles, and with another cost."""
     data, scenario = task.problem.search, task.problem.scenario
     at_ends = np.stack([[end, end] for end in (data.start, data.destination)])
     spare = max(0.0, float(task.values(at_ends)[:, Value.CLEARANCE].min()) - data.clearance)
@@ -375,7 +372,7 @@ def make_sampling(
 
 
 def directions(inner: int, scales: Floats) -> Floats:
-    """Return directions (k, 3 inner) of the noise: smooth modes of the whole path, and bumps of up to four waypoints.
+    """Return noise directions (k, 3 inner), smooth modes of the whole path and bumps of up to four waypoints.
 
     scales: (3,) largest deviations along, across and up.
     """
@@ -395,13 +392,13 @@ def directions(inner: int, scales: Floats) -> Floats:
 
 def noticed_amounts(default: FrontPlan, fourth: str) -> Floats:
     """Return the noticeable gains (4,) of the objectives relative to a default plan."""
-    length, exposure, _, last = _row(default, fourth)
+    length, exposure, _, last = _objective_row(default, fourth)
     least = NOTICED_EXPOSURE * max(LEAST_EXPOSURE, exposure)
     return np.array([NOTICED * length, least, NOTICED_CLEARANCE, NOTICED * last])
 
 
 def distinct_rows(objectives: Floats, amounts: Floats) -> list[int]:
-    """Return the rows of objectives (n, m), in order, that gain more than an amount (m,) over all rows taken before.
+    """Return the indices of objectives (n, m), in order, that gain more than an amount (m,) over all rows taken before.
 
     The additive epsilon-dominance of Laumanns, Thiele, Deb and Zitzler (Evolutionary Computation 10, 2002): a row is
     left out if a row taken before is worse by no more than the amounts in every objective.
@@ -416,7 +413,7 @@ def distinct_rows(objectives: Floats, amounts: Floats) -> list[int]:
     return taken
 
 
-def _certified(
+def _certify_distinct(
     task: FrontTask,
     search: FrontSampling,
     count: int,
@@ -436,20 +433,20 @@ def _certified(
         for row in order:
             if row not in found:
                 path = task.paths(search.vectors[row][None])[0]
-                found[row] = _with_values(task, finish(_plan(task, path, template)))
+                found[row] = _with_values(task, finish(_make_plan(task, path, template)))
         refused = [row for row in order if not found[row].plan.safe]
         chosen: list[FrontPlan] = []
         if not refused:
-            chosen = _distinct_undominated([*(found[row] for row in order), first], task.fourth, amounts)
+            chosen = _noticeable_undominated([*(found[row] for row in order), first], task.fourth, amounts)
             refused = [row for row in order if not any(one is found[row] for one in chosen)]
         if not refused:
             return chosen[:count], sum(not one.plan.safe for one in found.values())
         left = np.setdiff1d(left, refused)
 
 
-def _distinct_undominated(found: list[FrontPlan], fourth: str, amounts: Floats) -> list[FrontPlan]:
-    """Return the plans that are not dominated, by the values of their certificates, and have a noticeable gain."""
-    rows = np.array([_row(one, fourth) for one in found])
+def _noticeable_undominated(found: list[FrontPlan], fourth: str, amounts: Floats) -> list[FrontPlan]:
+    """Return the plans that are undominated by the values of their certificates, and have a noticeable gain."""
+    rows = np.array([_objective_row(one, fourth) for one in found])
     order = np.arange(len(rows))
     # Of equal plans the first is kept.
     less = (rows[:, None] < rows[None]).any(axis=2) | (order[:, None] < order)
@@ -458,7 +455,7 @@ def _distinct_undominated(found: list[FrontPlan], fourth: str, amounts: Floats) 
     return [found[k] for k in best[distinct_rows(rows[best], amounts)].tolist()]
 
 
-def _plan(task: FrontTask, path: Floats, template: Plan) -> Plan:
+def _make_plan(task: FrontTask, path: Floats, template: Plan) -> Plan:
     counts, objectives = paper_scores(task.problem.certified, path[None])
     return replace(
         template,

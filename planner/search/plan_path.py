@@ -105,7 +105,7 @@ def plan_path(
     ends = min(kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination))
     wanted = min(CERTIFIED_KILL_MARGIN, ends - 1e-6)
     search = Search(problem, chosen, encoding, stream(seed, PLANNER), progress, stop, first_safe, wanted, improved)
-    waypoints, certificate = search_cheapest(search, _attempts(search, previous), cost)
+    waypoints, certificate = search_cheapest(search, _search_repeatedly(search, previous), cost)
     counts, objectives = paper_scores(problem.certified, waypoints[None])
     return Plan(
         scenario=scenario,
@@ -121,15 +121,15 @@ def plan_path(
     )
 
 
-def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certificate]:
-    """Search, and search again with finer grids and more samples while the certificate fails."""
+def _search_repeatedly(search: Search, previous: Floats | None) -> tuple[Floats, Certificate]:
+    """Search, and repeat the search with finer grids and more samples while the certificate fails."""
     attempts = len(ATTEMPTS) if search.algorithm.seeded else 1
     if is_limited(search.problem.search.airspace):
         attempts = min(attempts, MAX_ATTEMPTS_AMONG_ZONES)
     best: tuple[Floats, Certificate] | None = None
     for number in range(attempts):
         if number > 0:
-            _retry(search, number)
+            _prepare_retry(search, number)
         try:
             _attempt(search, number, previous)
         except SearchEnded:
@@ -186,7 +186,7 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
             )
 
 
-def _retry(search: Search, number: int) -> None:
+def _prepare_retry(search: Search, number: int) -> None:
     """Increase the clearance buffer, pass missiles more closely, and re-evaluate the archive."""
     search.problem = with_narrow_margins(make_problem(search.problem.scenario, search.problem.limits, number))
     vectors = search.archive.vectors
@@ -228,7 +228,7 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
 
 
 def _finish(search: Search, last: Floats | None) -> None:
-    """Shorten or tighten the best path, and the result (d,) of the generations, if any."""
+    """Shorten or tighten the best path, and the result of the generations, if any, (d,)."""
     if search.shortens:
         if last is not None:
             search.shorten(search.encoding.decode(last[None])[0])

@@ -1,4 +1,4 @@
-"""Paths of few straight legs from one place and course to another: direct, by a few corners, and in laps.
+"""Construct paths of a few straight legs from one place and course to another, also with laps.
 
 The legs of a path must hold its turns, and the path must gain or lose a height.  `chains` lists horizontal candidates,
 `measure` computes their lengths and checks that the legs hold the turns, and `risen` and `fallen` give the altitudes of
@@ -46,24 +46,24 @@ MAX_LAPS = 8
 
 
 def chains(begin: Spot, course: float, end: Spot, end_course: float, radius: float, laps: int) -> Iterator[list[Spot]]:
-    """Yield corners between two places: none, or one near the beginning and one or two before the end.
+    """Yield lists of corners between two places, either empty or with one near the start and one or two before the end.
 
     course, end_course: course of the leg before the beginning, and of the leg after the end, rad.
     radius: radius of the tightest turn, m.  laps: number of laps before these corners.
     """
     heads: list[list[Spot]] = [[]]
     if laps:
-        heads = [_laps(begin, course, side * LAP_SIDE * radius, laps) for side in (1.0, -1.0)]
-    befores = [_moved(end, end_course, -share * radius) for share in _LAST_LEG_RADII]
+        heads = [_lap_corners(begin, course, side * LAP_SIDE * radius, laps) for side in (1.0, -1.0)]
+    befores = [_move(end, end_course, -share * radius) for share in _LAST_LEG_RADII]
     tails: list[list[Spot]] = [[], *([before] for before in befores)]
     bases = [
-        [_moved(before, end_course + turn, share * radius), before]
+        [_move(before, end_course + turn, share * radius), before]
         for before in befores[1:3]
         for turn in _BASE_LEG_TURNS_RAD
         for share in _BASE_LEG_RADII
     ]
     firsts = [
-        [_moved(begin, 2.0 * math.pi * k / _FIRST_DIRECTION_COUNT, share * radius)]
+        [_move(begin, 2.0 * math.pi * k / _FIRST_DIRECTION_COUNT, share * radius)]
         for share in _FIRST_LEG_RADII
         for k in range(_FIRST_DIRECTION_COUNT)
     ]
@@ -78,19 +78,16 @@ def chains(begin: Spot, course: float, end: Spot, end_course: float, radius: flo
                 yield [*head, *first, *tail]
 
 
-def _laps(begin: Spot, course: float, side: float, laps: int) -> list[Spot]:
-    """Return the corners of square laps that leave a place on its course and return to it.
-
-    To the left if side < 0.
-    """
+def _lap_corners(begin: Spot, course: float, side: float, laps: int) -> list[Spot]:
+    """Return the corners of square laps that begin and end at a place on its course; left-hand if side < 0."""
     across = course + math.copysign(0.5 * math.pi, side)
-    ahead = _moved(begin, course, abs(side))
-    corner = _moved(ahead, across, abs(side))
-    back = _moved(begin, across, abs(side))
+    ahead = _move(begin, course, abs(side))
+    corner = _move(ahead, across, abs(side))
+    back = _move(begin, across, abs(side))
     return [ahead, corner, back, begin] * laps
 
 
-def _moved(spot: Spot, course: float, run: float) -> Spot:
+def _move(spot: Spot, course: float, run: float) -> Spot:
     return spot[0] + run * math.sin(course), spot[1] + run * math.cos(course)
 
 
@@ -112,7 +109,7 @@ class TurnLengths(NamedTuple):
 
 
 def arc_lengths(radius: float) -> TurnLengths:
-    """Return the turn lengths of arcs of a radius (m): the lengths of their tangents.
+    """Return the turn lengths of arcs of the given radius (m), which are the lengths of their tangents.
 
     >>> [round(length) for length in arc_lengths(150.0).of(math.radians(90.0))]
     [150, 150]
@@ -125,7 +122,8 @@ class Measured(NamedTuple):
     """Horizontal measures of a path.
 
     length: m.  cost: length plus a cost of sharp turns, as their arcs are shorter, and so steeper, than the legs.
-    sharpest: sharpest turn, rad.  fullest: largest fraction of a leg that its turns take.
+    sharpest: sharpest turn, rad.
+    fullest: largest fraction of a leg that its turns take up.
     """
 
     length: float
@@ -135,12 +133,12 @@ class Measured(NamedTuple):
 
     @property
     def fits(self) -> bool:
-        """True if no turn is too sharp, and each leg holds the turns at its ends."""
+        """True if no turn is too sharp, and each leg is long enough for the turns at its ends."""
         return self.sharpest <= SHARPEST and self.fullest <= TURN_SHARE
 
 
 def measure(spots: Sequence[Spot], turning: TurnLengths) -> Measured:
-    """Measure a path, in plain numbers for speed, as there are tens of thousands of paths.
+    """Measure a path with plain numbers, because it is called for tens of thousands of paths.
 
     >>> measure([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(150.0)).fits
     True
@@ -164,10 +162,11 @@ def measure(spots: Sequence[Spot], turning: TurnLengths) -> Measured:
 
 
 def risen(spots: Sequence[Spot], low: float, climb: Slope, floor: float, end: float) -> Floats:
-    """Return altitudes (n,) m at n places of a path that climbs as steeply as allowed.
+    """Return the altitudes at n places of a path that climbs as steeply as allowed, (n,) m.
 
-    low: altitude at the first place.  floor: lowest altitude except at the end.  end: final altitude, which is not
-    exceeded, m; the last altitude is lower if the path is too short.
+    low: altitude at the first place, m.
+    floor: minimum altitude except at the end, m.
+    end: final altitude, which is not exceeded, m; the last altitude is lower if the path is too short.
 
     >>> risen([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 0.0, lambda course: 0.1, 20.0, 100.0).tolist()
     [20.0, 50.0, 100.0]
@@ -181,7 +180,7 @@ def risen(spots: Sequence[Spot], low: float, climb: Slope, floor: float, end: fl
 
 
 def fallen(spots: Sequence[Spot], high: float, climb: Slope, dive: Slope, end: float) -> Floats:
-    """Return altitudes (n,) m at n places of a path between two altitudes that descends late, or climbs early.
+    """Return the altitudes at n places of a path between two altitudes that descends late or climbs early, (n,) m.
 
     The first or the last altitude differs from the requested one if the path is too short.
 

@@ -40,9 +40,8 @@ def replan(
     stop: StopCondition | None = None,
     settle: Settle | None = None,
 ) -> Plan:
-    """Plan again from the waypoint at which leg `leg` of an old plan begins.
+    """Plan again from the waypoint at which leg `leg` of an old plan begins, and keep the flown legs before it.
 
-    The flown legs before it are kept.
     scenario: includes the threats known now (`world.scenario.with_threats`). The turn at that waypoint is measured from
     the course of the last flown leg. The search starts from the rest of the old plan, in addition to its grid routes.
     The certificate applies to the path ahead; violations and objectives to the whole path in this scenario.
@@ -117,7 +116,7 @@ def same_mission(scenario: Scenario, old: Plan) -> None:
 
 
 def _check_first_waypoint(scenario: Scenario, old: Plan, leg: int) -> None:
-    """Raise MissionError if the new plan would begin within a missile's kill radius or violate a zone there."""
+    """Raise MissionError if the new plan would begin within a missile's kill radius, or where it violates a zone."""
     threats = scenario.threats
     inside = threats.kill_radius - np.sqrt(((threats.position - old.waypoints[leg]) ** 2).sum(axis=1))
     unit = int(np.argmax(np.where(threats.kill_radius > 0.0, inside, -math.inf))) if len(inside) else -1

@@ -1,4 +1,4 @@
-"""Search for the path of least time or energy, if a scenario requires that instead of the shortest path.
+"""Search for the path with the minimum time or energy, if a scenario requires it instead of the shortest path.
 
 The search for the shortest path comes first, with its certificate. From that path, from the straight line and from
 routes on other sides of the obstacles, all waypoints then move at once so that the path costs less under the same
@@ -65,35 +65,35 @@ def wanted_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelC
 
 
 def search_cheapest(search: Search, found: _Found, cost: TravelCost) -> _Found:
-    """Return the cheapest path and its certificate; the shortest path if no equally safe path costs less."""
+    """Return the cheapest path and its certificate, or the shortest path if no equally safe path costs less."""
     by_length = cost.time == 0.0 and cost.energy == 0.0
     if by_length or not search.finished(found[1]):
         return found
     data = search.problem.search._replace(travel=cost)
     cheapest = found
     with suppress(SearchEnded):
-        for start in _starts(search, found[0]):
+        for start in _start_paths(search, found[0]):
             if search.must_end():
                 return cheapest
-            cheapest = _cheaper(search, data, start, cheapest)
+            cheapest = _choose_cheaper(search, data, start, cheapest)
     for _ in range(MAX_REPEATS):
-        before = _cost(data, cheapest[0])
+        before = _cost_or_inf(data, cheapest[0])
         for start in (resample(cheapest[0], len(cheapest[0])), cheapest[0]):
             if search.must_end():
                 return cheapest
-            cheapest = _cheaper(search, data, start, cheapest)
-        if _cost(data, cheapest[0]) > (1.0 - MIN_GAIN) * before:
+            cheapest = _choose_cheaper(search, data, start, cheapest)
+        if _cost_or_inf(data, cheapest[0]) > (1.0 - MIN_GAIN) * before:
             break
     return cheapest
 
 
-def _cost(data: ProblemArrays, path: Floats) -> float:
+def _cost_or_inf(data: ProblemArrays, path: Floats) -> float:
     """Return the cost of a path (w, 3), m; inf if a leg cannot be held against the wind."""
     return float(path_cost(data.travel, data.aircraft, np.array(path, dtype=np.float64)))
 
 
-def _starts(search: Search, shortest: Floats) -> Iterator[Floats]:
-    """Yield paths (w, 3) to start from: the shortest, also with equal legs, the straight line, and other routes.
+def _start_paths(search: Search, shortest: Floats) -> Iterator[Floats]:
+    """Yield start paths (w, 3): the shortest, also with equal legs, the straight line, and other routes.
 
     Raises SearchEnded if the search is asked to stop.
     """
@@ -112,7 +112,7 @@ def _starts(search: Search, shortest: Floats) -> Iterator[Floats]:
             yield resample(frame.restore(route.points), count)
 
 
-def _cheaper(search: Search, data: ProblemArrays, start: Floats, best: _Found) -> _Found:
+def _choose_cheaper(search: Search, data: ProblemArrays, start: Floats, best: _Found) -> _Found:
     """Return the cheaper of the best path and the result of shortening a start (w, 3)."""
     path = start
     for extra_margin, angle in EXTRA_MARGINS:
@@ -122,13 +122,13 @@ def _cheaper(search: Search, data: ProblemArrays, start: Floats, best: _Found) -
         except SearchEnded:
             return best
         search.evaluations += made
-        limit = _cost(data, best[0])
-        if not _cost(data, path) < limit:
+        limit = _cost_or_inf(data, best[0])
+        if not _cost_or_inf(data, path) < limit:
             return best
         for share in SHARES if is_limited(data.airspace) else SHARES[:1]:
             part = np.ascontiguousarray(best[0] + share * (path - best[0]))
             certificate = certify(search.problem, part)
-            if search.finished(certificate) and _cost(data, part) < limit:
+            if search.finished(certificate) and _cost_or_inf(data, part) < limit:
                 if search.improved is not None:
                     search.improved(part)
                 return part, certificate

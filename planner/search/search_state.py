@@ -1,4 +1,4 @@
-"""State of a search: scores, the archive of the best paths, the evaluation budget, and stopping.
+"""Hold the state of a search, with its scores, archive of the best paths, evaluation budget and stop condition.
 
 `Search` is the interface that seeding and generations share. It scores paths, keeps the best in an `Archive`, counts
 evaluations against the budget, applies local searches, and decides when the search is finished.
@@ -53,12 +53,12 @@ def no_scores() -> Floats:
 
 
 def violated(scores: Floats) -> Flags:
-    """Return True for scores (..., 8) of paths that violate a constraint, (...,)."""
+    """Flag the scores (..., 8) of paths that violate a constraint, (...,)."""
     return np.asarray(scores[..., : len(Violation)].any(axis=-1))
 
 
 def safe(scores: Floats) -> Flags:
-    """Return True for scores (..., 8) of paths without violations and without exposure to missiles, (...,)."""
+    """Flag the scores (..., 8) of paths without violations and without exposure to missiles, (...,)."""
     return np.asarray(~violated(scores) & ~(scores[..., KILL] > 0.0))
 
 
@@ -95,14 +95,14 @@ CERTIFICATES_AT_ONCE = 4
 
 
 def with_narrow_margins(problem: Problem) -> Problem:
-    """Return a problem whose search passes missiles more closely: with little more than the certificate's margin."""
+    """Return a problem whose search passes missiles with little more than the certificate's margin."""
     data = problem.search
     margin = data.tracking.across + CERTIFIED_KILL_MARGIN + NARROW_RESERVE
     return replace(problem, search=data._replace(kill_margin=min(data.kill_margin, margin)))
 
 
 class SearchEnded(Exception):
-    """Raised within a search that is asked to stop; its archive contains the results."""
+    """Raised within a search when it is asked to stop; the search's archive contains the results."""
 
 
 @dataclass(slots=True)
@@ -117,9 +117,10 @@ class Archive:
         return len(self.scores) > 0 and not violated(self.scores[0])
 
     def take(self, vectors: Floats, scores: Floats) -> None:
-        """Insert new rows; of rows of equal rank the older stay first.
+        """Insert new rows in rank order; among equals, older rows stay first.
 
-        Once any row is feasible, infeasible rows are dropped, as there can be thousands of them to rank.
+        Once any row is feasible, infeasible rows are dropped, because there can be thousands of them to rank. A full
+        archive accepts only rows better than its last.
         """
         fit = ~violated(scores)
         if self.feasible():
@@ -132,9 +133,9 @@ class Archive:
         elif fit.any():
             self.vectors, self.scores = self.vectors[:0], self.scores[:0]
         every = np.concatenate([self.scores, scores[fit] if fit.any() else scores])
-        joined = np.concatenate([self.vectors, vectors[fit] if fit.any() else vectors])
+        all_vectors = np.concatenate([self.vectors, vectors[fit] if fit.any() else vectors])
         order = best_first(every)[:ARCHIVE_SIZE]
-        self.vectors, self.scores = joined[order], every[order]
+        self.vectors, self.scores = all_vectors[order], every[order]
 
 
 @dataclass(slots=True)
@@ -208,7 +209,7 @@ class Search:
             scores = np.concatenate([scores, self.score(vectors[first : first + at_once])])
             if len(scores) < len(vectors) and self.asked_to_end():
                 break
-        self._take(vectors[: len(scores)], scores)
+        self._archive_and_count(vectors[: len(scores)], scores)
         if len(scores) < len(vectors):
             raise SearchEnded
         return scores
@@ -216,8 +217,8 @@ class Search:
     def pause(self) -> None:
         """Raise SearchEnded if the search is asked to stop.
 
-        A search of whole paths without a result continues for some pauses, until its first route. If it has no route
-        by then, the straight line is its result.
+        A search of whole paths that has no result yet continues for some pauses, until it finds its first route. If it
+        finds no route within those pauses, the straight line is its result.
         """
         if not self.asked_to_end():
             return
@@ -242,7 +243,7 @@ class Search:
         self.ended = reason or self.ended
         return bool(reason)
 
-    def _take(self, vectors: Floats, scores: Floats) -> None:
+    def _archive_and_count(self, vectors: Floats, scores: Floats) -> None:
         """Add evaluated vectors to the number of evaluations and to the archive."""
         self.evaluations += len(vectors)
         before = self.archive.vectors[:1]
@@ -256,7 +257,7 @@ class Search:
 
     def improve(self, vector: Floats, max_evaluations: int) -> Floats:
         """Improve a vector (d,) by a pattern search, archive the result, and return the best scores (8,)."""
-        left = min(max_evaluations, self._budget() - self.evaluations)
+        left = min(max_evaluations, self._evaluation_budget() - self.evaluations)
         if left < 2:
             return np.asarray(self.evaluate(vector[None])[0])
         found, made = search_patterns(self.problem.search, self.encoding, vector, int(left), self.asked_to_end)
@@ -267,7 +268,7 @@ class Search:
 
     def tighten(self, vector: Floats, rounds: int, scale: float, max_evaluations: int) -> Floats:
         """Move all waypoints of a vector (d,) at once, then `improve` it, and return the best scores (8,)."""
-        if self._budget() - self.evaluations < TIGHTENING_EVALUATIONS:
+        if self._evaluation_budget() - self.evaluations < TIGHTENING_EVALUATIONS:
             return self.improve(vector, max_evaluations)
         moved, made = tighten(self.problem.search, self.encoding, vector, rounds, scale)
         self.evaluations += made
@@ -275,7 +276,7 @@ class Search:
 
     @property
     def shortens(self) -> bool:
-        """True if paths are shortened free of their intervals; False among zones, which shortening ignores."""
+        """True if shortening may move waypoints out of their intervals; False among zones, which shortening ignores."""
         return self.algorithm.tightened and not is_limited(self.problem.search.airspace)
 
     def shorten(self, path: Floats) -> bool:
@@ -288,9 +289,9 @@ class Search:
         first, certificate = path, None
         for extra_margin, corners_too, angle in attempts:
             path = first if corners_too else path
-            if angle > 0.0 and not (certificate and self._fails_by_slopes(certificate)):
+            if angle > 0.0 and not (certificate and self._violates_only_slopes(certificate)):
                 return False
-            if self._budget() - self.evaluations < MAX_MODELS:
+            if self._evaluation_budget() - self.evaluations < MAX_MODELS:
                 self.budget_exhausted = True
                 return False
             # Keep the same problem if possible: a new one must be laid out in memory for kernels again.
@@ -311,15 +312,15 @@ class Search:
                 return False
         return False
 
-    def _fails_by_slopes(self, certificate: Certificate) -> bool:
-        """Return True if a path violates only the slope limits."""
+    def _violates_only_slopes(self, certificate: Certificate) -> bool:
+        """Return True if a path violates the slope limits and nothing else."""
         others = certificate.turn, certificate.clearance, certificate.bounds, certificate.zone_distance
         keeps_off = certificate.kill_distance >= self.required_distance and certificate.headroom >= 0.0
         return certificate.slope < self.problem.certified.angle_margin and keeps_off and min(others) >= 0.0
 
     def must_end(self) -> bool:
         """Return True if the search must end now: stopped, or out of budget."""
-        if self.budget_exhausted or self.evaluations >= self._budget():
+        if self.budget_exhausted or self.evaluations >= self._evaluation_budget():
             self.ended = "budget"
         elif self.stop is not None:
             self.ended = self.stop() or "completed"
@@ -354,7 +355,7 @@ class Search:
         """Return True if this certificate meets the goal of the search."""
         return certificate.ok and certificate.kill_distance >= self.required_distance
 
-    def _budget(self) -> float:
+    def _evaluation_budget(self) -> float:
         budget = self.problem.scenario.planner.budget
         return math.inf if budget is None else budget
 
@@ -368,7 +369,7 @@ class Search:
         self.history.append(row)
 
     def report(self, left: int) -> None:
-        """Report progress; left: number of generations that may follow."""
+        """Report progress, with `left` as the number of generations that may follow."""
         if self.progress is not None:
             best = self.archive.scores[0]
             remark = f"length ratio {self.length_ratio():.4f}, kill exposure {best[KILL]:.3g}"
@@ -415,7 +416,7 @@ class Search:
         return self.shortest
 
     def _certificate(self, vector: Floats, path: Floats) -> Certificate:
-        """Return the certificate of a vector's path from a cache: it is the same in all attempts."""
+        """Return the certificate of a vector's path from a cache, because it is the same in all attempts."""
         key = vector.tobytes()
         known = self.certificates.get(key)
         if known is None:

@@ -47,7 +47,7 @@ MAX_FOLLOWED_AGAIN = 3
 
 
 def straight_line(search: Search) -> bool:
-    """Return True if the straight line is a safe path: no path is shorter, and the search is finished."""
+    """Return True if the straight line is a safe path, so that no shorter path exists and the search is finished."""
     if search.encoding.name != "rotated":
         return False
     vectors = search.straight_vectors()
@@ -61,7 +61,7 @@ def straight_line(search: Search) -> bool:
 def starting_vectors(
     search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None, *, again: bool = False
 ) -> Floats:
-    """Return start vectors (n, d) of a search: the seed that is best after improvement, and the previous path.
+    """Return the start vectors of a search, the seed that is best after improvement and the previous path, (n, d).
 
     The marginals of several routes at once describe none of them, so only one seed is used. It is used in its form
     before the improvement: afterwards it is so close to every limit that hardly any sample around it is feasible.
@@ -219,7 +219,7 @@ def _try_ceiling(search: Search) -> list[Floats]:
 
 
 def _try_narrow_margins(search: Search, paths: list[Floats]) -> None:
-    """Shorten paths (w, 3), of which none is safe with the usual margins, with narrow margins."""
+    """Shorten paths (w, 3) with narrow margins, because no path is safe with the usual margins."""
     usual = search.problem
     search.problem = with_narrow_margins(usual)
     try:
@@ -233,7 +233,7 @@ def _try_narrow_margins(search: Search, paths: list[Floats]) -> None:
 
 
 def shorten_best(search: Search) -> None:
-    """Shorten the archive's best path, then the shortest path from equidistant waypoints as long as that gains."""
+    """Shorten the archive's best path; then space its waypoints equally and shorten it again, while that helps."""
     search.shorten(search.encoding.decode(search.archive.vectors[:1])[0])
     for _ in range(MAX_REPEATS):
         if search.shortest is None or search.must_end():
@@ -277,10 +277,7 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
 
 
 def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """Search a path (w, 3) along a route that may turn back.
-
-    Return it with its certificate if better than `found`.
-    """
+    """Search for a path along a route that may turn back; return the better of it and `found`, with certificate."""
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
     lattices, left = [make_lattice(data, frame, share * step) for share in STEPS], MAX_EXPANDED
@@ -307,7 +304,7 @@ def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tu
 
 
 def _follow_shortened(search: Search, found: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """Return the best path along the shortened form of a path, if shorter: shortening alone violates a constraint."""
+    """Return the best path along the shortened, unsafe form of `found` if it is shorter; otherwise return `found`."""
     if not search.shortens:
         return found
     for extra_margin in FOLLOWED_MARGINS:
@@ -348,7 +345,7 @@ def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate, b
 
 
 def _improve_along(inner: Search, vector: Floats, routes: tuple[Floats, ...]) -> None:
-    """Improve the path of a vector (d,), then shorten it and the given routes (k, 3), which may end better."""
+    """Improve the path of a vector (d,), then shorten the path and the routes (k, 3), which may be better."""
     inner.evaluate(vector[None])
     for _ in range(FIRST_SEARCHES):
         if inner.must_end() or inner.first_safe_found():
@@ -365,7 +362,7 @@ def _improve_along(inner: Search, vector: Floats, routes: tuple[Floats, ...]) ->
 
 
 def _candidate_points(route: Floats, encoding: Encoding) -> Floats:
-    """Return candidate points (w - 2, k, 3) on a route (k, 3) for each waypoint in its frame, within its piece."""
+    """Return candidate points for each waypoint in its frame, on its piece of a route (k, 3), (w - 2, k, 3)."""
     count = encoding.waypoints - 2
     dense, _ = sample_route(route, count * (CLOSE_FIT.candidates + 1) + 1)
     rows = np.arange(count)[:, None] * (CLOSE_FIT.candidates + 1) + 1 + np.arange(CLOSE_FIT.candidates)

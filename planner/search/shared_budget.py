@@ -12,7 +12,7 @@ Search = Callable[[Scenario, Limits], Plan]
 
 
 class SharedBudget:
-    """Search that may be repeated for the same plan, in another scenario or within other limits.
+    """A search that may be repeated for the same plan, in another scenario or within other limits.
 
     Each search has the rest of the scenario's budget of evaluations. If less than a population is left, no search is
     made.
@@ -24,7 +24,7 @@ class SharedBudget:
         self._ended = "completed"
 
     def __call__(self, scenario: Scenario, limits: Limits) -> Plan:
-        """Return the plan of a new search, or of the last search if the budget allows no other one."""
+        """Return the plan of a new search, or of the last search if the budget does not allow another search."""
         table = scenario.planner
         if table.budget is None:
             return self._keep(self._search(scenario, limits))

@@ -1,4 +1,4 @@
-"""Cheapest routes over grids among zones and below a maximum height above ground, in the rotated frame.
+"""Find cheapest routes over grids among zones and below a maximum height above ground, in the rotated frame.
 
 Dynamic programming over forward steps as in `planner.seeding.grids`, with two differences. Where there is a maximum
 height above ground, the layers follow the terrain. And each step is tested against the zones itself, because an
@@ -65,7 +65,7 @@ class _Passage(NamedTuple):
 
 
 @inner
-def _column(
+def _fill_column(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, along: float, across: float, column: Record
 ) -> None:
     """Fill the `COLUMN` record of a grid position."""
@@ -90,10 +90,10 @@ def _column(
 
 
 @inner
-def _passage(zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float) -> _Passage:
-    """Return heights that zones close to a horizontal step.
+def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float) -> _Passage:
+    """Return the heights that zones close to a horizontal step.
 
-    Lateral: lateral tracking error added to their margins, m.
+    lateral: tracking error to add to the zones' margins, m.
     """
     low, high = math.inf, -math.inf
     for z in range(zones.inclusions):
@@ -119,8 +119,8 @@ def _passage(zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: 
 
 
 @inner
-def _slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, share: float) -> Floats:
-    """Return tangents (sideways, 2) of this share of the steepest climb and dive of each step at a height (m)."""
+def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, share: float) -> Floats:
+    """Return the tangents of a fraction of the climb and dive limits of each step at a height (m), (sideways, 2)."""
     out, a, b = np.zeros((2 * SIDEWAYS + 1, 2)), np.zeros(3), np.zeros(3)
     a[0], a[1] = frame.east, frame.north
     a[2], b[2] = amsl, amsl
@@ -142,7 +142,7 @@ def _set_cell_costs(
     high: int,
     price: Floats,
 ) -> None:
-    """Fill the cost per m of a stage's cells (low..high, layers); inf if a path is not allowed."""
+    """Fill the cost per m of a stage's cells (low..high, layers), inf for a cell that no path may enter."""
     near, aside2 = np.empty(obstacles.shape[0], dtype=np.int64), np.empty(obstacles.shape[0])
     for y in range(low, high + 1):
         column, count = columns[y], 0
@@ -183,7 +183,7 @@ def _relax_stage(
     parents_before: Codes,
     parents: Codes,
 ) -> None:
-    """Relax one stage: costs (across, layers) before and after it, and the parent cell (across x layers) of each.
+    """Relax one stage, from the costs before it to the costs after it, (across, layers) each, and store parent cells.
 
     before, columns: `COLUMN` records (across,) of the previous stage and of this one. parents_before: parents of the
     previous stage. Changes of course are counted along the cheapest route to a cell only, so the result is not exactly
@@ -193,7 +193,7 @@ def _relax_stage(
     # No tracking error at a fixed end.
     lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)
     turn_cost, share = (TURN_COST * step, SLOPE_SHARE) if grid.gentle else (0.0, 1.0)
-    slopes = _slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]), share)
+    slopes = _step_slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]), share)
     for y in range(wide):
         if not np.isfinite(cost[y]).any():
             continue
@@ -208,7 +208,9 @@ def _relax_stage(
             to_east, to_north = position_of(frame, stage * step, grid.across[to])
             closed = _Passage(math.inf, -math.inf)
             if zones.required.shape[0] > 0:
-                closed = _passage(zones, segment_between(east, north, to_east, to_north), lateral, before[y].ground)
+                closed = _closed_heights(
+                    zones, segment_between(east, north, to_east, to_north), lateral, before[y].ground
+                )
             climb, dive = slopes[side + SIDEWAYS, 0] * run, slopes[side + SIDEWAYS, 1] * run
             for z in range(grid.layers):
                 if cost[y, z] == math.inf:
@@ -232,7 +234,7 @@ def _relax_stage(
 
 
 class AirspaceSearch(NamedTuple):
-    """A search for the cheapest route over a grid, as far as it has come.
+    """A search for the cheapest route over a grid, which can be continued.
 
     obstacles: `OBSTACLE` records. columns: `COLUMN` records (stages + 1, across). cells: (stages + 1, across, layers),
     the parent of each cell, as across x layers. cost, after, price: (across, layers) of the last stage reached, and
@@ -263,7 +265,7 @@ def cheapest_airspace_route(
 ) -> tuple[Floats, float]:
     """Return points (stages + 1, 3) along, across, up of the cheapest route over a grid, and its cost.
 
-    Else (0, 3) and inf.
+    Return (0, 3) points and inf if no route is found.
     extra: (stages + 1, across) added to the cost per m. bound: upper limit on the cost. pause: called after every
     `CELLS_AT_ONCE` cells; an exception raised there stops the search.
     """
@@ -278,14 +280,14 @@ def cheapest_airspace_route(
 
 @compiled
 def begin_airspace_route(data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid) -> AirspaceSearch:
-    """Return a search that is at the start."""
+    """Return a new search at the start."""
     stages, wide, step = grid.stages, grid.across.size, frame.length / grid.stages
     home = int(np.argmin(np.abs(grid.across)))
     columns = np.zeros((stages + 1, wide), dtype=COLUMN)
     for y in range(wide):
-        _column(data, frame, grid, 0.0, grid.across[y], columns[0, y])
+        _fill_column(data, frame, grid, 0.0, grid.across[y], columns[0, y])
     cost = np.full((wide, grid.layers), math.inf)
-    cost[home, _layer(grid, columns[0, home], data.start[2])] = 0.0
+    cost[home, _nearest_layer(grid, columns[0, home], data.start[2])] = 0.0
     return AirspaceSearch(
         find_obstacles(data, frame, step),
         columns,
@@ -308,7 +310,7 @@ def continue_airspace_route(
     search: AirspaceSearch,
     more: int,
 ) -> AirspaceSearch:
-    """Return the search after up to `more` further stages, or at the last one if no route comes further."""
+    """Continue a search by up to `more` stages, or until no route leads on, and return it."""
     stages, wide, step = grid.stages, grid.across.size, frame.length / grid.stages
     obstacles, columns, cells, cost, after, price, home, reached = search
     last_stage, ahead = min(stages, reached + more), np.empty(wide)
@@ -323,10 +325,10 @@ def continue_airspace_route(
             break
         low, high = max(0, low - SIDEWAYS), min(wide - 1, high + SIDEWAYS)
         for y in range(low, high + 1):
-            _column(data, frame, grid, along, grid.across[y], columns[stage, y])
+            _fill_column(data, frame, grid, along, grid.across[y], columns[stage, y])
         _set_cell_costs(grid, columns[stage], obstacles, along, extra[stage], low, high, price)
         if stage == stages:
-            price[home, _layer(grid, columns[stage, home], data.destination[2])] = 1.0
+            price[home, _nearest_layer(grid, columns[stage, home], data.destination[2])] = 1.0
         after[:] = math.inf
         _relax_stage(
             data,
@@ -354,9 +356,9 @@ def continue_airspace_route(
 def end_airspace_route(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, search: AirspaceSearch
 ) -> tuple[Floats, float]:
-    """Return points (stages + 1, 3) of the route found, and its cost; (0, 3) and inf if there is none."""
+    """Return points (stages + 1, 3) of the route found, and its cost, or (0, 3) points and inf."""
     stages, step, columns, y = grid.stages, frame.length / grid.stages, search.columns, search.home
-    z = _layer(grid, columns[stages, y], data.destination[2])
+    z = _nearest_layer(grid, columns[stages, y], data.destination[2])
     total = search.cost[y, z]
     if total == math.inf:
         return np.empty((0, 3)), math.inf
@@ -371,7 +373,7 @@ def end_airspace_route(
 
 
 @inner
-def _layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:
+def _nearest_layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:
     """Return the index of the layer nearest to a height, m."""
     first = column.lowest if grid.follows else grid.floor
     return min(grid.layers - 1, max(0, round((amsl - first) / grid.pitch)))
@@ -395,7 +397,7 @@ MAX_CELLS = 1_200_000
 
 
 def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> AirspaceGrid:
-    """Return a grid with this many stages, or fewer where it would become too large.
+    """Return a grid with this many stages, or with fewer if the grid would be too large.
 
     span: limits across, m.
     """
@@ -436,7 +438,7 @@ def airspace_routes(
 
     Routes of gentle grids are easier to fly. The first grid is also searched without that restriction, because narrow
     gaps can require steep or curved routes. pause: as in `cheapest_airspace_route`.
-    finer_only: True to leave out grids that `MAX_CELLS` makes no finer than one before.
+    finer_only: True to leave out grids that `MAX_CELLS` makes no finer than an earlier grid.
     """
     expected, finest = EXPECTED * math.dist(data.start, data.destination), 0
     for number, (stages, each) in enumerate(grids):
@@ -445,12 +447,12 @@ def airspace_routes(
             continue
         finest = max(finest, grid.stages)
         if number == 0:
-            route = _route(data, frame, grid._replace(gentle=False), (), expected, pause)
+            route = _find_route(data, frame, grid._replace(gentle=False), (), expected, pause)
             if route is not None:
                 yield route
         used: tuple[GridRoute, ...] = ()
         for _ in range(each):
-            route = _route(data, frame, grid, used, math.inf if used else FINER_COST * expected, pause)
+            route = _find_route(data, frame, grid, used, math.inf if used else FINER_COST * expected, pause)
             if route is None:
                 break
             expected = expected if used else route.cost
@@ -458,7 +460,7 @@ def airspace_routes(
             yield route
 
 
-def _route(
+def _find_route(
     data: ProblemArrays,
     frame: RotatedFrame,
     grid: AirspaceGrid,
@@ -466,7 +468,10 @@ def _route(
     expected: float,
     pause: Callable[[], None],
 ) -> GridRoute | None:
-    """Return the cheapest route over a grid away from used ones, or None. expected: first bound to try."""
+    """Return the cheapest route over a grid away from used routes, or None.
+
+    expected: first bound to try.
+    """
     extra = proximity_cost(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, used)
     for bound in (expected, math.inf):
         points, cost = cheapest_airspace_route(data, frame, grid, extra, bound, pause)

@@ -1,4 +1,4 @@
-"""First samples and the smooth basis of the rotated encoding.
+"""Draw first samples, and make the smooth basis of the rotated encoding.
 
 Neighbouring waypoints pass an obstacle on the same side. Independent marginal distributions of each coordinate lose
 this dependence; independent marginals along the eigenvectors of the Brownian-bridge kernel, which is fixed at both
@@ -31,7 +31,7 @@ def bridge_modes(inner: int) -> tuple[Floats, Floats]:
 
 
 def bridge_basis(inner: int) -> Floats:
-    """Orthogonal basis (3 inner, 3 inner): bridge modes for across and up, unit vectors for along."""
+    """Return an orthogonal basis (3 inner, 3 inner) of bridge modes across and up, and unit vectors along."""
     modes, _ = bridge_modes(inner)
     basis = np.zeros((3 * inner, 3 * inner))
     basis[0::3, 0::3] = np.eye(inner)
@@ -43,10 +43,9 @@ def bridge_basis(inner: int) -> Floats:
 def first_samples(
     space: Space, encoding: Encoding, population: int, starts: Floats, rng: np.random.Generator
 ) -> Floats:
-    """Return the first population (n, d): the starts and smooth paths around them.
+    """Return the first population (n, d), which consists of the starts and of smooth paths around them.
 
-    Without starts, around the straight line.
-    starts: vectors (s, d) to start from.
+    starts: vectors (s, d) to start from; without starts, the paths are drawn around the straight line.
     """
     inner = encoding.waypoints - 2
     modes, deviations = bridge_modes(inner)

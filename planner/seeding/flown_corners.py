@@ -1,4 +1,4 @@
-"""Heights and slopes of flown corners, with derivatives by the waypoints, as constraints of shortening.
+"""Constrain the heights and slopes of flown corners in shortening, with derivatives by the waypoints.
 
 Round the end of a ridge a flight cuts its corners over higher ground than there is below the legs.  Without tracking
 error it is on the chords of fly-by arcs; with it, it is within a distance of the legs before and after the waypoint, to
@@ -60,7 +60,10 @@ class FlownCorners(NamedTuple):
 
 @inner
 def no_corners(count: int, margin: float) -> FlownCorners:
-    """Return no corners for a path; margin: additional, m."""
+    """Return the record of a path without such corners.
+
+    margin: additional margin, m.
+    """
     slope_margin = ARC_MARGIN + ARC_SHARE * margin
     return FlownCorners(
         np.zeros(count), np.full((count, 2), margin), np.zeros(count), np.zeros((count, 2)), slope_margin
@@ -71,7 +74,10 @@ def no_corners(count: int, margin: float) -> FlownCorners:
 def corners_near_ground(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, corners: Records, lags: Records, margin: float
 ) -> FlownCorners:
-    """Return the corners of a path (w, 3) that are flown near the ground; margin: additional, m."""
+    """Return the corners of a path (w, 3) that are flown near the ground.
+
+    margin: additional margin, m.
+    """
     count = path.shape[0]
     found, point = no_corners(count, margin), np.empty(3)
     lowered = found.lowered
@@ -108,7 +114,7 @@ def corners_near_ground(
 
 @inner
 def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, found: FlownCorners) -> None:
-    """Fill radii and steepest slopes of the arcs that are almost as steep as can be flown, on either course."""
+    """Fill the radii and slope limits of the arcs whose slopes are close to the limits on one of their courses."""
     flat, step = np.zeros(3), np.zeros(3)
     for i in range(1, path.shape[0] - 1):
         if not 0.0 < corners[i].radius < math.inf or math.isinf(corners[i].tangent):
@@ -131,7 +137,7 @@ def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, found:
 def arc_room(before: Floats, at: Floats, after: Floats, radius: float, sign: float, steepest: float) -> float:
     """Return the arc's length past the waypoint `at` minus the length of its climb (sign 1) or descent (-1), m.
 
-    Slopes are those of `aircraft.path_limits.arc_slope`; steepest: tangent of what can be flown.
+    Slopes are those of `aircraft.path_limits.arc_slope`; steepest: tangent of the maximum slope.
     """
     run, on = _run(before, at), _run(at, after)
     ux, uy, vx, vy = at[0] - before[0], at[1] - before[1], after[0] - at[0], after[1] - at[1]
@@ -142,7 +148,7 @@ def arc_room(before: Floats, at: Floats, after: Floats, radius: float, sign: flo
 
 @inner
 def leg_of(sample: int) -> int:
-    """Return the leg of a sample: 0 for before its corner, 1 for after it."""
+    """Return 0 for a sample on the leg before its corner, 1 for a sample on the leg after it."""
     return 2 * sample // SAMPLES
 
 
@@ -153,7 +159,7 @@ def _run(a: Floats, b: Floats) -> float:
 
 @inner
 def height_above_required(data: ProblemArrays, limits: PrecomputedLimits, point: Floats) -> float:
-    """Return the height of a point (3,) above the lowest that is allowed there, m; NaN off the terrain."""
+    """Return the height of a point (3,) above its minimum allowed height, m; NaN off the terrain."""
     column, row = polymap(data.to_pixel, point[0], point[1])
     ground: float = pixel_height(data.heights, column, row)
     return point[2] - ground - clearance_at(limits.required, point[0], point[1])
@@ -163,7 +169,7 @@ def height_above_required(data: ProblemArrays, limits: PrecomputedLimits, point:
 def corner_point(
     data: ProblemArrays, before: Floats, at: Floats, after: Floats, radius: float, sample: int, out: Floats
 ) -> None:
-    """Fill the place (3,) of a sample of the corner at the waypoint `at`, whose turn has this radius, m.
+    """Fill `out` (3,) with the position of a sample of the corner at the waypoint `at`, whose turn has this radius, m.
 
     Heights are those of the legs, or of the arc between its tangent points, and not lowered.
     """
@@ -201,9 +207,9 @@ def corner_point(
 def corner_slopes(
     data: ProblemArrays, corner: Floats, radius: float, sample: int, up: Floats, point: Floats, slopes: Floats
 ) -> None:
-    """Fill the derivatives (3, 3), by the waypoints of a corner (3, 3), of a value that rises by `up` (3,) at a sample.
+    """Fill the derivatives (3, 3), by a corner's waypoints (3, 3), of a value with the gradient `up` (3,) at a sample.
 
-    point: scratch (3,).
+    point: scratch memory, (3,).
     """
     for row in range(3):
         for axis in range(3):
@@ -231,7 +237,7 @@ def arc_room_slopes(corner: Floats, radius: float, sign: float, steepest: float,
 
 @inner
 def ground_slopes(data: ProblemArrays, x: float, y: float, out: Floats) -> None:
-    """Fill the derivatives (3,) of the height above ground at a place; 0 across where they are not known."""
+    """Fill the derivatives (3,) of the height above ground at a point; unknown horizontal derivatives are 0."""
     heights, to_pixel = data.heights, data.to_pixel
     column, row = polymap(to_pixel, x + GROUND_STEP, y)
     rise = pixel_height(heights, column, row)

@@ -1,4 +1,4 @@
-"""Routes over coarse grids: cheapest routes through terrain and threats in the rotated frame, stage by stage.
+"""Find cheapest routes over coarse grids through terrain and threats in the rotated frame, stage by stage.
 
 A grid decides on which side to pass each obstacle; `planner.seeding.waypoint_fitting` then places the path's waypoints,
 one per interval, by evaluating whole legs. Both use dynamic programming over forward steps, because a path in the
@@ -71,7 +71,7 @@ class _PixelSteps(NamedTuple):
 
 @inner
 def position_of(frame: RotatedFrame, along: float, across: float) -> tuple[float, float]:
-    """East and north of a point in the rotated frame."""
+    """Return the east and north of a point in the rotated frame."""
     return (
         frame.east + frame.cosine * along - frame.sine * across,
         frame.north + frame.sine * along + frame.cosine * across,
@@ -79,7 +79,7 @@ def position_of(frame: RotatedFrame, along: float, across: float) -> tuple[float
 
 
 @inner
-def _lowest_height(
+def _min_height(
     data: ProblemArrays,
     required: RequiredClearance,
     frame: RotatedFrame,
@@ -87,10 +87,9 @@ def _lowest_height(
     across: float,
     steps: _PixelSteps,
 ) -> float:
-    """Return the lowest height allowed in a cell: highest ground of 3 x 3 samples plus the clearance.
+    """Return the minimum height in a cell, the highest ground of 3 x 3 samples plus the clearance; inf outside the map.
 
-    Inf outside the map.
-    steps: 0 along for the middle sample alone.
+    steps: steps between the samples; 0 along for the middle sample alone.
     """
     east, north = position_of(frame, along, across)
     if not (data.west <= east <= data.east and data.south <= north <= data.north):
@@ -113,7 +112,7 @@ def _lowest_height(
 
 @inner
 def _pixel_steps(data: ProblemArrays, frame: RotatedFrame, along: float, pitch: float) -> _PixelSteps:
-    """Return steps in the raster of `pitch` m along and across the line, at this distance along."""
+    """Return the raster steps that correspond to `pitch` m along and across the line, at this distance along."""
     east, north = position_of(frame, along, 0.0)
     column, row = polymap(data.to_pixel, east, north)
     east, north = position_of(frame, along + pitch, 0.0)
@@ -125,9 +124,9 @@ def _pixel_steps(data: ProblemArrays, frame: RotatedFrame, along: float, pitch: 
 
 @compiled
 def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink: float = 0.0) -> Records:
-    """Return `OBSTACLE` records of the missiles for a grid with this step between stages.
+    """Return `OBSTACLE` records of the missiles for a grid with the given step between stages.
 
-    Shrink: see `Grid`.
+    shrink: see `Grid`.
     """
     growth = COARSE_GROWTH * step if step > COARSE else 0.0
     if shrink > 0.0:
@@ -148,7 +147,7 @@ def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink
 
 
 @inner
-def _add_danger(obstacles: Records, along: float, grid: Grid, low: int, high: int, price: Floats) -> None:
+def _add_kill_cost(obstacles: Records, along: float, grid: Grid, low: int, high: int, price: Floats) -> None:
     """Add the cost per m inside kill spheres, increasing inwards, to a stage's cells (layers, low..high)."""
     across, layers = grid.across, grid.layers
     pitch = across[1] - across[0] if across.size > 1 else 1.0
@@ -184,7 +183,7 @@ def set_cell_costs(
     high: int,
     price: Floats,
 ) -> None:
-    """Fill the cost per m of a stage's cells (layers, low..high); inf if the ground is too near."""
+    """Fill the cost per m of a stage's cells (layers, low..high), inf for a cell too close to the ground."""
     across, layers = grid.across, grid.layers
     step = frame.length / grid.stages
     steps = _pixel_steps(data, frame, stage * step, grid.spread * step if stage < grid.stages else 0.0)
@@ -193,10 +192,10 @@ def set_cell_costs(
         if stage == grid.stages and across[y] == 0.0:
             lowest = -math.inf
         else:
-            lowest = _lowest_height(data, required, frame, stage * step, across[y], steps)
+            lowest = _min_height(data, required, frame, stage * step, across[y], steps)
         for z in range(layers.size):
             price[z, y] = 1.0 + extra[stage, y] if layers[z] >= lowest else math.inf
-    _add_danger(obstacles, stage * step, grid, low, high, price)
+    _add_kill_cost(obstacles, stage * step, grid, low, high, price)
 
 
 # --- Dynamic programme over stages ---
@@ -214,7 +213,7 @@ SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 
 @inner
 def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float) -> Records:
-    """Return `STEP_LAYERS` records (sideways, layers): climb and descent of a step on its course and at its height."""
+    """Return `STEP_LAYERS` records (sideways, layers) of the climb and descent of each step by course and height."""
     pitch = layers[1] - layers[0] if layers.size > 1 else 1.0
     out = np.zeros((2 * SIDEWAYS + 1, layers.size), dtype=STEP_LAYERS)
     a, b = np.zeros(3), np.zeros(3)
@@ -243,9 +242,9 @@ def relax(
     count: int,
     length: float,
 ) -> None:
-    """Relax `count` adjacent cells to as many of the next stage, with cell costs from `priced`.
+    """Relax `count` adjacent cells to as many cells of the next stage, with cell costs from `priced`.
 
-    All arrays flat.
+    All arrays are flat.
     """
     for k in range(count):
         # Unsigned indices (numba checks signed ones for wrap-around) and no branches: this innermost loop is
@@ -269,7 +268,7 @@ def relax_stage(
     pitch: float,
     ratio: float,
 ) -> None:
-    """Relax one stage: costs (layers, across) before and after it, parent cells, and cost per m of the cells.
+    """Relax one stage, from the costs before it to the costs after it, (layers, across) each, and store parent cells.
 
     spans: `SPAN` records (layers,) of the cells with a finite cost before. pitch: between layers, m.
     """
@@ -307,9 +306,8 @@ def distance_to_goal(columns: int, home: int, left: int, step: float, ratio: flo
 
 @inner
 def prune(after: Floats, spans: Records, ahead: Floats, rises: Floats, bound: float, low: int, high: int) -> None:
-    """Drop cells low..high from which no route reaches the destination within the bound.
+    """Drop cells low..high from which no route reaches the destination within the bound, and fill the remaining spans.
 
-    Note the remaining spans.
     spans: `SPAN` records (layers,) to fill. ahead: (across,) horizontal distance to the destination, m. rises:
     (layers,) height difference to it, m.
     """
@@ -326,7 +324,7 @@ def prune(after: Floats, spans: Records, ahead: Floats, rises: Floats, bound: fl
 
 
 class GridSearch(NamedTuple):
-    """A search for the cheapest route over a grid, as far as it has come; arrays are (layers, across).
+    """A search for the cheapest route over a grid, which can be continued; arrays are (layers, across).
 
     parents: (stages + 1, layers, across).  cost, after: of the last stage reached, and scratch; price: cost per m,
     scratch.  spans: `SPAN` records (layers,) of the cells with a finite cost.  stage: the last one reached.
@@ -359,7 +357,7 @@ def cheapest_route(
 ) -> tuple[Records, float]:
     """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route over a grid, and its cost.
 
-    Empty if there is none.
+    Return no records if there is no route.
     extra: (stages + 1, across) added to the cost per m. bound: upper limit on the cost; more expensive routes are not
     searched. pause: called after every `CELLS_AT_ONCE` cells; an exception raised there stops the search.
     """
@@ -374,7 +372,7 @@ def cheapest_route(
 
 @compiled
 def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSearch:
-    """Return a search that is at the start."""
+    """Return a new search at the start."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     home, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
@@ -403,7 +401,7 @@ def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSea
 def continue_route(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, extra: Floats, bound: float, search: GridSearch, more: int
 ) -> GridSearch:
-    """Return the search after up to `more` further stages, or at the last one if no route comes further."""
+    """Continue a search by up to `more` stages, or until no route leads on, and return it."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
@@ -430,7 +428,7 @@ def continue_route(
 
 @compiled
 def end_route(search: GridSearch) -> tuple[Records, float]:
-    """Return `ROUTE_CELL` records (stages + 1,) of the route found, and its cost; empty if there is none."""
+    """Return `ROUTE_CELL` records (stages + 1,) of the route found, or no records, and its cost."""
     goal, home, cost = search.goal, search.home, search.cost
     if search.spans[goal].first > home or search.spans[goal].last < home or cost[goal, home] == np.inf:
         return np.zeros(0, dtype=ROUTE_CELL), np.inf
@@ -441,7 +439,7 @@ def end_route(search: GridSearch) -> tuple[Records, float]:
 def trace_back(parents: Codes, layer: int, across: int) -> Records:
     """Return `ROUTE_CELL` records from the start to this cell of the last stage.
 
-    Parents: (stages + 1, layers, across).
+    parents: (stages + 1, layers, across).
     """
     wide = parents.shape[2]
     cells = np.zeros(parents.shape[0], dtype=ROUTE_CELL)
@@ -482,7 +480,7 @@ class GridRoute:
 
 
 def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> Grid:
-    """Return a grid with this many stages, square in the plane, with a layer at the start's height.
+    """Return a grid with this many stages, square cells in the plane, and a layer at the start's height.
 
     span: limits across, m. The number of stages is reduced where the grid would become too large.
     """
@@ -509,7 +507,7 @@ def grid_route(
     expected: float = math.inf,
     pause: Callable[[], None] = lambda: None,
 ) -> GridRoute | None:
-    """Return the cheapest route over a grid; None if terrain and ceiling leave none.
+    """Return the cheapest route over a grid, or None if terrain and ceiling block every route.
 
     used: earlier routes, near which the cost is higher, so that the next route takes another side. expected: cost bound
     to try first, such as the cost on a coarser grid; a search without a bound follows if it fails. pause: as in
@@ -530,7 +528,7 @@ def grid_route(
 
 
 def proximity_cost(along: Floats, across: Floats, used: tuple[GridRoute, ...]) -> Floats:
-    """Return the additional cost per m near earlier routes, at positions along (s,) and across (y,), m: (s, y)."""
+    """Return the additional cost per m near earlier routes, at positions along (s,) and across (y,), m, as (s, y)."""
     extra = np.zeros((along.size, across.size))
     width = max(APART, APART_STEPS * along[-1] / (along.size - 1))
     for route in used:

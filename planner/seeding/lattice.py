@@ -1,4 +1,4 @@
-"""Routes that may turn back or circle to climb: A* over a lattice of positions, layers of height and eight courses.
+"""Find routes that may turn back or circle to climb, by A* over a lattice of positions, heights and eight courses.
 
 A* search (Hart, Nilsson and Raphael, 1968) over states of a lattice point and one of eight courses. A step leads to a
 neighbouring point, turns by no more than a right angle, and climbs or descends within the slope limits; a route that
@@ -96,7 +96,7 @@ def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) ->
 
 
 class _StateTable(NamedTuple):
-    """State of the search. Per state: cost (m), parent, closed flag. Per step: feasible flag.
+    """State of the search, with a cost (m), parent and closed flag per state, and a feasible flag per step.
 
     parents: one more than the parent's number; 0 for a state that is not reached, whose cost is not set, and `_FIRST`
     for one of the start. rises: (8, 2) maximum climb and descent in layers. steps: by cell, course and rise.
@@ -120,7 +120,7 @@ def _expand_state(
     courses: int,
     open_states: list[tuple[float, int]],
 ) -> None:
-    """Expand a state: relax its successors and push them with cost plus straight distance to the goal."""
+    """Expand a state by relaxing its successors, and push each with its cost plus its distance to the goal."""
     rises, course, cell = table.rises, state % 8, state // 8
     layer, place = cell % lattice.layers, cell // lattice.layers
     along, across = place // lattice.across, place % lattice.across
@@ -145,7 +145,7 @@ def _expand_state(
             # The feasibility of a step does not depend on the course before it.
             number = (cell * 8 + to) * width + next_layer - layer + sinks
             if table.steps[number] == _UNKNOWN:
-                free = _inside(data, b) and leg_cost(data, limits, a, b, CLOSED * length) <= CLOSED * length
+                free = _is_inside(data, b) and leg_cost(data, limits, a, b, CLOSED * length) <= CLOSED * length
                 table.steps[number] = _FREE if free else _SHUT
             if table.steps[number] == _FREE:
                 table.cost[code], table.parents[code] = total, state + 1
@@ -154,7 +154,7 @@ def _expand_state(
 
 
 class LatticeSearch(NamedTuple):
-    """An interrupted search: its state, and the open list in heap order.
+    """A search that can be continued, with its state and the open list in heap order.
 
     costs, states: (k,) of the open list. seen: number of states expanded. found: the goal state, or -1.
     """
@@ -179,13 +179,13 @@ def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Latt
         rises,
         np.zeros(size * width, dtype=np.int8),
     )
-    states = _reach_start(data, frame, lattice, table)
+    states = _start_states(data, frame, lattice, table)
     return LatticeSearch(table, np.zeros(states.size), states, 0, -1)
 
 
 @compiled
-def _reach_start(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable) -> Codes:
-    """Return the states of the start, (k,), which are then reached."""
+def _start_states(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable) -> Codes:
+    """Mark the states of the start as reached, and return them, (k,)."""
     first = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
     prescribed = _nearest_course(frame, data.start_course)
     states = np.arange(first, first + 8) if prescribed < 0 else np.array([first + prescribed])
@@ -198,9 +198,9 @@ def _reach_start(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, tab
 def continue_lattice_search(
     data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, courses: int, search: LatticeSearch, max_expansions: int
 ) -> LatticeSearch:
-    """Return the search continued by up to `max_expansions` expansions.
+    """Continue a search by up to `max_expansions` expansions, and return it.
 
-    It has failed if the open list is empty.
+    The search has failed if its open list is empty.
     courses: largest turn per step, in units of 45 degrees.
     """
     limits, table, seen = precompute_limits(data), search.table, search.seen
@@ -235,7 +235,7 @@ def _nearest_course(frame: RotatedFrame, course: float) -> int:
 
 
 @inner
-def _inside(data: ProblemArrays, point: Floats) -> bool:
+def _is_inside(data: ProblemArrays, point: Floats) -> bool:
     """Return True if a point (3,) is on the map and between floor and ceiling."""
     inside: bool = data.west <= point[0] <= data.east and data.south <= point[1] <= data.north
     return inside and data.floor <= point[2] <= data.ceiling
@@ -261,7 +261,7 @@ def trace_route(parents: Numbers, found: int, lattice: Lattice) -> Records:
 
 @compiled
 def simplify_route(data: ProblemArrays, points: Floats) -> Floats:
-    """Simplify a route (k, 3) to as few points (j, 3) as possible by greedy line of sight.
+    """Simplify a route (k, 3) to few points (j, 3) by greedy line of sight.
 
     From each remaining point the leg goes to the furthest point that it reaches without a violation.
     """
@@ -313,7 +313,7 @@ def turning_step(data: ProblemArrays) -> float:
 
 
 def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Lattice:
-    """Return a lattice over the whole map with points at both ends and steps of at most this length.
+    """Return a lattice over the whole map, with points at both ends and steps of at most the given length.
 
     step: m. The step is increased where the lattice would have more than `MAX_LATTICE_STATES` states.
     """
@@ -346,7 +346,7 @@ def cheapest_lattice_route(
     max_states: int,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Records, int]:
-    """Return `LATTICE_CELL` records of the cheapest route, empty without one, and the number of states seen.
+    """Return `LATTICE_CELL` records of the cheapest route, empty without a route, and the number of expanded states.
 
     courses: largest turn per step, in units of 45 degrees. max_states: maximum number of expanded states.
     """
@@ -368,10 +368,10 @@ def lattice_route(
     pause: Callable[[], None] = lambda: None,
     max_states: int = MAX_EXPANDED,
 ) -> tuple[Floats, int]:
-    """Return world points (k, 3) of a route over a lattice of this step (m), and the number of states expanded.
+    """Return world points (k, 3) of a route over a lattice of this step (m), and the number of expanded states.
 
-    (0, 3) without a route. pause: called after every `STATES_AT_ONCE` states; an exception raised there stops the
-    search. max_states: maximum number of expanded states.
+    Return (0, 3) points without a route. pause: called after every `STATES_AT_ONCE` states; an exception raised there
+    stops the search. max_states: maximum number of expanded states.
     """
     lattice = make_lattice(data, frame, step)
     # Turns of up to 90 degrees where the limits allow them; with eight courses 45 degrees is the minimum.
@@ -392,8 +392,11 @@ def ceiling_route(
     """Return world points (k, 3) of a route at the height of the ceiling, where spheres on the ground are smallest.
 
     It climbs to the ceiling at its start and leaves it at its destination, however steeply: a lattice of a single layer
-    is searched in milliseconds. step: m. closer: how far it may enter missiles' spheres, m. pause: as in
-    `lattice_route`. (0, 3) for none.
+    is searched in milliseconds. Return (0, 3) points without a route.
+
+    step: m.
+    closer: depth to which the route may enter missiles' spheres, m.
+    pause: as in `lattice_route`.
     """
     start, destination = (np.array([*end[:2], data.ceiling]) for end in (data.start, data.destination))
     for end in (start, destination):

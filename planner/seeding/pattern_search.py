@@ -1,4 +1,4 @@
-"""Pattern search that shortens one path by moves of single waypoints and of neighbouring groups.
+"""Shorten one path by a pattern search with moves of single waypoints and of neighbouring groups.
 
 After Hooke and Jeeves ("Direct search", Journal of the ACM 8, 1961), over a basis of triangular displacements of
 several widths. Sampling finds the route around the obstacles; this local search finds the last percent of its length
@@ -98,9 +98,9 @@ def search_patterns(
 ) -> tuple[Floats, int]:
     """Shorten a path of the rotated encoding.
 
-    vector: (d,). evaluations: maximum number. must_end: asked after every `EVALUATIONS_AT_ONCE` evaluations whether to
-    end with what is found so far. Returns the best vectors (k, d), namely the best feasible one, if any, and the one
-    with the lowest merit; and the number of evaluations made.
+    vector: (d,). evaluations: maximum number. must_end: called after every `EVALUATIONS_AT_ONCE` evaluations; True
+    ends the search with its present result. Return the best vectors (k, d), which are the best feasible vector, if any,
+    and the vector with the lowest merit, and the number of evaluations made.
     """
     frames = frames_of(encoding)
     inner = encoding.waypoints - 2
@@ -125,7 +125,7 @@ def search_patterns(
 
 
 def merits(scores: Floats) -> Floats:
-    """Return merits (n,), which the search minimises, of scores (n, 8) by `planner.plan.Violation` and `Objective`."""
+    """Return the merits (n,) of scores (n, 8) by `planner.plan.Violation` and `Objective`, for minimisation."""
     prices = np.array([TURN_PRICE, SLOPE_PRICE, TERRAIN_PRICE, BOUNDS_PRICE])
     count = len(prices)
     ratio, exposure = scores[:, count + Objective.LENGTH_RATIO], scores[:, count + Objective.KILL_EXPOSURE]
@@ -135,10 +135,7 @@ def merits(scores: Floats) -> Floats:
 
 @cache
 def _triangular_basis(inner: int) -> tuple[Floats, Ints]:
-    """Return moves (k, 3 inner): triangles with half-widths of 1, 2, 4, ... waypoints.
-
-    Also returns the axis (k,) of each.
-    """
+    """Return triangular moves with half-widths of 1, 2, 4, ... waypoints, (k, 3 inner), and the axis of each, (k,)."""
     rows: list[Floats] = []
     axes: list[int] = []
     place = np.arange(inner, dtype=np.float64)
@@ -166,7 +163,7 @@ def _make_candidate(data: ProblemArrays, waypoints: int) -> _Candidate:
 
 
 @inner
-def _merit(
+def _evaluate_merit(
     data: ProblemArrays,
     limits: PrecomputedLimits,
     frames: WaypointFrames,
@@ -175,10 +172,10 @@ def _merit(
     best: float,
     shortest: float,
 ) -> tuple[float, bool]:
-    """Return the length ratio plus priced violations, and whether the path is feasible.
+    """Return the length ratio plus priced violations, and True if the path is feasible.
 
-    Parts of a path's evaluation only add to its merit: it ends as soon as that reaches `best`, and `shortest` if the
-    path is still feasible. What is returned then is no less than these, either.
+    Each part of the evaluation only adds to the merit. The evaluation therefore ends as soon as the merit reaches
+    `best`, and `shortest` if the path is still feasible; the returned merit is then a lower bound.
     """
     path, inner, scratch = candidate.path, vector.reshape((vector.size // 3, 3)), candidate.scratch
     for i in range(inner.shape[0]):
@@ -189,23 +186,23 @@ def _merit(
     violations, objectives = candidate.violations[0], candidate.objectives[0]
     violations.turn, violations.slope, violations.terrain, violations.bounds = 0.0, 0.0, 0.0, 0.0
     score_legs(data, limits, scratch, path, violations, objectives)
-    merit, feasible = _price(violations, objectives)
+    merit, feasible = _violation_price(violations, objectives)
     if merit >= best and (merit >= shortest or not feasible):
         return merit, feasible
     score_ground(data, limits, scratch, path, violations)
-    merit, feasible = _price(violations, objectives)
+    merit, feasible = _violation_price(violations, objectives)
     if merit >= best and (merit >= shortest or not feasible):
         return merit, feasible
     score_missiles(data, limits, scratch, path, violations, objectives)
-    merit, feasible = _price(violations, objectives)
+    merit, feasible = _violation_price(violations, objectives)
     if merit >= best and (merit >= shortest or not feasible):
         return merit, feasible
     score_airspace(data, scratch, path, violations)
-    return _price(violations, objectives)
+    return _violation_price(violations, objectives)
 
 
 @inner
-def _price(violations: Record, objectives: Record) -> tuple[float, bool]:
+def _violation_price(violations: Record, objectives: Record) -> tuple[float, bool]:
     price, feasible = EXPOSURE_PRICE * objectives.kill_exposure, True
     if objectives.kill_exposure > 0.0:
         price += EXPOSED
@@ -221,9 +218,9 @@ def _price(violations: Record, objectives: Record) -> tuple[float, bool]:
 
 @compiled
 def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, steps: Floats) -> _State:
-    """Return the search at a vector (d,), with moves of these initial steps (k,), which it modifies."""
+    """Return a new search at a vector (d,), with moves of the initial steps (k,), which the search modifies."""
     limits, candidate = precompute_limits(data), _make_candidate(data, start.size // 3 + 2)
-    best, fit = _merit(data, limits, frames, start, candidate, math.inf, math.inf)
+    best, fit = _evaluate_merit(data, limits, frames, start, candidate, math.inf, math.inf)
     feasible = np.full(start.size, np.inf)
     if fit:
         copy_into(feasible, start)
@@ -231,8 +228,8 @@ def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, st
 
 
 @inner
-def _move_all(box: _Box, moves: Floats, k: int, steps: Floats, before: Floats, here: Floats, trial: Floats) -> None:
-    """Fill a trial (d,): the vector after move k, or after the whole round's displacement if k is beyond the last."""
+def _fill_trial(box: _Box, moves: Floats, k: int, steps: Floats, before: Floats, here: Floats, trial: Floats) -> None:
+    """Fill a trial (d,) with the vector after move k, or after the round's whole displacement if there is no move k."""
     for d in range(here.size):
         step = steps[k] * moves[k, d] if k < moves.shape[0] else here[d] - before[d]
         trial[d] = min(box.upper[d], max(box.lower[d], here[d] + step))
@@ -264,8 +261,8 @@ def _continue_search(
                 continue
             better = False
             for _ in range(2):
-                _move_all(box, moves, k, steps, before, here, trial)
-                merit, fit = _merit(data, limits, frames, trial, candidate, best, shortest)
+                _fill_trial(box, moves, k, steps, before, here, trial)
+                merit, fit = _evaluate_merit(data, limits, frames, trial, candidate, best, shortest)
                 made += 1
                 if fit and merit < shortest:
                     shortest = merit

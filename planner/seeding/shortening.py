@@ -1,4 +1,4 @@
-"""Shortening: the shortest path near a given one under its constraints, all waypoints at once, free of intervals.
+"""Find the shortest path near a given path under its constraints, by moving all waypoints at once.
 
 Grids and populations decide on which side to pass each obstacle. Near such a path, length is a smooth function of all
 coordinates under smooth constraints, and an augmented Lagrangian method with Newton steps minimises it in a millisecond
@@ -52,7 +52,7 @@ STILL = 0.05
 def _newton_step(
     path: Floats, low: Floats, high: Floats, model: LagrangianModel, factor: Floats, step: Floats
 ) -> float:
-    """Fill the Newton step (n,) from a path within its box; returns its largest component, m."""
+    """Fill the Newton step (n,) from a path within its box, and return the largest component of the step, m."""
     size = step.size
     for row in range(size):
         model.band[row, 0] += DAMPING
@@ -92,7 +92,7 @@ class Shortening(NamedTuple):
 def begin_shortening(
     data: ProblemArrays, path: Floats, samples: int, extra_margin: float, corners_too: bool
 ) -> Shortening:
-    """Return the shortening of a path (w, 3) m before its first round.
+    """Return a new shortening of a path (w, 3) m, before its first round.
 
     samples: of the ground on each leg. extra_margin: additional margin to spheres and ground, m. corners_too: see
     `active_constraints`.
@@ -114,7 +114,7 @@ class _Descent(NamedTuple):
 
 @compiled
 def continue_shortening(data: ProblemArrays, under_way: Shortening, extra_margin: float, max_rounds: int) -> Shortening:
-    """Return the shortening after up to `max_rounds` further rounds."""
+    """Continue a shortening by up to `max_rounds` rounds, and return it."""
     here, active, multipliers, number, made, corners_too = under_way
     limits, size = precompute_limits(data), 3 * (here.shape[0] - 2)
     descent = _Descent(
@@ -151,10 +151,7 @@ def _descend(
     penalty: float,
     descent: _Descent,
 ) -> int:
-    """Minimise over a path (w, 3), in place, and fill the constraints' values at the end.
-
-    Returns the number of models evaluated.
-    """
+    """Minimise over a path (w, 3) in place, fill the constraints' final values, and return the number of models."""
     low, high, model, step, trial = descent.low, descent.high, descent.model, descent.step, descent.trial
     merit, made = lagrangian(data, limits, active, here, multipliers, values, penalty, model), 1
     for _ in range(STEPS):
@@ -209,7 +206,7 @@ def shorten_path(
 
     A model is one evaluation. extra_margin: additional margin to spheres and ground, m. pause: called after some
     milliseconds of work; an exception raised there stops it. Zones and the maximum height above ground are ignored.
-    corners_too: True if corners as flown are held clear of the ground and below the steepest slopes, which is slower.
+    corners_too: True to constrain the height and slope of corners as flown, too, which is slower.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem

@@ -1,4 +1,4 @@
-"""Augmented Lagrangian of a path's length, with gradient and Hessian, which `planner.seeding.shortening` minimises.
+"""Compute the augmented Lagrangian of a path's length, with gradient and Hessian, for `planner.seeding.shortening`.
 
 The method of multipliers of Hestenes and Powell, in the form for inequalities of Rockafellar ("The multiplier method of
 Hestenes and Powell applied to convex programming", Journal of Optimization Theory and Applications 12, 1973): a
@@ -93,8 +93,8 @@ def active_constraints(
 ) -> ActiveConstraints:
     """Return active constraints near a path (w, 3).
 
-    Extra_margin: additional margin to spheres and ground, m.
-    corners_too: True if flown corners are held clear of the ground and below the steepest slopes; legs then keep twice
+    extra_margin: additional margin to spheres and ground, m.
+    corners_too: True to constrain the height and slope of flown corners, too; legs then keep twice
     the additional margin in addition to their turns.
     """
     limits = precompute_limits(data)
@@ -114,8 +114,8 @@ def active_constraints(
             roll[i] = roll_length(data.aircraft, legs, corners, i, up, limits.wind)
     before, after = np.zeros(count + 1), np.zeros(count + 1)
     if data.legs_hold_turns:
-        _turn_shares(data, limits, path, legs, before, after)
-    pairs, distances = _near_missiles(data, path, corners, lags, extra_margin)
+        _fill_turn_lengths(data, limits, path, legs, before, after)
+    pairs, distances = _find_near_missiles(data, path, corners, lags, extra_margin)
     flown = no_corners(path.shape[0], extra_margin)
     turns = data.legs_hold_turns, TURN_MARGIN
     if corners_too:
@@ -125,10 +125,10 @@ def active_constraints(
 
 
 @inner
-def _turn_shares(
+def _fill_turn_lengths(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, legs: Records, before: Floats, after: Floats
 ) -> None:
-    """Fill the lengths that turns take of the legs before and after them, over the tangent of half the turn, (w,)."""
+    """Fill the lengths of the legs that a turn takes up, divided by the tangent of half the turn, (w,)."""
     corners = np.zeros(1, dtype=CORNER)
     for i in range(path.shape[0]):
         ux, uy, vx, vy = courses_at(data, legs, i)
@@ -151,10 +151,10 @@ def _turn_shares(
 
 
 @inner
-def _near_missiles(
+def _find_near_missiles(
     data: ProblemArrays, path: Floats, corners: Records, lags: Records, extra_margin: float
 ) -> tuple[Ints, Floats]:
-    """Return legs and the missiles near them (p, 2), and the distances (p,) required from the missiles' centres, m."""
+    """Return pairs of a leg and a missile near it, (p, 2), and the required distances from the centres, (p,) m."""
     missiles = data.missiles.missiles
     pairs, distances = [(0, 0) for _ in range(0)], [0.0 for _ in range(0)]
     for k in range(missiles.shape[0]):
@@ -192,7 +192,7 @@ def constraint_count(active: ActiveConstraints) -> int:
 
 @inner
 def carry_multipliers(old: ActiveConstraints, multipliers: Floats, new: ActiveConstraints) -> Floats:
-    """Return the multipliers for new active constraints; those of new pairs of leg and missile start at 0."""
+    """Return the multipliers for new active constraints; a new pair of leg and missile starts with 0."""
     out, many, before = np.zeros(constraint_count(new)), new.pairs.shape[0], old.pairs.shape[0]
     copy_into(out[many:], multipliers[before:])
     k = 0
@@ -223,10 +223,7 @@ TURN_MARGIN = 1.0
 
 
 class LagrangianModel(NamedTuple):
-    """Gradient (n,) and Hessian band (n, BAND) over the inner waypoints.
-
-    And derivatives (4, 3) of one constraint.
-    """
+    """Gradient (n,) and Hessian band (n, BAND) over the inner waypoints, and derivatives (4, 3) of one constraint."""
 
     gradient: Floats
     band: Floats
@@ -234,11 +231,12 @@ class LagrangianModel(NamedTuple):
 
 
 @inner
-def _add(value: float, first: int, points: int, multiplier: float, penalty: float, model: LagrangianModel) -> float:
-    """Add a constraint on `points` waypoints from waypoint `first` to the model.
+def _add_constraint(
+    value: float, first: int, points: int, multiplier: float, penalty: float, model: LagrangianModel
+) -> float:
+    """Add a constraint on `points` waypoints from waypoint `first` to the model, and return its share of the merit.
 
-    Returns its contribution to the merit.
-    Its derivatives with respect to these waypoints are in `model.slopes`.
+    The derivatives of the constraint with respect to these waypoints are in `model.slopes`.
     """
     push = multiplier - penalty * value
     if not push > 0.0:
@@ -256,7 +254,7 @@ def _add(value: float, first: int, points: int, multiplier: float, penalty: floa
 
 @inner
 def _add_length(path: Floats, model: LagrangianModel) -> float:
-    """Add the path's length to the model; returns the length, m."""
+    """Add the path's length to the model, and return the length, m."""
     total, size, unit = 0.0, model.gradient.size, np.empty(3)
     for i in range(path.shape[0] - 1):
         length = 0.0
@@ -286,7 +284,7 @@ def _add_length(path: Floats, model: LagrangianModel) -> float:
 
 @inner
 def _add_travel_cost(data: ProblemArrays, path: Floats, model: LagrangianModel) -> float:
-    """Add what the path costs to the model where that is not its length alone; returns the cost, m."""
+    """Add the path's cost to the model, if the cost is not length alone, and return the cost, m."""
     total, size, leg = 0.0, model.gradient.size, LegModel(np.zeros((2, 3)), np.zeros((2, 3, 2, 3)))
     for i in range(path.shape[0] - 1):
         total += model_leg(data.travel, data.aircraft, path[i], path[i + 1], leg)
@@ -311,10 +309,7 @@ def _add_missiles(
     penalty: float,
     model: LagrangianModel,
 ) -> float:
-    """Add the distances of legs from missiles, the first constraints.
-
-    Returns their contribution to the merit.
-    """
+    """Add the distances of legs from missiles, which are the first constraints, and return their share of the merit."""
     merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
     for p in range(active.pairs.shape[0]):
         i, missile = active.pairs[p, 0], missiles[active.pairs[p, 1]]
@@ -330,7 +325,7 @@ def _add_missiles(
             slopes[1, axis] = share * slopes[0, axis]
             slopes[0, axis] *= 1.0 - share
         values[p] = away - active.distances[p]
-        merit += _add(values[p], i, 2, multipliers[p], penalty, model)
+        merit += _add_constraint(values[p], i, 2, multipliers[p], penalty, model)
     return merit
 
 
@@ -346,9 +341,9 @@ def _add_ground(
     model: LagrangianModel,
     at: int,
 ) -> float:
-    """Add the heights of leg samples above the required height, constraints from `at`.
+    """Add one ground-clearance constraint for each leg sample, numbered from `at`.
 
-    See `_add_missiles`.
+    Its value is the height above the required clearance, m. Parameters and result are those of `_add_missiles`.
     """
     merit, slopes, heights, to_pixel = 0.0, model.slopes, data.heights, data.to_pixel
     for i in range(path.shape[0] - 1):
@@ -366,7 +361,7 @@ def _add_ground(
                 for axis in range(3):
                     slopes[1, axis] = share * slopes[0, axis]
                     slopes[0, axis] *= 1.0 - share
-            merit += _add(value, i, 2, multipliers[number], penalty, model)
+            merit += _add_constraint(value, i, 2, multipliers[number], penalty, model)
     return merit
 
 
@@ -382,9 +377,9 @@ def _add_corners(
     model: LagrangianModel,
     at: int,
 ) -> float:
-    """Add the heights of flown corners above the required height, and lengths of steep arcs.
+    """Add the heights of flown corners above the required height, and the lengths of steep arcs.
 
-    See `_add_missiles`.
+    Constraints are numbered from `at`. Parameters and result are those of `_add_missiles`.
     """
     merit, point, up, corner = 0.0, np.empty(3), np.empty(3), np.empty((3, 3))
     for i in range(1, path.shape[0] - 1):
@@ -402,7 +397,7 @@ def _add_corners(
             if multipliers[number] - penalty * value > 0.0:
                 ground_slopes(data, point[0], point[1], up)
                 corner_slopes(data, corner, radius, k, up, point, model.slopes)
-            merit += _add(value, i - 1, 3, multipliers[number], penalty, model)
+            merit += _add_constraint(value, i - 1, 3, multipliers[number], penalty, model)
         for k in range(2):
             number, radius = at + path.shape[0] * SAMPLES + 2 * i + k, flown.steep_radii[i]
             values[number] = NEAR_GROUND
@@ -413,7 +408,7 @@ def _add_corners(
             values[number] = value
             if multipliers[number] - penalty * value > 0.0:
                 arc_room_slopes(corner, radius, sign, steepest, model.slopes)
-            merit += _add(value, i - 1, 3, multipliers[number], penalty, model)
+            merit += _add_constraint(value, i - 1, 3, multipliers[number], penalty, model)
     return merit
 
 
@@ -427,7 +422,7 @@ def _add_slopes(
     model: LagrangianModel,
     at: int,
 ) -> float:
-    """Add slope margins of legs, as m of height, and lengths above the shortest leg; see `_add_missiles`."""
+    """Add the slope margins of legs, as m of height, and their lengths above the minimum; see `_add_ground`."""
     merit, slopes = 0.0, model.slopes
     for i in range(path.shape[0] - 1):
         dx, dy, rise = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
@@ -441,7 +436,7 @@ def _add_slopes(
                 slopes[0, axis] = -slopes[1, axis]
             number = at + 3 * i + kind
             values[number] = tangent * run + sign * rise - (SHORTEST_LEG if kind == 2 else SLOPE_MARGIN)
-            merit += _add(values[number], i, 2, multipliers[number], penalty, model)
+            merit += _add_constraint(values[number], i, 2, multipliers[number], penalty, model)
     return merit
 
 
@@ -456,7 +451,7 @@ def _add_turns(
     model: LagrangianModel,
     at: int,
 ) -> float:
-    """Add turn margins, and lengths of legs that their turns leave over; see `_add_missiles`."""
+    """Add turn margins, and the lengths of legs that remain between their turns; see `_add_ground`."""
     merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
     turn, of_before, of_after = np.zeros(count + 1), np.zeros((count + 1, 2)), np.zeros((count + 1, 2))
     for i in range(count + 1):
@@ -474,9 +469,9 @@ def _add_turns(
         of_before[i, 0], of_before[i, 1] = side * uy / u2, -side * ux / u2
         of_after[i, 0], of_after[i, 1] = -side * vy / v2, side * vx / v2
         slopes[:] = 0.0
-        _turn_slopes(of_before[i], of_after[i], -TURN_LENGTH, slopes[:3])
+        _add_turn_derivatives(of_before[i], of_after[i], -TURN_LENGTH, slopes[:3])
         values[at + i] = TURN_LENGTH * (data.max_turn - turn[i])
-        merit += _add(values[at + i], i - 1, 3, multipliers[at + i], penalty, model)
+        merit += _add_constraint(values[at + i], i - 1, 3, multipliers[at + i], penalty, model)
     if not active.turns_in_legs:
         return merit
     for i in range(count):
@@ -488,16 +483,18 @@ def _add_turns(
         slopes[:] = 0.0
         for axis, part in ((0, dx / run), (1, dy / run)):
             slopes[1, axis], slopes[2, axis] = -(1.0 - SETTLING_SHARE) * part, (1.0 - SETTLING_SHARE) * part
-        _turn_slopes(of_before[i], of_after[i], -0.5 * active.after[i] * (1.0 + one * one), slopes[:3])
-        _turn_slopes(of_before[i + 1], of_after[i + 1], -0.5 * active.before[i + 1] * (1.0 + two * two), slopes[1:])
+        _add_turn_derivatives(of_before[i], of_after[i], -0.5 * active.after[i] * (1.0 + one * one), slopes[:3])
+        _add_turn_derivatives(
+            of_before[i + 1], of_after[i + 1], -0.5 * active.before[i + 1] * (1.0 + two * two), slopes[1:]
+        )
         values[number] = (1.0 - SETTLING_SHARE) * run - need - min(SETTLING_LENGTH, need) - active.turn_margin
-        merit += _add(values[number], i - 1, 4, multipliers[number], penalty, model)
+        merit += _add_constraint(values[number], i - 1, 4, multipliers[number], penalty, model)
     return merit
 
 
 @inner
-def _turn_slopes(of_before: Floats, of_after: Floats, factor: float, slopes: Floats) -> None:
-    """Add a factor times the derivatives of a turn, by its legs before and after, to its waypoints (3, 3)."""
+def _add_turn_derivatives(of_before: Floats, of_after: Floats, factor: float, slopes: Floats) -> None:
+    """Add the derivatives of a turn by its two legs, times a factor, to its derivatives by waypoints (3, 3)."""
     for axis in range(2):
         slopes[0, axis] -= factor * of_before[axis]
         slopes[1, axis] += factor * (of_before[axis] - of_after[axis])
@@ -515,10 +512,7 @@ def lagrangian(
     penalty: float,
     model: LagrangianModel,
 ) -> float:
-    """Return the augmented length or cost of a path (w, 3), m.
-
-    Fills the constraints' values and the model.
-    """
+    """Return the augmented length or cost of a path (w, 3), m, and fill the constraints' values and the model."""
     model.gradient[:], model.band[:] = 0.0, 0.0
     at = active.pairs.shape[0]
     by_length = data.travel.time == 0.0 and data.travel.energy == 0.0

@@ -1,4 +1,4 @@
-"""Routes that pass obstacles on other sides than the cheapest route: one per choice of sides, cheapest first.
+"""Find routes that pass obstacles on other sides than the cheapest route, one per choice of sides.
 
 Two passes of dynamic programming over the same grid, from the start and from the destination, meet in every cell, and
 the sum of their costs is the cost of the cheapest route through it. The smallest sum to the left of an obstacle belongs
@@ -48,9 +48,8 @@ PASSING = np.dtype(
 
 
 class GridCosts(NamedTuple):
-    """Costs of the cheapest partial routes over a grid, (stages + 1, layers, across).
+    """Costs of the cheapest partial routes over a grid, (stages + 1, layers, across); inf above the bound.
 
-    Inf if none is within the bound.
     reached: from the start; parents: the previous cell, as layer x width + across.
     left: to the destination; successors: the next cell.
     """
@@ -73,7 +72,7 @@ def _relax_stage_back(
     pitch: float,
     ratio: float,
 ) -> None:
-    """Relax one stage backwards: costs (layers, across) to the destination after and before it.
+    """Relax one stage backwards, from the costs after it to the costs before it, (layers, across) each.
 
     spans: `SPAN` records (layers,) of the cells before it that are within the bound.
     """
@@ -96,7 +95,7 @@ def _relax_stage_back(
 
 
 @inner
-def _bounded(reached: Floats, left: Floats, spans: Records, bound: float) -> None:
+def _drop_unbounded(reached: Floats, left: Floats, spans: Records, bound: float) -> None:
     """Drop cells (layers, across) of one stage through which no route is within the bound."""
     for z in range(reached.shape[0]):
         for y in range(spans[z].first, spans[z].last + 1):
@@ -105,7 +104,7 @@ def _bounded(reached: Floats, left: Floats, spans: Records, bound: float) -> Non
 
 
 class SideSearch(NamedTuple):
-    """A search for the costs of partial routes, as far as it has come: from the start, then back from the destination.
+    """A search for the costs of partial routes, first from the start, then from the destination; it can be continued.
 
     price: cost per m of the cells, (stages + 1, layers, across). spans: `SPAN` records (stages + 1, layers) of the
     cells within the bound. done: stages that are done, of those there and back; twice the grid's once it has ended.
@@ -142,7 +141,7 @@ def grid_costs(
 
 @compiled
 def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> SideSearch:
-    """Return a search that is at the start."""
+    """Return a new search at the start."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     shape = (stages + 1, high, wide)
@@ -168,7 +167,7 @@ def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> Si
 def continue_grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, search: SideSearch, more: int
 ) -> SideSearch:
-    """Return the search after up to `more` further stages, or ended if no route comes further."""
+    """Continue a search by up to `more` stages, or end it if no route leads on, and return it."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step, required = frame.length / stages, required_clearance(data)
     pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
@@ -201,13 +200,13 @@ def continue_grid_costs(
         _relax_stage_back(
             after, price[stage + 1], here, successors[stage], spans[stage], step_layers, step, pitch, grid.ratio
         )
-        _bounded(reached[stage], left[stage], spans[stage], bound)
+        _drop_unbounded(reached[stage], left[stage], spans[stage], bound)
     return SideSearch(costs, step_layers, obstacles, price, spans, home, goal, until)
 
 
 @inlined
 def side_of(aside: float, above: float) -> int:
-    """Return the side of a point given its offsets to the left of an obstacle's centre and above it."""
+    """Return the side on which a point lies, from its offsets to the left of an obstacle's centre and above it."""
     if abs(aside) >= abs(above):
         return LEFT if aside >= 0.0 else RIGHT
     return OVER if above > 0.0 else UNDER
@@ -259,9 +258,8 @@ SAME_WAY = 100.0
 
 
 def sides_passed(points: Floats, obstacles: Records) -> Ints:
-    """Return sides (k,) on which a route's points (s, 3) along, across, up pass `OBSTACLE` records.
+    """Return the sides on which a route's points (s, 3) along, across, up pass obstacles, (k,); -1 beyond its ends.
 
-    -1 beyond its ends.
     Routes with the same sides can be deformed into each other without touching an obstacle. Routes with different sides
     are assumed not to be, although a route over a sphere on the ground can be moved to either side.
     """
@@ -285,8 +283,8 @@ def side_routes(
 ) -> list[GridRoute]:
     """Return up to `max_routes` routes with different sides and a cost of at most `bound`, cheapest first.
 
-    Each is the cheapest that passes one obstacle on one side; the first is the cheapest of all. Of routes close to each
-    other only the cheapest is returned. pause: as in `grid_costs`.
+    Each route is the cheapest that passes one obstacle on one side; the first route is the cheapest of all. Among
+    routes close to each other, only the cheapest is returned. pause: as in `grid_costs`.
     """
     if grid.layers.size == 0:
         return []
@@ -323,7 +321,7 @@ def optimistic_grid(
     spread: float,
     ratio: float,
 ) -> Grid:
-    """Return a grid with reduced kill spheres and ground taken from a smaller area around each cell: see `Grid`.
+    """Return a grid with smaller kill spheres, and with ground from a smaller area around each cell; see `Grid`.
 
     Its highest layer is the ceiling, where spheres on the ground are smallest.
     """

@@ -1,4 +1,4 @@
-"""The best path through each of many candidate waypoints, joined by dynamic programming over legs.
+"""Find the best path through each of many candidate waypoints, by dynamic programming over legs.
 
 A path's length and most of its violations are sums over its legs, so the best of all combinations of candidates, one
 per interval, is found without enumerating them: forward from the start and backward from the destination, as messages
@@ -57,7 +57,7 @@ class WaypointChains(NamedTuple):
     legs: int
 
     def path_through(self, waypoint: int, candidate: int) -> Ints:
-        """Return the candidates (w,) of the best path through one."""
+        """Return the candidates of the best path through a candidate, (w,)."""
         out = np.empty(len(self.cost), dtype=np.int64)
         out[waypoint] = candidate
         for i in range(waypoint, 0, -1):
@@ -74,9 +74,8 @@ def waypoint_chains(
     pause: Callable[[], None] = lambda: None,
     max_legs: int = ALL_LEGS,
 ) -> WaypointChains:
-    """Return the best paths through candidates (w, k, 3) world m.
+    """Return the best paths through candidates (w, k, 3) world m; only the first candidate of each end is used.
 
-    Of the ends only the first candidate is used.
     bound: upper limit on the cost of a path, m; pruning by it saves time. pause: called after every `LEGS_AT_ONCE`
     legs; an exception raised there stops the work. max_legs: there are no paths where more have to be evaluated.
     """
@@ -93,14 +92,14 @@ def waypoint_chains(
         done = int(cursor["legs"][0])
         if done >= max_legs:
             return WaypointChains(np.full((count, wide), np.inf), before, after, done)
-    return WaypointChains(_through(data, candidates, bound, sweeps), before, after, int(cursor["legs"][0]))
+    return WaypointChains(_costs_through(data, candidates, bound, sweeps), before, after, int(cursor["legs"][0]))
 
 
 @compiled
 def _advance(
     data: ProblemArrays, candidates: Floats, legs: Floats, bound: float, sweeps: _Sweeps, cursor: Records, max_legs: int
 ) -> bool:
-    """Continue from the cursor until `max_legs` legs have been evaluated; returns whether all is done.
+    """Continue from the cursor until `max_legs` legs have been evaluated, and return True if all is done.
 
     legs: (w - 1, k, k) costs, filled on demand; a lower bound is negative. cursor: a `_CURSOR` record (1,).
     """
@@ -118,7 +117,7 @@ def _advance(
             k = at.candidate
             # Lower bound on the cost of the rest of a path through this candidate.
             rest = _distance(candidates[i, k], candidates[-1][0]) if step > 0 else sweeps.forward[i, k]
-            at.legs += _extend(
+            at.legs += _extend_paths(
                 data, limits, candidates, i, k, step, cost, link, bound - rest, legs, open_ends, lower_bounds, corners
             )
             at.candidate += 1
@@ -130,11 +129,8 @@ def _advance(
 
 
 @compiled
-def _through(data: ProblemArrays, candidates: Floats, bound: float, sweeps: _Sweeps) -> Floats:
-    """Return the cost of the best path through each candidate, its turn there included.
-
-    Inf above the bound.
-    """
+def _costs_through(data: ProblemArrays, candidates: Floats, bound: float, sweeps: _Sweeps) -> Floats:
+    """Return the cost of the best path through each candidate, including the turn there; inf above the bound."""
     limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
     cost = sweeps.forward + sweeps.backward
     for i in range(1, candidates.shape[0] - 1):
@@ -147,7 +143,7 @@ def _through(data: ProblemArrays, candidates: Floats, bound: float, sweeps: _Swe
 
 
 @inner
-def _extend(
+def _extend_paths(
     data: ProblemArrays,
     limits: PrecomputedLimits,
     candidates: Floats,
@@ -162,9 +158,8 @@ def _extend(
     lower_bounds: Floats,
     corners: Records,
 ) -> int:
-    """Extend partial paths with costs (w, k) to candidate k of waypoint i.
+    """Extend partial paths with costs (w, k) to candidate k of waypoint i, and return the number of legs evaluated.
 
-    Returns the number of legs evaluated.
     step: 1 for paths from the start, -1 from the destination. link: (w, k) neighbouring candidate of each partial path.
     max_cost: upper limit on the cost of a partial path. open_ends: candidates of the previous waypoint with partial
     paths. lower_bounds, corners: scratch.
@@ -177,7 +172,7 @@ def _extend(
         lower_bounds[m] = cost[last, open_ends[m]] + _distance(candidates[last, open_ends[m]], here)
     while True:
         # Best lower bound first: a leg without violations ends the search.
-        m = _lowest(lower_bounds, open_ends.size)
+        m = _lowest_index(lower_bounds, open_ends.size)
         j, cheapest = open_ends[m], lower_bounds[m]
         if not cheapest < min(cost[i, k], max_cost):
             return evaluated
@@ -204,7 +199,7 @@ def _extend(
 
 
 @inlined
-def _lowest(values: Floats, count: int) -> int:
+def _lowest_index(values: Floats, count: int) -> int:
     """Return the index of the lowest of the first `count` values."""
     lowest = 0
     for k in range(1, count):
@@ -221,7 +216,7 @@ def _distance(a: Floats, b: Floats) -> float:
 def _corner_cost(
     data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, c: Floats, corners: Records
 ) -> float:
-    """Return the cost of the turn at b between a and c: its excess over the limit, and the lack of leg length for it.
+    """Return the cost of the turn at b between a and c, which is its excess over the limit and the lack of leg length.
 
     corners: scratch, one record.
     """
@@ -252,7 +247,7 @@ def _corner_cost(
 
 @compiled
 def free_points(data: ProblemArrays, points: Floats) -> Flags:
-    """Return True for points (n, 3), world m, on the map, above the clearance and outside all kill spheres.
+    """Flag the points (n, 3), world m, that are on the map, above the clearance and outside all kill spheres.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem

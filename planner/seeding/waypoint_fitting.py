@@ -1,4 +1,4 @@
-"""Waypoints along a route: dynamic programming over candidate points near it, with evaluation of whole legs.
+"""Fit waypoints to a route by dynamic programming over candidate points, with evaluation of whole legs.
 
 `fit_points` chooses one candidate per interval so that the sum of leg costs is smallest, then repeats this with
 candidates around each chosen waypoint and shrinking moves. `tighten` applies the same moves to a path of the rotated
@@ -30,10 +30,9 @@ ROUNDING = 1e-3
 
 @inner
 def leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, enough: float) -> float:
-    """Return the cost of one leg, in m of path: its length and its violations.
+    """Return the cost of one leg, its length and its violations, in m of path.
 
-    A lower bound on it where that exceeds `enough`.
-    The rest is not evaluated then.
+    If the cost exceeds `enough`, the evaluation ends and returns a lower bound that exceeds `enough`.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     run = math.sqrt(dx * dx + dy * dy)
@@ -44,7 +43,7 @@ def leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Float
     if total > enough:
         return total
     ends = segment_pixels(data.to_pixel, a[0], a[1], b[0], b[1])
-    below = _below(data, limits, ux, uy, run, a[2], b[2]) if data.tracking.has_error else 0.0
+    below = _max_depth_below_leg(data, limits, ux, uy, run, a[2], b[2]) if data.tracking.has_error else 0.0
     total += DEPTH_COST * terrain_excess(
         data.heights,
         data.slope_bounds,
@@ -87,12 +86,12 @@ def leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Float
 
 
 @inner
-def _below(
+def _max_depth_below_leg(
     data: ProblemArrays, limits: PrecomputedLimits, east: float, north: float, run: float, low: float, high: float
 ) -> float:
-    """Return the largest distance of the aircraft below a long leg, m.
+    """Return the largest distance of the aircraft below a long leg, m; negative if it is always above.
 
-    Negative above. east, north: its unit course.
+    east, north: unit course of the leg.
     """
     rise = high - low
     if abs(rise) < data.tracking.step:
@@ -103,9 +102,9 @@ def _below(
 
 @compiled
 def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
-    """Return candidates (w, c, 3) chosen at each waypoint to minimise the sum of leg costs.
+    """Choose one of the candidates (w, c, 3) of each waypoint to minimise the sum of leg costs.
 
-    Number of legs evaluated.
+    Return the chosen candidates and the number of legs evaluated.
     """
     count, width, _ = candidates.shape
     parents = np.zeros((count, width), dtype=np.int64)
@@ -172,7 +171,7 @@ _AXIS_NEIGHBOURS = _NEIGHBOURS[np.abs(_NEIGHBOURS).sum(axis=1) <= 1.0]
 def fit_waypoints(
     data: ProblemArrays, frame: RotatedFrame, route: Floats, waypoints: int, fit: WaypointFit = CLOSE_FIT
 ) -> Floats:
-    """Return waypoints (w, 3) world m along a route (s, 3) in rotated axes, one per interval, chosen by whole legs."""
+    """Return waypoints (w, 3) world m along a route (s, 3) in rotated axes, one per interval."""
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     span = edges[1] - edges[0]
     shares = np.linspace(0.1, 0.9, fit.candidates)
@@ -182,15 +181,15 @@ def fit_waypoints(
 
 
 def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit: WaypointFit = CLOSE_FIT) -> Floats:
-    """Return waypoints (w, 3) world m: each one of its candidates (w - 2, k, 3) in its frame, then moved locally."""
+    """Choose waypoints among candidates (w - 2, k, 3) in their frames, move them locally, and return them, (w, 3) m."""
     inner, width, _ = points.shape
     candidates = np.zeros((inner + 2, width * len(fit.lifts), 3))
     candidates[1:-1] = np.tile(points, (1, len(fit.lifts), 1))
     candidates[1:-1, :, 2] += np.repeat(fit.lifts, width)
-    chosen, _ = _pick(data, frames, candidates)
+    chosen, _ = _pick_candidates(data, frames, candidates)
     steps = _NEIGHBOURS if fit.diagonal else _AXIS_NEIGHBOURS
-    moved, _ = _move(data, frames, chosen, steps, fit.rounds, np.array(FIRST_MOVES), SHRINK)
-    return _restore(frames, moved[:, None])[:, 0]
+    moved, _ = _move_waypoints(data, frames, chosen, steps, fit.rounds, np.array(FIRST_MOVES), SHRINK)
+    return _restore_world(frames, moved[:, None])[:, 0]
 
 
 def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int, scale: float) -> tuple[Floats, int]:
@@ -202,11 +201,11 @@ def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int
     frames = frames_of(encoding)
     path = np.zeros((encoding.waypoints, 3))
     path[1:-1] = frames.rotate(encoding.decode(vector[None])[0, 1:-1])
-    chosen, legs = _move(data, frames, path, _NEIGHBOURS, rounds, scale * np.array(FIRST_MOVES), LAST_SHRINK)
+    chosen, legs = _move_waypoints(data, frames, path, _NEIGHBOURS, rounds, scale * np.array(FIRST_MOVES), LAST_SHRINK)
     return np.clip(chosen[1:-1].ravel(), encoding.lower, encoding.upper), math.ceil(legs / (encoding.waypoints - 1))
 
 
-def _move(
+def _move_waypoints(
     data: ProblemArrays,
     frames: WaypointFrames,
     chosen: Floats,
@@ -215,9 +214,9 @@ def _move(
     moves: Floats,
     shrink: float,
 ) -> tuple[Floats, int]:
-    """Return waypoints (w, 3) in their frames after rounds of moves of up to `moves` along, across, up.
+    """Move waypoints (w, 3) in their frames, in rounds of up to `moves` steps along, across and up.
 
-    Legs evaluated.
+    Return the moved waypoints and the number of legs evaluated.
     """
     legs = 0
     low, high = frames.edges[:-1, None], frames.edges[1:, None]
@@ -228,24 +227,24 @@ def _move(
         candidates[1:-1] += steps * moves
         candidates[1:-1, :, 0] = np.clip(candidates[1:-1, :, 0], low, high)
         candidates[1:-1, :, 2] = np.clip(candidates[1:-1, :, 2], data.floor, data.ceiling)
-        chosen, more = _pick(data, frames, candidates)
+        chosen, more = _pick_candidates(data, frames, candidates)
         legs += more
         moves = moves * shrink
     return chosen, legs
 
 
-def _pick(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tuple[Floats, int]:
-    """Chosen candidates (w, 3) in their frames, with fixed ends; number of legs evaluated."""
+def _pick_candidates(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tuple[Floats, int]:
+    """Return the chosen candidates (w, 3) in their frames, with fixed ends, and the number of legs evaluated."""
     count = len(candidates) - 2
     # An end has the frame of the waypoint next to it.
     for end, point, next_inside in ((0, data.start, 0), (-1, data.destination, count - 1)):
         candidates[end] = frames.rotate(np.tile(point, (count, 1)))[next_inside]
-    chosen, legs = _choose(data, np.ascontiguousarray(_restore(frames, candidates)))
+    chosen, legs = _choose(data, np.ascontiguousarray(_restore_world(frames, candidates)))
     return candidates[np.arange(len(candidates)), chosen], int(legs)
 
 
-def _restore(frames: WaypointFrames, candidates: Floats) -> Floats:
-    """Return world positions of candidates (w, c, 3), of the ends in the frame of the waypoint next to each."""
+def _restore_world(frames: WaypointFrames, candidates: Floats) -> Floats:
+    """Return the world positions of candidates (w, c, 3); an end is in the frame of the waypoint next to it."""
     rows = np.clip(np.arange(len(candidates)) - 1, 0, len(candidates) - 3)
     east, north, cosine, sine = (values[rows] for values in frames[:4])
     of_rows = WaypointFrames(east, north, cosine, sine, frames.edges)

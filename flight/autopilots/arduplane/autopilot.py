@@ -116,7 +116,7 @@ class ArduPlane(Autopilot):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return an empty list: what the aircraft does not state has ArduPlane's defaults."""
+        """Return an empty list, because ArduPlane has a default for each parameter that the aircraft does not state."""
         ArduPilotParameters.load(aircraft)
         return []
 
@@ -130,7 +130,7 @@ class ArduPlane(Autopilot):
         own.parameters = self.parameters.record()
 
     def take_over(self, before: Record, own: Record, here: Floats) -> None:
-        """Begin a new leg here, as after a change of mode: TECS and airspeed filter keep their state."""
+        """Begin a new leg here, as after a change of mode, and keep the state of TECS and airspeed filter."""
         own.memory = before.memory
         for name in _LEG_FIELDS:
             setattr(own.memory, name, 0)
@@ -286,7 +286,7 @@ class ArduPlane(Autopilot):
         return SpeedLimits(self.parameters.airspeed_min, self.parameters.airspeed_max, "AIRSPEED_MIN", "AIRSPEED_MAX")
 
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
-        """Return the last speed that it accepted, for each leg."""
+        """Return the last accepted speed for each leg."""
         return speeds_flown(commanded, cruise, self.parameters)
 
     @property
@@ -306,7 +306,7 @@ class ArduPlane(Autopilot):
         return tracking_error(self.parameters, airspeed, nav, fly_over=fly_over, turbulence=turbulence)
 
     def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
-        """Return the altitude gain in updrafts: it keeps its airspeed, and its sink rate is limited."""
+        """Return the altitude gain in updrafts, in which it holds its airspeed with a limited sink rate."""
         return height_in_updrafts(sink, turbulence)
 
     def from_ground(self, ways: GroundWays, aircraft: Aircraft, contacts: Sequence[Contact]) -> "ArduPlaneFromGround":
@@ -314,7 +314,7 @@ class ArduPlane(Autopilot):
         return ArduPlaneFromGround(self.parameters, ways=ways, aircraft=aircraft, contacts=tuple(contacts))
 
     def with_parameters(self, **values: float) -> "ArduPlane":
-        """Return ArduPlane's law with other parameters; a recorded program is replaced by the law."""
+        """Return ArduPlane's control law with the given parameters changed; it replaces a recorded program."""
         return ArduPlane(self.parameters.changed(**values))
 
 
@@ -322,7 +322,8 @@ class ArduPlane(Autopilot):
 class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
     """ArduPlane's law with take-off, landing, or both.
 
-    ways: take-off and landing that are flown.  contacts: points where the aircraft touches the ground.
+    ways: take-off and landing that are flown.
+    contacts: points where the aircraft touches the ground.
     """
 
     own: ClassVar[np.dtype[np.record] | None] = ARDUPLANE_GROUND
@@ -447,7 +448,7 @@ def _radius_growth(up: float) -> float:
 
 
 def _bank_limit_note(bank: float) -> str:
-    """Return a note that a bank limit of loiters (deg) is not flown; "" if ArduPlane has no limit.
+    """Return a note that a bank limit for loiters (deg) is not simulated; "" if ArduPlane has no limit.
 
     With a limit, `AP_L1_Control::loiter_radius` lets a loiter grow with altitude only if the bank cannot hold its
     radius.

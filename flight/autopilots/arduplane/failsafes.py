@@ -1,4 +1,4 @@
-"""Causes that end ArduPlane's mission, and its reactions, by its parameters.
+"""List the causes that end ArduPlane's mission, and its reactions according to its parameters.
 
 Read from ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event`, `failsafe_long_on_event` and
 `handle_battery_failsafe` in ArduPlane/events.cpp, `Plane::fence_check` in fence.cpp; AP_BattMonitor for the thresholds.
@@ -30,8 +30,9 @@ FailsafeAction = Literal[
 class Cause(NamedTuple):
     """A possible cause of leaving the mission.
 
-    name: for people.  does: ArduPlane's reaction.
-    parameter, value: the parameter that decides it; "" if no parameter decides.
+    name: name for people.
+    does: ArduPlane's reaction.
+    parameter, value: the parameter that decides the reaction, and its value; "" if no parameter decides.
     """
 
     name: str
@@ -65,7 +66,7 @@ _FENCE_REACTION: dict[int, FailsafeAction] = {0: "on", 1: "return", 6: "guided",
 def failsafe_causes(
     parameters: ArduPilotParameters, *, has_fence: bool, has_landing: bool = False, ends_landed: bool = False
 ) -> tuple[Cause, ...]:
-    """Return what can take an aircraft off its mission in AUTO, in the usual order of questions.
+    """Return the causes that can end an aircraft's mission in AUTO, in the order in which pilots usually ask.
 
     has_fence: True if the mission carries a fence.
     has_landing: True if it has a landing sequence; without one a landing is an RTL.

@@ -7,7 +7,7 @@ relative to *home*; if the field lies higher than home, that may be at once.  Th
 sequence: from its position to the first place of the sequence, turning on the short side, on a straight slope from its
 altitude, and by the sequence's other places back to the line-up.
 
-The point mass and the law of each leg are the ones in `flight.autopilots.arduplane.rtl_point_mass`.
+The point mass and the control law of each leg are those of `flight.autopilots.arduplane.rtl_point_mass`.
 """
 
 import math
@@ -51,7 +51,7 @@ class GoArounds:
 
 
 def climb_rows(way: Floats, top: float) -> int:
-    """Return the number of positions (t, 3) of a go-around before its climb is over; t if it never is.
+    """Return the number of positions (t, 3) of a go-around before its climb ends; t if the climb never ends.
 
     >>> climb_rows(np.array([[0.0, 0.0, 10.0], [0.0, 20.0, 14.0], [0.0, 40.0, 18.0]]), 13.0)
     1
@@ -63,8 +63,10 @@ def climb_rows(way: Floats, top: float) -> int:
 def aborted_at(place: Sequence[float], course: float, slope: float, airspeed: float, aircraft: PointMass) -> Records:
     """Return (1,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`: the abort point on a glide.
 
-    place: east, north, up, m.  course: of the glide over the ground, rad.  slope: of the glide, m per m.
-    airspeed: true, m/s.  The wind is taken from the aircraft.
+    place: east, north, up, m.
+    course: course of the glide over the ground, rad.
+    slope: slope of the glide, m per m.
+    airspeed: true airspeed, m/s.  The wind is taken from the aircraft.
     """
     start: Records = np.zeros(1, RETURN_START)
     made = aircraft.record
@@ -90,7 +92,8 @@ def fly_go_arounds(
     """Simulate a go-around from each of n places on a glide to the end of a landing sequence.
 
     starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
-    top: altitude above which the climb ends, m AMSL.  pitch: of the climb, rad.
+    top: altitude above which the climb ends, m AMSL.
+    pitch: pitch of the climb, rad.
     landings: one or more landing sequences; each go-around joins the nearest one where its climb is over.  A loiter in
         a sequence is the last place: the go-around is over once around it.
 
@@ -157,7 +160,7 @@ def fly_go_arounds(
 
 
 def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
-    """Return the climb's parameters, as in a take-off: speed by pitch, and a fixed pitch."""
+    """Return the parameters of the climb, which fix the pitch and control the speed by pitch, as in a take-off."""
     staged = parameters.record()
     staged.tecs_speed_weight = 2.0
     staged.tecs_pitch_min = 0.0

@@ -1,4 +1,4 @@
-"""ArduPlane's take-off and landing, compiled: one tick of a flight that begins or ends on the ground.
+"""Run one compiled tick of ArduPlane's take-off or landing, in a flight that begins or ends on the ground.
 
 In the air the law is `flight.autopilots.arduplane.law`.  Take-off and landing use the same law with other parameters
 and demands:
@@ -194,9 +194,11 @@ def ground_tick(block: Floats, heights: Heights) -> int:
 
 @inner
 def update_ground_contact(state: Record, clearance: float, ground: Record) -> None:
-    """Update which points touch the ground, which is level as in JSBSim.
+    """Update whether the aircraft touches the ground, and whether it is tipped over; the ground is level, as in JSBSim.
 
-    state: of `flight.dynamics.state.STATE`.  clearance: of the center of gravity, m.  ground: of `GROUND_STATE`.
+    state: a `flight.dynamics.state.STATE` record.
+    clearance: height of the center of gravity above ground, m.
+    ground: a `GROUND_STATE` record.
     """
     ground.touches, ground.tipped = False, False
     lowest = clearance
@@ -211,9 +213,10 @@ def update_ground_contact(state: Record, clearance: float, ground: Record) -> No
 
 @inner
 def ended(work: Record, ground: Record) -> int:
-    """Return how the flight has ended, a key of `ENDS`, or 0 to fly on.
+    """Return a key of `ENDS` if the flight has ended, or 0 to fly on.
 
-    work: of `flight.simulation.tick.WORKSPACE`.  ground: of `GROUND_STATE`, whose stage any law may set.
+    work: a `flight.simulation.tick.WORKSPACE` record.
+    ground: a `GROUND_STATE` record, whose stage any control law may set.
     """
     state, speed = work.state, math.hypot(work.true.velocity_east, work.true.velocity_north)
     empty = work.air.energy >= work.settings.battery
@@ -248,7 +251,7 @@ def ended(work: Record, ground: Record) -> int:
 
 @inner
 def _tick_take_off(work: Record, own: Record, waypoints: Records, pieces: Records) -> None:
-    """Run one tick of the take-off: fill the commands, and at its end begin the first leg."""
+    """Run one tick of the take-off, which fills the commands; at the end of the take-off, begin the first leg."""
     state, estimated, ground, memory = work.state, work.estimated, own.ground, own.memory
     dt, staged = work.timing.dt, own.staged
     factor = true_by_equivalent(estimated.up)
@@ -284,7 +287,7 @@ def _tick_take_off(work: Record, own: Record, waypoints: Records, pieces: Record
 
 @inner
 def _set_take_off_parameters(estimated: Record, parameters: Record, staged: Record, ground: Record) -> None:
-    """Set the take-off's parameters: speed by pitch, fixed pitch, and a bank limit that grows with height."""
+    """Set the parameters of the take-off: fixed pitch, speed by pitch, and a bank limit that grows with height."""
     staged.tecs_speed_weight = 2.0
     staged.tecs_pitch_min = 0.0
     staged.pitch_limit_min = ground.pitch * _leveling_fraction(estimated, parameters, ground)
@@ -299,9 +302,9 @@ def _set_take_off_parameters(estimated: Record, parameters: Record, staged: Reco
 
 @inner
 def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) -> float:
-    """Return the fraction of the minimum pitch that remains near the take-off's end.
+    """Return the fraction of the minimum pitch that remains near the end of the take-off.
 
-    The pitch is reduced from where the climb would reach the end within TKOFF_PLIM_SEC.
+    The pitch is reduced once the climb would reach the final altitude within TKOFF_PLIM_SEC.
     """
     left = ground.top - estimated.up
     if ground.leveling > 0.0:
@@ -332,7 +335,7 @@ def _hold_heading(state: Record, estimated: Record, parameters: Record, ground: 
 def _begin_first_leg(
     estimated: Record, waypoints: Records, pieces: Records, guided: Record, ground: Record, memory: Record
 ) -> None:
-    """Begin the leg that follows the take-off, from here."""
+    """Begin the leg that follows the take-off at the aircraft's position."""
     ground.stage = IN_AIR
     memory.leg = ground.leg
     memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
@@ -409,9 +412,9 @@ def _follow_line_to_point(
 def _update_stage(
     estimated: Record, parameters: Record, ground: Record, memory: Record, left: tuple[float, float, float, float]
 ) -> None:
-    """Change to the approach and to the flare when it is time.
+    """Change to the approach, or to the flare, when its condition is met.
 
-    left: as `_follow_line_to_point` returns it.
+    left: distance to the landing point, as `_follow_line_to_point` returns it, m.
     """
     _, share, angle, cross_track = left
     height, sink = estimated.up - ground.up, -estimated.velocity_up
@@ -440,7 +443,7 @@ def _update_stage(
 def _demand_glide(estimated: Record, parameters: Record, ground: Record, memory: Record, left: float) -> None:
     """Demand the altitude of the glide, and in the flare a sink rate that blends to its final value.
 
-    left: m before the point.
+    left: distance to the landing point, m.
     """
     memory.climb_share, memory.sink_share = 1.0, 1.0
     if ground.stage < FLARING:
@@ -469,7 +472,7 @@ def _demand_glide(estimated: Record, parameters: Record, ground: Record, memory:
 def _set_landing_parameters(
     estimated: Record, parameters: Record, staged: Record, ground: Record, share: float
 ) -> None:
-    """Set the landing's parameters.
+    """Set the parameters of the landing.
 
     share: flown fraction of the line.
     """

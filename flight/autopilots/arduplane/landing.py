@@ -1,4 +1,4 @@
-"""ArduPlane's landing: the glide from the waypoint before the landing, and the go-around altitude.
+"""Compute ArduPlane's glide from the waypoint before the landing, and its go-around altitude.
 
 From that waypoint it flies a straight slope to the start of the flare, before and above the landing point.  The flare
 starts at the height which the slope's sink rate covers in LAND_FLARE_SEC, but no higher than twice LAND_FLARE_ALT, and
@@ -21,7 +21,7 @@ _GO_AROUND_ALTITUDE_M = 30.0
 
 
 def landing_airspeed(parameters: ArduPilotParameters, tail_wind: float) -> float:
-    """Return the equivalent airspeed on the glide, m/s: minimum to cruise, increased by a head wind.
+    """Return the equivalent airspeed on the glide, between minimum and cruise and higher in a head wind, m/s.
 
     No landing is faster than the cruise airspeed, whatever TECS_LAND_ARSPD is.
 
@@ -40,7 +40,8 @@ def landing_airspeed(parameters: ArduPilotParameters, tail_wind: float) -> float
 def landing_glide(height: float, run: float, ground_speed: float, parameters: ArduPilotParameters) -> LandingGlide:
     """Return the glide to a landing point from the waypoint before it.
 
-    height, run: of the waypoint above and before the landing point, m.  ground_speed: m/s.
+    height, run: height of the waypoint above the landing point, and its distance before it, m.
+    ground_speed: m/s.
 
     At 20 m/s the sink rate from 54 m over 600 m is 1.8 m/s, and the flare's two seconds 3.6 m; the flare lasts
     3.6 / (0.125 + 0.9) s, in which the aircraft flies 70 m.
@@ -67,7 +68,7 @@ def landing_glide(height: float, run: float, ground_speed: float, parameters: Ar
 
 
 def go_around_height(asked: float, takeoff: float) -> float:
-    """Return the altitude of a go-around over home, m: from the landing item, the take-off, or 30 m.
+    """Return the height of a go-around above home, m, which the landing item or the take-off states, or 30 m.
 
     >>> go_around_height(50.0, 80.0), go_around_height(0.0, 80.0), go_around_height(0.0, 0.0)
     (50.0, 80.0, 30.0)

@@ -1,4 +1,4 @@
-"""Motor start of a launched aircraft in ArduPlane, from acceleration, speed and attitude.
+"""Compute when ArduPlane starts the motor of a launched aircraft, from acceleration, speed and attitude.
 
 With TKOFF_THR_MINACC it waits for an acceleration along the nose, and then for TKOFF_THR_DELAY; then within a tenth of
 a second the ground speed must be above TKOFF_THR_MINSPD, and the nose between -30 and 45 degrees, or it waits for an
@@ -21,11 +21,13 @@ _MOTOR_START_TIMEOUT_S = 5.0
 
 
 def motor_start(acceleration: float, speed: float, incline: float, parameters: ArduPilotParameters) -> float:
-    """Return the time of the motor start, s after the release, negative on the rail.
+    """Return the time of the motor start after the release, s; it is negative on the rail.
 
-    The result is inf if it never starts, -inf if it runs before the launch.
-    acceleration: steady along the rail, m/s^2; 0 for a runway.  speed: at its end over the ground, m/s.
-    incline: of the nose, rad.
+    The result is inf if the motor never starts, and -inf if it runs before the launch.
+
+    acceleration: steady acceleration along the rail, m/s^2; 0 for a runway.
+    speed: ground speed at the end of the rail, m/s.
+    incline: pitch of the nose, rad.
 
     A rail of 6 m takes 0.6 s to 20 m/s, at 33 m/s^2; 10 m/s need 8.3 m/s^2.
 
@@ -73,7 +75,7 @@ def takeoff_slew(parameters: ArduPilotParameters) -> float:
 
 
 def run_up(starts: float, parameters: ArduPilotParameters) -> float:
-    """Return the wait on the ground for full throttle, s; 0 if the motor starts in the launch or later.
+    """Return the time on the ground until full throttle, s; 0 if the motor starts in the launch or later.
 
     starts: the result of `motor_start`.
 

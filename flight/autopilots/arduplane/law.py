@@ -1,4 +1,4 @@
-"""ArduPlane's control law, compiled: its memory, bank demand, altitude demand, TECS, and one tick."""
+"""Implement ArduPlane's control law as compiled code, with its memory, bank and altitude demands, TECS and a tick."""
 
 import math
 
@@ -313,7 +313,7 @@ def look_ahead(
 
 @inner
 def _return_altitude(estimated: Record, b: Record, parameters: Record, own: Record) -> float:
-    """Return the altitude setpoint of an RTL, m: on a straight slope down, or at once if it climbs.
+    """Return the altitude setpoint of an RTL, m, on a straight slope in a descent, or the target's altitude in a climb.
 
     The slope leads from where the RTL began to the center of its loiter; on the loiter the target's altitude applies
     (`Plane::setup_glide_slope`, `Mode::update_target_altitude`).  The slope down to a rally point is computed as if the
@@ -335,9 +335,9 @@ def _return_altitude(estimated: Record, b: Record, parameters: Record, own: Reco
 def _estimate_airspeed(state: Record, estimated: Record, parameters: Record, own: Record, dt: float) -> None:
     """Estimate airspeed and its rate with a complementary filter of acceleration and airspeed.
 
-    The acceleration along the nose gives the fast changes, the measured airspeed the slow ones.  An accelerometer along
-    the nose, with gravity removed, measures changes of the velocity over the ground, including its vertical part: at
-    the start of a climb that is more than the airspeed gains.
+    The acceleration along the nose gives the fast changes, and the measured airspeed gives the slow changes.  An
+    accelerometer along the nose, with gravity removed, measures changes of the velocity over the ground, including its
+    vertical part: at the start of a climb that is more than the airspeed gains.
     """
     level = math.cos(state.pitch)
     acceleration = (estimated.velocity_east - own.last_velocity_east) * math.sin(state.yaw) * level
@@ -362,7 +362,7 @@ def _estimate_airspeed(state: Record, estimated: Record, parameters: Record, own
 def is_underspeed(estimated: Record, parameters: Record, own: Record, slowest: float, dt: float) -> bool:
     """Return True while speed has priority over altitude (`AP_TECS::_detect_underspeed`).
 
-    slowest: AIRSPEED_MIN, true, m/s.
+    slowest: AIRSPEED_MIN as a true airspeed, m/s.
 
     After an engine failure underspeed lasts until the aircraft meets a slope that leads down: it glides at
     AIRSPEED_MIN, and does not become as slow again (seen in 14 flights).
@@ -382,8 +382,8 @@ def update_tecs(
 ) -> None:
     """Update the throttle and pitch demands for the altitude demand and an airspeed (m/s, true).
 
-    state: a record of `flight.dynamics.state.STATE`.  factor: ratio of true to equivalent airspeed.  The others are as
-    `demand_height` takes them.
+    state: a record of `flight.dynamics.state.STATE`.  factor: ratio of true to equivalent airspeed.  The other
+    parameters are those of `demand_height`.
     """
     _estimate_airspeed(state, estimated, parameters, own, dt)
     speed = own.airspeed
@@ -428,8 +428,8 @@ def _set_throttle(
 
     Follows `AP_TECS::_update_throttle_with_airspeed`.
 
-    spe_error: m^2/s^2.  max_rate, min_rate: STE rates at full and at
-    idle throttle, m^2/s^3.
+    spe_error: m^2/s^2.
+    max_rate, min_rate: STE rates at full and at idle throttle, m^2/s^3.
     """
     lowest, highest = max(0.0, parameters.throttle_min), parameters.throttle_max
     rate_per_throttle = (max_rate - min_rate) / (highest - parameters.throttle_min)
@@ -458,7 +458,7 @@ def _set_throttle(
 
 @inner
 def wind_up_throttle(parameters: Record, own: Record) -> None:
-    """Set the STE integrator to its value at full throttle, as at every update of a climb-out.
+    """Set the STE integrator to its value at full throttle, as ArduPlane does at every update of a climb-out.
 
     `AP_TECS::_update_throttle_with_airspeed` does so during take-off and an aborted landing; the throttle stays open
     for a while after that.
@@ -582,8 +582,9 @@ def fly_as_ardupilot(
     """Fill the commands for one tick of ``dt`` seconds, and update the memories.
 
     parameters: a record of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
-    own: of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY`.  The others are as `flight.autopilots.planfly.law.guide`
-    takes them.  The path is only the reference against which the track is measured; the law does not use it.
+    own: a `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY` record.  The other parameters are those of
+    `flight.autopilots.planfly.law.guide`.  The path is only the reference against which the track is measured; the law
+    does not use it.
     """
     find_on_path(estimated, pieces, memory)
     b = waypoints[own.leg + 1]

@@ -1,4 +1,4 @@
-"""ArduPlane's navigation: L1 guidance along legs, changes of leg, loiters, and RTL.
+"""Navigate as ArduPlane does, with L1 guidance along legs, changes of leg, loiters, and RTL.
 
 L1 guidance follows Park, Deyst and How ("A New Nonlinear Guidance Logic for Trajectory Tracking", AIAA 2004-4900) with
 the parameters of ArduPlane's documentation (ardupilot.org, Plane, "Navigation Tuning") and the formulas of
@@ -41,12 +41,13 @@ _MIN_EXIT_DISTANCE_RATIO = 1.05
 
 @compiled
 def turn_distance(acceptance: float, turn: float, radius: float, length: float, air_density_factor: float) -> float:
-    """Return the distance before a waypoint at which ArduPlane turns to the next leg, m.
+    """Return the distance before a waypoint at which ArduPlane turns to the next leg, m; 0 if it flies to the waypoint.
 
-    The result is 0 if it flies on to the waypoint.
-    acceptance: from the mission, m, used as stated, in whole metres; 0 if the mission states none.
-    turn: rad, positive.  radius: WP_RADIUS, m.  length: L1 distance, m.
-    air_density_factor: ratio of true to equivalent airspeed; the room for a turn grows as its square.
+    acceptance: acceptance radius that the mission states, in whole metres; 0 if it states none.
+    turn: rad, positive.
+    radius: WP_RADIUS, m.
+    length: L1 distance, m.
+    air_density_factor: ratio of true to equivalent airspeed; the distance for a turn grows as its square.
     """
     acceptance_m = math.floor(min(MAX_ACCEPTANCE_M, acceptance))
     if acceptance_m > 0.0:
@@ -57,7 +58,7 @@ def turn_distance(acceptance: float, turn: float, radius: float, length: float, 
 
 @inner
 def past_line(estimated: Record, from_east: float, from_north: float, east: float, north: float) -> bool:
-    """Return True past the line across the leg at its end (east, north), and for a leg without length."""
+    """Return True if the aircraft is past the line across the leg's end (east, north), or if the leg has no length."""
     leg_e, leg_n = east - from_east, north - from_north
     ahead_e, ahead_n = east - estimated.east, north - estimated.north
     return ahead_e * leg_e + ahead_n * leg_n <= 0.0
@@ -90,11 +91,11 @@ def navigate_legs(
         _join_landing(estimated, waypoints, b, own)
         return
     if b.circle != 0.0:
-        _loiter(estimated, waypoints, b, parameters, own, length, speed, air_density_factor, dt)
+        _fly_loiter(estimated, waypoints, b, parameters, own, length, speed, air_density_factor, dt)
         return
     own.on_circle = False
     _follow_line(estimated, b.east, b.north, parameters, own, length, speed, dt, b.straight)
-    turn = _turn_at(waypoints, b, own)
+    turn = _turn_angle_at(waypoints, b, own)
     if own.leg + 2 < waypoints.shape[0] and _is_leg_over(
         estimated, b, turn, parameters, own, length, air_density_factor
     ):
@@ -132,10 +133,10 @@ def _follow_line(
 
 
 @inner
-def _turn_at(waypoints: Records, b: Record, own: Record) -> float:
+def _turn_angle_at(waypoints: Records, b: Record, own: Record) -> float:
     """Return the turn angle at b that ArduPlane uses, rad, positive.
 
-    Next to a loiter that is the turn from or to the loiter's center.
+    Next to a loiter, the angle is that of the turn from or to the loiter's center.
     """
     turn: float = b.turn
     if own.leg + 2 >= waypoints.shape[0]:
@@ -150,7 +151,7 @@ def _turn_at(waypoints: Records, b: Record, own: Record) -> float:
 
 @inner
 def _begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> None:
-    """Begin a leg: its line leads from its waypoint to the next, or from the aircraft if past the end."""
+    """Begin a leg, whose line leads from its waypoint to the next, or from the aircraft if it is past the end."""
     a, b = waypoints[leg], waypoints[leg + 1]
     own.leg = leg
     # The next loiter has not been captured yet, even if the current one was.
@@ -176,7 +177,7 @@ def _is_leg_over(
     length: float,
     air_density_factor: float,
 ) -> bool:
-    """Return True if the leg to b is over: b is within the turn distance, or the line across it passed.
+    """Return True if the leg to b is over, because b is within the turn distance or the line across b is passed.
 
     turn: of the route at b, rad.
     """
@@ -194,7 +195,7 @@ def _is_leg_over(
 
 
 @inner
-def _loiter(
+def _fly_loiter(
     estimated: Record,
     waypoints: Records,
     b: Record,
@@ -205,7 +206,7 @@ def _loiter(
     air_density_factor: float,
     dt: float,
 ) -> None:
-    """Fly to a loiter and around it until it is over and the aircraft heads for what follows.
+    """Fly to a loiter and around it until it is over and the aircraft heads for the next place.
 
     b: the corner of the route that stands for the loiter; its circle has the radius at its altitude.
     """
@@ -232,7 +233,7 @@ def _loiter(
 
 @inner
 def _update_loiter_progress(estimated: Record, b: Record, own: Record, dt: float) -> None:
-    """Update the time and the angle around a loiter, from its capture on."""
+    """Update the time and the angle around a loiter since the aircraft captured it."""
     bearing = math.atan2(estimated.east - b.centre_east, estimated.north - b.centre_north)
     if own.loitering:
         own.stayed += dt
@@ -249,7 +250,7 @@ def _update_loiter_progress(estimated: Record, b: Record, own: Record, dt: float
 
 @inner
 def _is_loiter_done(estimated: Record, b: Record, own: Record) -> bool:
-    """Return True once the loiter's turns, time or altitude are done."""
+    """Return True once the loiter's turns or time are completed, or its altitude is reached."""
     if not own.loitering:
         return False
     if b.to_height:
@@ -264,7 +265,7 @@ def _is_loiter_done(estimated: Record, b: Record, own: Record) -> bool:
 
 @inner
 def _is_lined_up(estimated: Record, onward: Record, b: Record, radius: float, own: Record) -> bool:
-    """Return True if the course leads to the place after loiter b, or if none can.
+    """Return True if the course leads to the place after loiter b, or if no course can.
 
     No course from the loiter leads to a place inside its circle (radius, m).
     """
@@ -308,7 +309,7 @@ def _navigate_rtl(estimated: Record, b: Record, parameters: Record, own: Record,
 
 @inner
 def _join_landing(estimated: Record, waypoints: Records, b: Record, own: Record) -> None:
-    """Leave the RTL loiter for the landing sequence, if there is one, once it is flown near its altitude.
+    """Leave the RTL loiter for the landing sequence, if there is one, once the aircraft loiters near its altitude.
 
     `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1.  The leg begins at the aircraft.
     """

@@ -1,4 +1,4 @@
-"""Point mass of an aircraft, for compiled code: drag, thrust and power from its trims, and its motion.
+"""Model an aircraft as a point mass for compiled code, with drag, thrust and power from its trims.
 
 Bank and pitch are given; the flight path is below the pitch by the angle of attack, which grows with the load factor.
 Specific excess power is taken from trims at the throttle, airspeed and altitude, less the induced drag of the bank.
@@ -79,7 +79,7 @@ def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wi
     record.airspeed, record.slowest, record.has_power = airspeed, speeds[0], has_power
     record.speed_step, record.height_step = speeds[1] - speeds[0], _ALTITUDES_M[1] - _ALTITUDES_M[0]
     record.alpha, record.alpha_lift = alpha, lift
-    record.induced = _induced_drag(speeds, excess[0, :, 0])
+    record.induced = _induced_drag_factor(speeds, excess[0, :, 0])
     record.wind_speed, record.wind_gradient, record.wind_reference = wind.speed, wind.gradient, wind.reference_amsl
     record.wind_east, record.wind_north = -math.sin(wind.from_course), -math.cos(wind.from_course)
     return PointMass(record, excess, power, bool(np.isfinite(trims[0]).any()))
@@ -93,8 +93,8 @@ _CACHE_VERSION = 2
 def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
     """Return airspeeds (v,), specific excess power (t, v, h), and two terms of the angle of attack.
 
-    The terms are the angle without lift, and the part from lift times the square of airspeed.  Excess power is NaN if
-    there is no trim.  Trims are stored in the user's cache folder, as the envelope is.
+    The first term is the angle without lift, the second is the part from lift times the square of airspeed.  Excess
+    power is NaN without a trim.  Trims are stored in the user's cache folder, as the envelope is.
     """
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, _AIRSPEED_COUNT)
     version = model_hash(aircraft)
@@ -113,9 +113,9 @@ def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
 
 
 def _trims(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats]:
-    """Return specific excess power (t, v, h) and angle of attack (v,) at the lowest altitude.
+    """Return specific excess power (t, v, h), and angle of attack at the lowest altitude (v,); both NaN without a trim.
 
-    Both are NaN if there is no trim.  speeds: (v,) m/s.
+    speeds: (v,) m/s.
     """
     simulator = Fdm(aircraft)
     excess = np.full((_THROTTLE_COUNT, _AIRSPEED_COUNT, len(_ALTITUDES_M)), np.nan)
@@ -178,7 +178,7 @@ def _resample(envelope: Envelope, table: Floats, speeds: Floats) -> Floats:
     return np.stack([np.interp(_ALTITUDES_M, envelope.amsl, row) for row in by_speed])
 
 
-def _induced_drag(speeds: Floats, excess: Floats) -> float:
+def _induced_drag_factor(speeds: Floats, excess: Floats) -> float:
     """Return induced drag per weight times the square of airspeed, from glides with closed throttle.
 
     Drag per weight is a V^2 + b / V^2 in straight flight; bank increases b as the square of the load factor.
@@ -205,7 +205,7 @@ def move_on(
     power: Floats,
     dt: float,
 ) -> float:
-    """Move a point mass by ``dt`` s on a path angle (rad, to the air), and return the power used, W."""
+    """Move a point mass by ``dt`` s on a path angle relative to the air (rad), and return the power used, W."""
     thrust = excess_power(excess, throttle, state.airspeed, motion.up, aircraft)
     tilt = math.tan(min(1.2, abs(state.roll)))
     gain = thrust - aircraft.induced / state.airspeed * tilt * tilt
@@ -259,7 +259,7 @@ def excess_power(excess: Floats, throttle: float, airspeed: float, amsl: float, 
 
 @inner
 def _interpolate(table: Floats, airspeed: float, amsl: float, aircraft: Record) -> float:
-    """Return the value of a table (v, h) at an airspeed and an altitude, bilinear, with extended edges."""
+    """Interpolate a table (v, h) bilinearly at an airspeed and an altitude, with extended edges."""
     x = min(table.shape[0] - 1.0, max(0.0, (airspeed - aircraft.slowest) / aircraft.speed_step))
     y = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.height_step))
     i, j = min(table.shape[0] - 2, int(x)), min(table.shape[1] - 2, int(y))

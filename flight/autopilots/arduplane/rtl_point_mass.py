@@ -147,7 +147,7 @@ class SwiftReturns:
 
 
 def surroundings(scenario: Scenario) -> ReturnEnvironment:
-    """Return the ground and the kill spheres of a scenario."""
+    """Return the terrain and the kill spheres of a scenario."""
     threats, terrain = scenario.threats, scenario.terrain
     spheres, radii = threats.position.reshape(-1, 3), threats.kill_radius
     if terrain is None:
@@ -238,7 +238,7 @@ def fly_returns(
 def _make_stages(
     target: ReturnCircle | None, landing: LandingStart | None, parameters: ArduPilotParameters, aircraft: PointMass
 ) -> Records:
-    """Return (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: the successive targets of an RTL.
+    """Return the successive targets of an RTL as `flight.guidance.lateral_reference_laws.WAYPOINT` records, (n,).
 
     A place of a landing sequence is a waypoint, or the center of a loiter of the mission, which is the last target.
     """
@@ -270,7 +270,7 @@ def truncate_at_first_loiter(places: Sequence[LandingStart]) -> Sequence[Landing
 
 
 def fill_stage(stage: Record, landing: LandingStart, parameters: ArduPilotParameters) -> None:
-    """Fill a stage with a place of a landing sequence: a waypoint, or the center of a loiter."""
+    """Fill a stage with a place of a landing sequence, which is a waypoint or the center of a loiter."""
     stage.east, stage.north, stage.up = stage.centre_east, stage.centre_north, stage.up = landing.place
     # The turn to its next leg is unknown: use a right angle, as at a mission's end.
     stage.turn = 0.5 * math.pi
@@ -282,7 +282,7 @@ _STRAIGHT_LEG_LENGTH_M = 10_000.0
 
 
 def straight_on(start: Record) -> Records:
-    """Return (1,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: far ahead on course and slope."""
+    """Return a waypoint far ahead on course and slope, as `flight.guidance.lateral_reference_laws.WAYPOINT` (1,)."""
     ahead: Records = np.zeros(1, WAYPOINT)
     over = max(1.0, math.hypot(start["velocity_east"], start["velocity_north"]))
     for axis, velocity in (("east", "velocity_east"), ("north", "velocity_north"), ("up", "velocity_up")):
@@ -291,7 +291,7 @@ def straight_on(start: Record) -> Records:
 
 
 def most_seconds(start: Record, stages: Records, aircraft: PointMass) -> float:
-    """Return the time after which an RTL is given up, s."""
+    """Return the timeout of an RTL, s."""
     slowest = max(5.0, aircraft.record.airspeed - aircraft.record.wind_speed)
     east, north, up, seconds = start["east"], start["north"], start["up"], 0.0
     for end in stages:
@@ -324,9 +324,10 @@ def fly_stages(
     way: Floats,
     out: Record,
 ) -> None:
-    """Fly from stage to stage for ``most`` s at the longest, and fill in the outcome.
+    """Fly from stage to stage for at most ``most`` s, and fill in the outcome.
 
-    climb: whether the first stage is a climb, and up to which altitude.  staged: the parameters of that climb.
+    climb: True if the first stage is a climb, and the altitude up to which it climbs.
+    staged: the parameters of that climb.
     """
     # The same spacing as in `waypoint_column`.  A loiter is flown until the RTL is over: no leg follows it.
     spaced, turns = np.zeros(6, WAYPOINT), np.zeros(1, _LOITER_PROGRESS)
@@ -385,7 +386,7 @@ def fly_stages(
 
 @inner
 def _store_position(here: Record, way: Floats, out: Record) -> None:
-    """Store a position while there is room."""
+    """Store a position unless the array is full."""
     if out.rows < way.shape[0]:
         way[out.rows, 0], way[out.rows, 1], way[out.rows, 2] = here.east, here.north, here.up
         out.rows += 1
@@ -431,7 +432,7 @@ def _is_stage_complete(
 def _demand_climb(
     state: Record, motion: Record, staged: Record, own: Record, climb: Record, wanted: float, factor: float, dt: float
 ) -> None:
-    """Demand a climb straight ahead: wings level, the pitch of its parameters, and the throttle opened.
+    """Demand a climb straight ahead, with level wings, the pitch of its parameters, and increasing throttle.
 
     wanted: equivalent airspeed, m/s.
     """
@@ -452,7 +453,7 @@ def _demand_climb(
 def _is_target_reached(
     here: Record, b: Record, own: Record, circling: Record, is_last: bool, wide: float, dt: float
 ) -> bool:
-    """Return True if a stage is over: waypoint reached, last loiter flown, or loiter left for the landing.
+    """Return True once a waypoint is reached, the last loiter is flown, or a loiter is left for the landing.
 
     b: its waypoint.  wide: distance from the center, m, within which the aircraft has arrived at the loiter.
     dt: s since the last call.
@@ -476,7 +477,7 @@ def _is_target_reached(
 
 @inner
 def _initialise_outcome(start: Record, estimated: Record, known: bool, out: Record) -> None:  # pragma: no cover
-    """Fill in the start, and the outcome before anything was flown."""
+    """Fill in the start, and the outcome before the flight."""
     estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
     estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
     estimated.velocity_up = start.velocity_up
@@ -488,7 +489,7 @@ def _initialise_outcome(start: Record, estimated: Record, known: bool, out: Reco
 
 @inner
 def _load_stage(stages: Records, at: int, waypoints: Records, estimated: Record, own: Record) -> None:
-    """Set both waypoints to a stage, on a leg from here, or from the last waypoint if that was reached."""
+    """Set both waypoints to a stage; its leg begins here, or at the last waypoint if that was reached."""
     stage, reached = stages[at], own.leg > 0
     for k in range(1, 3):
         b = waypoints[k]

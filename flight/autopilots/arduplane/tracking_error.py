@@ -1,4 +1,4 @@
-"""Deviation of ArduPlane from the legs of a plan: corners flown in the plane by its own guidance.
+"""Compute ArduPlane's deviation from the legs of a plan by flying corners with its own guidance in the plane.
 
 Each corner is flown in still air, at a constant ground speed, by `flight.autopilots.arduplane.law` and the lag of its
 bank, to find the acceptance radius with the least deviation.  For wind, the excursion in still air at the highest
@@ -70,10 +70,11 @@ def tracking_error(
     fly_over: bool = False,
     turbulence: Turbulence = "none",
 ) -> TrackingError:
-    """Return the room that a plan leaves for ArduPlane's deviations at an equivalent airspeed (m/s).
+    """Return the margins that a plan needs for ArduPlane's deviations at an equivalent airspeed (m/s).
 
-    nav: accuracy of navigation.  fly_over: True if it flies on to each waypoint before it turns.
-    turbulence: of the wind; gusts leave less of the throttle for a climb.
+    nav: accuracy of navigation.
+    fly_over: True if it flies on to each waypoint before it turns.
+    turbulence: turbulence of the wind; gusts leave less of the throttle for a climb.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> parameters = ArduPilotParameters.defaults().changed(AIRSPEED_MIN=18.0, AIRSPEED_MAX=31.0)
@@ -81,7 +82,7 @@ def tracking_error(
     >>> error.lag, error.step, 40.0 < error.corner_acceptance(math.radians(30.0), 25.0) < 60.0
     (3.0, 15.0, True)
     """
-    acceptance, excursion, before, after = _corners(parameters, airspeed, fly_over)
+    acceptance, excursion, before, after = _corner_tables(parameters, airspeed, fly_over)
     navigation_error = _NAVIGATION_SIGMAS * ERRORS[nav][0]
     return TrackingError(
         airspeed=airspeed,
@@ -104,7 +105,9 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 
 
 @lru_cache(maxsize=8)
-def _corners(parameters: ArduPilotParameters, airspeed: float, fly_over: bool) -> tuple[Floats, Floats, Floats, Floats]:
+def _corner_tables(
+    parameters: ArduPilotParameters, airspeed: float, fly_over: bool
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Return tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
     record, speeds = parameters.record(), SPEED_SHARES * airspeed
@@ -160,7 +163,7 @@ def _fly_corner(
     fly_over: bool,
     waypoints: Records,
 ) -> tuple[float, float]:
-    """Return the greatest distance from the two legs, and the length of the second until it is settled, m.
+    """Return the maximum distance from the two legs, and the length of the second leg until the flight settles, m.
 
     The first leg leads north to the origin.  turn: rad, to the right.  speed: over the ground, m/s.
     """

@@ -1,4 +1,4 @@
-"""ArduPlane itself as an autopilot: its SITL program, in lockstep with planfly's physics."""
+"""Implement ArduPlane itself as an autopilot, by its SITL program in lockstep with planfly's physics."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from flight.simulation.setup import FlightSetup
 
 @dataclass(frozen=True)
 class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
-    """ArduPlane itself.  Before the flight its law answers for it."""
+    """ArduPlane itself.  Before the flight, its control law stands in for the program."""
 
     flies_ground: ClassVar[bool] = True
     flies_both_ends: ClassVar[bool] = True
@@ -27,12 +27,12 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
 
     @classmethod
     def recognises(cls, program: Path) -> bool:
-        """Return True for any program: it reports its release after its start."""
+        """Return True for any program, because ArduPlane reports its release only after its start."""
         return True
 
     @classmethod
     def flying(cls, law: ArduPlane, binary: Path) -> Self:
-        """Return the program's autopilot in place of its law."""
+        """Return the program's autopilot in place of its control law."""
         return cls(law.parameters, binary=binary)
 
     @classmethod

@@ -1,4 +1,4 @@
-"""Flight of ArduPlane itself, as a program in lockstep with planfly's physics."""
+"""Fly ArduPlane itself, as a program in lockstep with planfly's physics."""
 
 import contextlib
 import math
@@ -66,7 +66,7 @@ class AutopilotFlight(SitlFlight):
             self._preflight = Preflight(self._link, lambda: self._lockstep.time)
             self._apply_gnss_error()
             self._hold_during(self._preflight.meet(given.given))
-            program = _program(self._link, digest, given)
+            program = _program_of_messages(self._link, digest, given)
             self.setup = replace(setup, autopilot=replace(autopilot, program=program))
             self._stack = stack.pop_all()
 
@@ -81,10 +81,10 @@ class AutopilotFlight(SitlFlight):
 
     def _prepare_program(self) -> None:
         self._hold_during(self._preflight.prepare(self._mission))
-        self._hold_during(self._run_up())
+        self._hold_during(self._wait_for_thrust())
         self._push()
 
-    def _run_up(self) -> Talk:
+    def _wait_for_thrust(self) -> Talk:
         """Wait for full thrust before the launch, if the motor runs before it."""
         take_off = self._ways.take_off
         law = None if take_off is None else self._from_ground
@@ -96,7 +96,7 @@ class AutopilotFlight(SitlFlight):
             yield
 
 
-def _program(link: AutopilotLink, digest: str, given: AutopilotParameters) -> AutopilotProgram:
+def _program_of_messages(link: AutopilotLink, digest: str, given: AutopilotParameters) -> AutopilotProgram:
     """Return the program that flew, from its messages."""
     news = link.news
     unknown = given.changed.keys() - news.parameters.keys()
@@ -117,11 +117,12 @@ def fly_autopilot(
     *,
     log: Path | None = None,
 ) -> tuple[SimulatedFlight, FlightSetup]:
-    """Fly a setup with ArduPlane SITL, from its boot to its end; arguments as of `AutopilotFlight`.
+    """Fly a setup with ArduPlane SITL, from its boot to its end.
 
-    log: where the autopilot's own log (.BIN) is kept.
+    setup, aircraft, autopilot, own: as in `AutopilotFlight`.
+    log: file to which the autopilot's own log (.BIN) is moved.
 
-    Returns the flight, and the setup with the program that flew it.
+    Return the flight, and the setup with the program that flew it.
     """
     with AutopilotFlight(setup, aircraft, autopilot, own) as flight:
         flight.prepare()

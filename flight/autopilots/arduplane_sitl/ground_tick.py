@@ -1,4 +1,4 @@
-"""One tick of an ArduPlane SITL flight from the ground to the ground: its phases, and its end.
+"""Run one tick of an ArduPlane SITL flight from the ground to the ground, with its phases and its end.
 
 The phases, and the ends of a flight in each, are the ones of `flight.autopilots.arduplane.ground_law`.  The program
 reports only the mission's items: the rest is found from positions and altitudes.
@@ -39,7 +39,7 @@ _MIN_FLARE_HEIGHT_M = 6.0
 
 @compiled
 def program_ground_tick(block: Floats, heights: Heights) -> int:
-    """Run a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
+    """Run a tick on the block of a `flight.simulation.tick.Workspace`, as the tick of a control law does.
 
     The program has set the commands in the block.
     """
@@ -62,10 +62,10 @@ def program_ground_tick(block: Floats, heights: Heights) -> int:
 
 @inner
 def find_phase(true: Record, ground: Record, on_last_leg: bool) -> None:
-    """Change to the next phase when it is time.
+    """Change to the next phase when its condition is met.
 
-    true: of `flight.guidance.navigation_error.MOTION`.
-    ground: of `flight.autopilots.arduplane.ground_law.GROUND_STATE`.
+    true: a `flight.guidance.navigation_error.MOTION` record.
+    ground: a `flight.autopilots.arduplane.ground_law.GROUND_STATE` record.
     on_last_leg: True if the program flies to its landing.
     """
     if ground.stage == TAKING_OFF:

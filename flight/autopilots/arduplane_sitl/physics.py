@@ -1,4 +1,4 @@
-"""ArduPilot's JSON physics interface in lockstep: packets, the socket, and the exchange."""
+"""Implement ArduPilot's JSON physics interface in lockstep, with packets, socket and exchange."""
 
 import socket
 import struct
@@ -36,7 +36,7 @@ _CLOSING_BYTES = b"}\n"
 
 
 class ServoPacket(NamedTuple):
-    """Outputs of the autopilot: the number of its frame, and the pulse of each output, microseconds."""
+    """Outputs of the autopilot, with the number of its frame and the pulse of each output in microseconds."""
 
     frame: int
     pulses: tuple[int, ...]
@@ -94,8 +94,8 @@ class PhysicsPort:
     port: its number.
     watch: called while nothing arrives; raises FlightError if the program has ended.
 
-    It sends nothing without a request.  A repeated request for a frame, after the program has waited in vain, gets the
-    same answer again, and the aircraft does not move.
+    It sends nothing without a request.  A repeated request for a frame, which the program sends after a timeout, gets
+    the same answer again, and the aircraft does not move.
     """
 
     def __init__(self) -> None:
@@ -120,7 +120,7 @@ class PhysicsPort:
     def receive(self) -> ServoPacket:
         """Return the next frame.
 
-        Raise FlightError for a program that ends, falls silent, restarts, or uses another version of the interface.
+        Raise FlightError for a program that ends, stops sending, restarts, or uses another version of the interface.
         """
         waiting_since = 0.0
         while True:
@@ -182,9 +182,9 @@ def _do_nothing() -> None:
 
 
 class JsonLockstep(Lockstep):
-    """Exchange over that socket: a frame is requested by servo outputs and answered with the motion.
+    """Exchange over a `PhysicsPort`, on which servo outputs request a frame and the motion answers it.
 
-    servos: outputs of the controls.  The others as in `Lockstep`.
+    servos: outputs of the controls.  The other parameters are those of `Lockstep`.
     """
 
     def __init__(

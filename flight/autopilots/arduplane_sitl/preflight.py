@@ -1,4 +1,4 @@
-"""Preparation of ArduPlane before it flies: parameters, mission, home, arming, AUTO."""
+"""Prepare ArduPlane before it flies, by parameters, mission, home, arming, and AUTO."""
 
 from collections.abc import Iterable
 
@@ -24,7 +24,7 @@ class Preflight(Conversation):
     """The conversation with one ArduPlane."""
 
     def meet(self, parameters: Iterable[str]) -> Talk:
-        """Identify it, and read the given parameters as far as it has them.
+        """Identify the autopilot, and read those of the given parameters that it has.
 
         Raise FlightError if it is not ArduPlane.
         """
@@ -43,12 +43,12 @@ class Preflight(Conversation):
         yield from self._send_until_accepted(Command.DO_SET_HOME, lambda: self._set_home(mission.home), "home")
         yield from self._send_until_accepted(
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
-            lambda: self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1, _FORCE_ARMING),
+            lambda: self._send_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1, _FORCE_ARMING),
             "arming",
         )
         yield from self._send_until_accepted(
             Command.DO_SET_MODE,
-            lambda: self._command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, AUTO),
+            lambda: self._send_command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, AUTO),
             "AUTO",
         )
         under_way = Awaited("AUTO", REPLY_TIMEOUT_S, "is not in AUTO, armed")
@@ -62,7 +62,7 @@ def _home_item(home: Home) -> MissionItem:
 
 
 def version_text(texts: list[str], number: int | None) -> str:
-    """Return the autopilot's name and version, from its messages or else from its version number.
+    """Return the autopilot's name and version from its messages, or otherwise from its version number.
 
     >>> version_text(["Initialising", "ArduPlane V4.6.0-dev (0123abcd)"], None)
     'ArduPlane V4.6.0-dev (0123abcd)'

@@ -1,4 +1,4 @@
-"""Start of ArduPlane's program for a flight, and its parameters."""
+"""Start ArduPlane's program for a flight, with its parameters."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -25,8 +25,9 @@ def arduplane_launch(
 ) -> Callable[[Path], Launch]:
     """Return a function that prepares a folder for ArduPlane's program and returns its command line.
 
-    home: its start position.  heading: at the start, degrees.
-    parameters: by name, its defaults for this flight.
+    home: start position of the aircraft.
+    heading: heading at the start, degrees.
+    parameters: the program's defaults for this flight, by name.
     physics_port, link_port: ports on this machine of the physics (UDP) and of planfly's MAVLink connection (TCP).
     """
 

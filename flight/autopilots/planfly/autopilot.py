@@ -1,4 +1,4 @@
-"""Planfly's own guidance as an autopilot: it follows the fly-by path by one of three lateral laws."""
+"""Implement planfly's own guidance as an autopilot that follows the fly-by path by one of three lateral laws."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Self
@@ -47,7 +47,7 @@ class PlanflyGuidance(Autopilot):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return the gains file, if it is missing: every law flies through the inner loops that it tunes."""
+        """Return the gains file if it is missing; its gains tune the inner loops, which every lateral law uses."""
         if (aircraft.folder / GAINS_FILE).exists():
             load_gains(aircraft)
             return []
@@ -65,7 +65,7 @@ class PlanflyGuidance(Autopilot):
     def gust_sink(self, climb: float, turbulence: Turbulence) -> float:
         """Return the altitude loss in a one-in-a-hundred downdraft.
 
-        Updrafts do not lift it: it dives and flies faster.
+        Updrafts do not lift the aircraft, because it dives and flies faster.
         """
         return height_in_gusts(climb, turbulence)
 
@@ -75,5 +75,5 @@ class PlanflyGuidance(Autopilot):
 
     @property
     def keeps_to_arcs(self) -> bool:
-        """False for the reference laws, which pass a waypoint at any distance."""
+        """False for the reference laws, which may pass a waypoint at any distance."""
         return self.guidance == "path"

@@ -1,10 +1,11 @@
-"""Planfly's guidance, compiled: from the state to the four commands, on records with named fields.
+"""Compute planfly's guidance in compiled code, from the state to the four commands, on records with named fields.
 
 Three lateral laws: planfly's own, a second-order cross-track law with curvature feed-forward about the offset path that
 a rolling aircraft can follow, which answers gusts by bank, and by a skid where bank is at its limit; L1 along the legs,
 as ArduPlane flies it; and the vector field of Beard and McLain along the fly-by path, whose arcs are its fillets.
 They share bank limit, vertical channel and inner loops (`flight.guidance.inner_loops`), so that flights differ by the
-law alone.  None uses the wind: all steer by the velocity over the ground.  No clock: dt is an argument.
+lateral law alone.  No law uses the wind, because all steer by the velocity over the ground.  The time step is an
+argument.
 """
 
 import math
@@ -102,13 +103,13 @@ def guide(
 ) -> None:
     """Fill the commands for one tick of ``dt`` seconds, and update the memory.
 
-    state: a record of `flight.dynamics.state.STATE`.
-    estimated: of `flight.guidance.navigation_error.MOTION`.
-    pieces, nodes: of a `flight.guidance.path.FlyByPath`.
-    waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    gains: a record of `flight.guidance.gains.GAINS`.
-    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
-    commands: of `flight.dynamics.state.COMMANDS`.
+    state: a `flight.dynamics.state.STATE` record.
+    estimated: a `flight.guidance.navigation_error.MOTION` record.
+    pieces, nodes: arrays of a `flight.guidance.path.FlyByPath`.
+    waypoints: `flight.guidance.lateral_reference_laws.WAYPOINT` records, (w,).
+    gains: a `flight.guidance.gains.GAINS` record.
+    memory: a `flight.guidance.inner_loops.GUIDANCE_MEMORY` record.
+    commands: a `flight.dynamics.state.COMMANDS` record.
     """
     course = find_on_path(estimated, pieces, memory)
     memory.speed_command = waypoints[memory.leg].airspeed
@@ -132,7 +133,7 @@ def _path_bank_command(
     course: float,
     dt: float,
 ) -> float:
-    """Return the bank command, rad: curvature ahead, plus a second-order law on the cross-track error."""
+    """Return the bank command from the curvature ahead and a second-order law on the cross-track error, rad."""
     speed = max(5.0, math.hypot(estimated.velocity_east, estimated.velocity_north))
     ground_course = math.atan2(estimated.velocity_east, estimated.velocity_north)
     off_course = wrap(ground_course - course)
@@ -168,7 +169,7 @@ def _path_bank_command(
 
 @inner
 def _limit_nose_angle(wanted: float, nose: float, max_bank: float) -> float:
-    """Return the demanded bank, or less where it would turn the nose too far from the course, rad.
+    """Return the demanded bank, reduced where it would turn the nose too far from the course, rad.
 
     At `_NOSE_LIMIT_RAD` the nose is almost perpendicular to the course.  Turning further would gain nothing against a
     crosswind and would take the aircraft all the way round.  The result is continuous in both angles except where the
@@ -187,9 +188,10 @@ def _correct_roll_offset(
 ) -> float:
     """Return the acceleration (m/s^2 to the right) that corrects the offset from rolling into arcs.
 
-    No aircraft steps into an arc: `aside` is the planned offset from the path where the curvature jumps.
+    No aircraft can change its bank in one step, so `aside` is the planned offset from the path where curvature jumps.
 
-    curvature: of the path here, 1/m.  turn: m/s^2 to the right that the path ahead needs.
+    curvature: curvature of the path here, 1/m.
+    turn: acceleration to the right that the path ahead needs, m/s^2.
     """
     memory.path_bank, memory.path_bank_rate, _ = roll_model(
         math.atan(turn / (GRAVITY * crab)), memory.path_bank, memory.path_bank_rate, gains, dt
@@ -255,7 +257,7 @@ def _unexplained_acceleration(
 def _l1_bank_command(
     state: Record, estimated: Record, waypoints: Records, gains: Record, memory: Record, dt: float
 ) -> float:
-    """Return the bank command, rad, of L1 on the current leg, with its own switching between legs."""
+    """Return the bank command of L1 on the current leg, and switch to the next leg as L1 does, rad."""
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     damping = gains.l1_damping
     length = l1_length(speed, gains.l1_period, damping)
@@ -279,7 +281,7 @@ def _l1_bank_command(
 def _field_bank_command(
     estimated: Record, curvature: float, gains: Record, memory: Record, course: float, dt: float
 ) -> float:
-    """Return the bank command, rad: an orbit's own bank, and a PI law on the field's course."""
+    """Return the bank command from an orbit's own bank and a PI law on the field's course, rad."""
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     wanted_course = field_course(
         course, memory.cross_track, curvature, gains.field_approach, gains.field_path, gains.field_orbit
@@ -341,11 +343,11 @@ def _max_upward_acceleration(
 ) -> float:
     """Return the maximum upward acceleration that the energy allows, m/s^2.
 
-    The specific excess power now, plus the power of the unused throttle, is the climb rate at a steady airspeed.  The
-    aircraft may climb faster while its airspeed is above the slowest one allowed, and must climb more slowly, or sink,
-    to return to it from below.  Near the stall the measured airspeed is used, with its gusts: a gust takes it there
-    within a second.  In a steep turn that begins at a higher airspeed: the stall speed grows with the root of the load
-    factor.
+    The climb rate available at constant airspeed is the specific excess power now plus that of the unused throttle.
+    While the airspeed is above its minimum, the aircraft may climb faster than that; while it is below, the aircraft
+    must climb more slowly, or descend, to regain speed.  Near the stall the measured airspeed, gusts included, replaces
+    the filtered one, because a gust can bring the aircraft to the stall within a second.  In a steep turn this
+    protection starts at a higher airspeed, because the stall speed grows with the square root of the load factor.
     """
     climb_rate = estimated.velocity_up
     if memory.last_airspeed < 0.0:
@@ -356,14 +358,14 @@ def _max_upward_acceleration(
     memory.last_airspeed = airspeed
     memory.energy_rate += (energy_rate - memory.energy_rate) * dt / _ENERGY_LAG_S
     memory.airspeed += (airspeed - memory.airspeed) * dt / _AIRSPEED_LAG_S
-    left = (1.0 - commands.throttle) / max(1e-3, gains.throttle_per_slope) * airspeed
+    unused_climb = (1.0 - commands.throttle) / max(1e-3, gains.throttle_per_slope) * airspeed
     stall = memory.stall_speed * density_factor(estimated.up)
     load_factor = 1.0 / max(_MIN_BANK_COSINE, math.cos(state.roll))
-    multiple = max(SAFE_SPEED, SAFE_SPEED_BANKED * math.sqrt(load_factor))
-    safe = min(memory.speed_command, multiple * stall)
+    stall_multiple = max(SAFE_SPEED, SAFE_SPEED_BANKED * math.sqrt(load_factor))
+    safe = min(memory.speed_command, stall_multiple * stall)
     slowest = max(safe, memory.speed_command - gains.slow_margin)
-    excess = min(memory.airspeed - slowest, airspeed - safe)
-    climb = memory.energy_rate + left + excess * airspeed / (GRAVITY * _SPEED_RECOVERY_TIME_S)
+    airspeed_excess = min(memory.airspeed - slowest, airspeed - safe)
+    climb = memory.energy_rate + unused_climb + airspeed_excess * airspeed / (GRAVITY * _SPEED_RECOVERY_TIME_S)
     return rate_gain * (climb - climb_rate)
 
 

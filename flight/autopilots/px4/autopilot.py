@@ -82,7 +82,7 @@ class Px4(Autopilot):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return an empty list: what the aircraft does not state has PX4's defaults."""
+        """Return an empty list, because PX4 has a default for each parameter that the aircraft does not state."""
         Px4Parameters.load(aircraft)
         return []
 
@@ -96,7 +96,7 @@ class Px4(Autopilot):
         own.parameters = self.parameters.record()
 
     def take_over(self, before: Record, own: Record, here: Floats) -> None:
-        """Begin a new leg here, as after a change of mode: TECS and airspeed filter keep their state."""
+        """Begin a new leg here, as after a change of mode, and keep the state of TECS and airspeed filter."""
         own.memory = before.memory
         for name in _LEG_FIELDS:
             setattr(own.memory, name, 0)
@@ -136,7 +136,7 @@ class Px4(Autopilot):
 
     @property
     def reads_acceptance(self) -> bool:
-        """False: only PX4's multicopters read the second parameter of a waypoint."""
+        """False, because only PX4's multicopters read the second parameter of a waypoint."""
         return False
 
     def turn_distance(self, turn: float, amsl: float) -> float:
@@ -220,7 +220,7 @@ class Px4(Autopilot):
 
     @property
     def speed_limits(self) -> SpeedLimits | None:
-        """FW_AIRSPD_MIN and FW_AIRSPD_MAX; a speed outside is replaced by the nearer limit."""
+        """FW_AIRSPD_MIN and FW_AIRSPD_MAX; a speed outside these limits is replaced by the nearest limit."""
         made = self.parameters
         low, high = made["FW_AIRSPD_MIN"], made["FW_AIRSPD_MAX"]
         return SpeedLimits(low, high, "FW_AIRSPD_MIN", "FW_AIRSPD_MAX", nearest=True)
@@ -242,7 +242,7 @@ class Px4(Autopilot):
     def tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """Return the deviations of its law with these parameters; it flies over no waypoint."""
+        """Return the deviations of its control law with these parameters; PX4 flies over no waypoint."""
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
     def altitude_miss_probability(self, climb: float, sink: float, turbulence: Turbulence) -> float:
@@ -250,7 +250,7 @@ class Px4(Autopilot):
         return altitude_miss_probability(self.parameters["NAV_FW_ALT_RAD"], climb, sink, turbulence)
 
     def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
-        """Return the altitude gain in updrafts: it keeps its airspeed, and its sink rate is limited."""
+        """Return the altitude gain in updrafts, in which it holds its airspeed with a limited sink rate."""
         return height_in_updrafts(sink, turbulence)
 
     def with_scenario_rtl_settings(
@@ -260,5 +260,5 @@ class Px4(Autopilot):
         return self if rtl_altitude is None else Px4(self.parameters.changed(RTL_RETURN_ALT=rtl_altitude))
 
     def with_parameters(self, **values: float) -> "Px4":
-        """Return the autopilot with other parameters."""
+        """Return a copy with the given parameters changed."""
         return Px4(self.parameters.changed(**values))

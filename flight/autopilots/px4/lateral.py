@@ -1,4 +1,4 @@
-"""PX4's lateral guidance: NPFG with its wind triangle, and the paths of a mission.
+"""Implement PX4's lateral guidance, NPFG with its wind triangle, on the paths of a mission.
 
 NPFG is by Furieri, Stastny, Marconi, Siegwart and Gilitschenski, "Gone with the wind: Nonlinear guidance for small
 fixed-wing aircraft in arbitrarily strong windfields" (ACC 2017), extended to any path in Stastny's "On Flying
@@ -27,9 +27,9 @@ _MIN_GROUND_SPEED_MPS = 1.0
 
 @inner
 def feasibility(airspeed: float, across: float, along: float) -> float:
-    """Return the feasibility of a course (0..1): 1 with airspeed to spare, 0 where the wind prevails.
+    """Return the feasibility of a course, from 1 with enough airspeed to 0 where the wind prevails.
 
-    across, along: of the wind to the course, m/s.
+    across, along: components of the wind across and along the course, m/s.
     """
     headwind = abs(across) if along >= 0.0 else math.hypot(across, along)
     share = min(1.0, max(0.0, (airspeed - headwind) / _AIRSPEED_BUFFER_MPS))
@@ -73,7 +73,8 @@ def adapted_period(
 ) -> float:
     """Return a period that is stable with the roll lag and short enough for a curve in wind, s.
 
-    feasible: feasibility of the track, 0..1.  proximity: to the track, 0..1.
+    feasible: feasibility of the track, 0..1.
+    proximity: proximity to the track, 0..1.
     """
     wind_factor = 2.0 * (1.0 - math.sqrt(1.0 - min(1.0, wind_speed / max(0.1, airspeed))))
     turn_rate = abs(curvature) * airspeed
@@ -142,7 +143,8 @@ def follow_track(
     """Demand the side acceleration that leads onto a track, m/s^2 to the right, into ``own``.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
-    near: the track's point nearest to the aircraft, m.  along: its direction there, a unit vector.
+    near: point of the track nearest to the aircraft, m.
+    along: direction of the track at that point, a unit vector.
     curvature: 1/m, positive to the right.
     wind: velocity of the air, m/s.
     airspeed_demand: m/s; it is raised, into ``own.airspeed_for_ground``, where the ground speed would be too low.
@@ -198,8 +200,8 @@ def follow_leg(
 ) -> None:
     """Follow the line from the leg's start to its end b (m), or steer straight to one of them.
 
-    Before the start, further away than the switch distance, the aircraft steers to the start; past the end, back to the
-    end (`navigateWaypoints`).  The others are as `follow_track` takes them.
+    Before the start and further away than the switch distance, the aircraft steers to the start; past the end, it
+    steers back to the end (`navigateWaypoints`).  The other parameters are those of `follow_track`.
     """
     leg_east, leg_north = b_east - own.from_east, b_north - own.from_north
     length = math.hypot(leg_east, leg_north)
@@ -259,7 +261,7 @@ def follow_circle(
 ) -> None:
     """Follow a loiter about a center (m).
 
-    radius: m, positive to the right.  The others are as `follow_track` takes them.
+    radius: m, positive to the right.  The other parameters are those of `follow_track`.
     """
     out_east, out_north = estimated.east - middle_east, estimated.north - middle_north
     distance = math.hypot(out_east, out_north)

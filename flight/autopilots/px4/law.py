@@ -1,4 +1,4 @@
-"""PX4's control law, compiled: its memory, and one tick of navigation, guidance, TECS and attitude.
+"""Implement PX4's control law as compiled code, with its memory and a tick of navigation, guidance, TECS and attitude.
 
 Attitude control uses planfly's inner loops (`flight.guidance.inner_loops`) with the lags of PX4's controllers, whose
 gains are tuned to the aircraft and do not belong to the law.
@@ -132,7 +132,7 @@ def fly_as_px4(
     wind: velocity of the air, m/s.
     parameters: a record of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
     own: of `flight.autopilots.px4.law.PX4_MEMORY`.
-    The others are as `flight.autopilots.planfly.law.guide` takes them.
+    The other parameters are those of `flight.autopilots.planfly.law.guide`.
 
     The path is only the reference against which the track is measured; the law does not use it.
     """
@@ -165,7 +165,7 @@ def fly_as_px4(
 
 @inner
 def _end_mission(estimated: Record, b: Record, memory: Record, parameters: Record, own: Record, dt: float) -> None:
-    """End the flight past the last waypoint b once it is at its altitude, or after a timeout.
+    """End the flight once it is past the last waypoint b and at its altitude, or after a timeout.
 
     At the mission's end PX4 loiters without end (`MissionBase::setEndOfMissionItems`): the flight joins that loiter
     and flies it once around.  A circle that begins before the waypoint, and is left at once because the altitude is

@@ -1,4 +1,4 @@
-"""PX4's navigator: the waypoint that is flown to, its acceptance, and the altitude setpoint on a leg.
+"""Navigate as PX4 does: choose the waypoint to fly to, accept it, and set the altitude setpoint on a leg.
 
 Follows PX4's `src/modules/navigator/mission_block.cpp` (`is_mission_item_reached_or_completed`) and
 `src/modules/fw_mode_manager` (to 1.16 `fw_pos_control`).  A waypoint is reached within a radius of it or past the plane
@@ -45,7 +45,7 @@ def reach_radius(ground_speed: float, parameters: Record) -> float:
 
 @inner
 def past_waypoint(estimated: Record, b: Record, own: Record) -> bool:
-    """Return True past the plane across the leg at its end b; False for a leg without length."""
+    """Return True if the aircraft is past the plane across the leg at its end b; False for a leg without length."""
     leg_east, leg_north = b.east - own.from_east, b.north - own.from_north
     ahead = (estimated.east - b.east) * leg_east + (estimated.north - b.north) * leg_north
     return leg_east * leg_east + leg_north * leg_north > 1e-6 and ahead > 0.0
@@ -79,7 +79,7 @@ def navigate(
         _navigate_rtl(estimated, b, wind_east, wind_north, airspeed_demand, parameters, own)
         return
     if b.circle != 0.0:
-        _loiter(estimated, waypoints, b, wind_east, wind_north, airspeed_demand, parameters, own, dt)
+        _fly_loiter(estimated, waypoints, b, wind_east, wind_north, airspeed_demand, parameters, own, dt)
     else:
         _follow_plain_leg(estimated, waypoints, target, wind_east, wind_north, airspeed_demand, parameters, own, dt)
 
@@ -95,7 +95,7 @@ def flown_to(waypoints: Records, own: Record) -> int:
 
 @inner
 def _past_gate(estimated: Record, gate: Record, b: Record) -> bool:
-    """Return True past the plane through a gate, at right angles to the line from it to the waypoint b."""
+    """Return True past the plane through a gate that is perpendicular to the line from the gate to the waypoint b."""
     onward_east, onward_north = b.east - gate.east, b.north - gate.north
     ahead = (estimated.east - gate.east) * onward_east + (estimated.north - gate.north) * onward_north
     return ahead >= 0.0
@@ -145,7 +145,7 @@ def _follow_plain_leg(
 
 
 @inner
-def _loiter(
+def _fly_loiter(
     estimated: Record,
     waypoints: Records,
     b: Record,
@@ -190,7 +190,7 @@ def _loiter(
 
 @inner
 def is_last(waypoints: Records, own: Record) -> bool:
-    """Return True if nothing follows the current target, other corners of the same loiter excluded."""
+    """Return True if nothing but corners of the same loiter follows the current target."""
     target = flown_to(waypoints, own)
     b = waypoints[target]
     return target + 1 >= waypoints.shape[0] or (b.circle != 0.0 and waypoints[-1].stop == b.stop)
@@ -204,7 +204,7 @@ def _setpoint_position(b: Record) -> tuple[float, float]:
 
 @inner
 def _is_on_exit_course(estimated: Record, onward: Record, b: Record) -> bool:
-    """Return True if the course leads to the setpoint after loiter b, or if none can.
+    """Return True if the course leads to the setpoint after loiter b, or if no course can.
 
     No course is required to a setpoint too close to the loiter's center.  onward: the waypoint after the loiter.
     """
@@ -225,7 +225,7 @@ def _navigate_rtl(
     parameters: Record,
     own: Record,
 ) -> None:
-    """Fly an RTL: climb in a circle if need be, go straight to the target at that altitude, descend there.
+    """Fly an RTL: climb in a circle if necessary, go straight to the target at that altitude, and descend there.
 
     Follows PX4's `src/modules/navigator/rtl_direct.cpp`; the aircraft never descends before it is over its target.
     """
@@ -265,7 +265,7 @@ def _navigate_rtl(
 
 @inner
 def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> None:
-    """Begin a leg: its line joins both waypoints, and after a loiter starts from the loiter's center.
+    """Begin a leg, whose line joins both waypoints; after a loiter, the line starts at the loiter's center.
 
     After a loiter by turns, which PX4 does not fly, it starts where the loiter is left.
     """
@@ -290,7 +290,7 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> N
 
 @inner
 def past_corner(estimated: Record, b: Record) -> bool:
-    """Return True if an aircraft on a loiter has passed the corner of the route for this part of it."""
+    """Return True if an aircraft on a loiter has passed the route's corner for this part of the loiter."""
     corner = math.atan2(b.east - b.centre_east, b.north - b.centre_north)
     here = math.atan2(estimated.east - b.centre_east, estimated.north - b.centre_north)
     turned = wrap(here - corner) * math.copysign(1.0, b.circle)
@@ -299,7 +299,7 @@ def past_corner(estimated: Record, b: Record) -> bool:
 
 @inner
 def leg_height(end_east: float, end_north: float, end_up: float, early: float, own: Record) -> float:
-    """Return a leg's altitude setpoint at the aircraft, m: a slope that ends ``early`` m before its end.
+    """Return a leg's altitude setpoint at the aircraft, m, on a slope that ends ``early`` m before the leg's end.
 
     PX4 calls it a first-order hold.  The slope uses the smallest horizontal distance to the end that was reached on
     this leg; a leg no longer than ``early`` is a step.

@@ -155,7 +155,7 @@ TABLE = ParameterTable(PX4, "PX4", DEFINITIONS, pairs=_PAIRS, orders=_ORDERS, lo
 class Px4Parameters(ParameterSet):
     r"""Parameters with which PX4 flies.
 
-    version: of PX4.
+    version: release of PX4.
 
     >>> default = Px4Parameters.defaults()
     >>> round(default["FW_R_LIM"], 3), default["NAV_ACC_RAD"], Px4Parameters.defaults("1.16").anticipates
@@ -186,7 +186,7 @@ class Px4Parameters(ParameterSet):
 
     @classmethod
     def _of_aircraft(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
-        """Return the values of the aircraft's file that are PX4's too, within PX4's ranges."""
+        """Return the values in the aircraft's file that PX4 has as well, limited to PX4's ranges."""
         values = {}
         for name, entry in entries.items():
             if name in FROM_ARDUPILOT:
@@ -196,13 +196,13 @@ class Px4Parameters(ParameterSet):
         return values
 
     @classmethod
-    def _is_stated(cls, definition: Definition, value: float) -> bool:
-        """Return False for a parameter that is not flown and has PX4's own value: a station saves every parameter."""
+    def _counts_as_set(cls, definition: Definition, value: float) -> bool:
+        """Return False for a parameter that is not flown and has its default, because stations save every parameter."""
         return definition.name not in NOT_FLOWN or value != definition.default
 
     @property
     def is_whole_set(self) -> bool:
-        """True if the file is a complete set: a parameter that it does not state has the release's default."""
+        """True if the file is a complete set, so that a parameter missing from it has the release's default."""
         return len(self.unused) + len(self.by_origin("file")) >= _COMPLETE_SET_COUNT
 
     @property
@@ -225,7 +225,7 @@ class Px4Parameters(ParameterSet):
 
 
 def speed_filter_gains(speed: float, rate: float, process: float) -> tuple[float, float, float, float]:
-    """Return the gains of the airspeed filter: speed by errors of speed and rate, rate by the same.
+    """Return the gains of the airspeed filter, for speed and for rate, each by the errors of speed and of rate.
 
     speed, rate: standard deviations of the measured airspeed (m/s) and of its measured rate (m/s^2).  process: standard
     deviation of the noise that drives the rate, m/s^2.  They are the steady gains of a Kalman-Bucy filter on an

@@ -1,4 +1,4 @@
-"""PX4's TECS: throttle from the STE rate, pitch from the balance of altitude and speed (SEB rate).
+"""Implement PX4's TECS, with throttle from the STE rate and pitch from the balance of altitude and speed (SEB rate).
 
 Follows PX4's `src/lib/tecs/TECS.cpp` and its parameter reference (FW_T_*).  The Total Energy Control System is by
 Lambregts (AIAA 83-2239).  Energies are per kilogram, their rates m^2/s^3.  Speeds are true airspeeds.
@@ -21,7 +21,7 @@ _UNDERSPEED_FRACTION = 0.15
 def lead_height(parameters: Record, own: Record, dt: float) -> None:
     """Move the altitude reference towards the setpoint, within its limits (`TECSAltitudeReferenceModel`).
 
-    It climbs by FW_T_CLMB_R_SP and sinks by FW_T_SINK_R_SP at most, and decelerates in time, with FW_T_VERT_ACC.
+    It climbs by at most FW_T_CLMB_R_SP, sinks by at most FW_T_SINK_R_SP, and decelerates in time with FW_T_VERT_ACC.
     """
     altitude_error = own.height_asked - own.height_reference
     rate = min(math.sqrt(2.0 * parameters.vertical_acceleration * abs(altitude_error)), abs(altitude_error) / dt)
@@ -80,7 +80,7 @@ def update_tecs(
 
 @inner
 def underspeed(airspeed: float, parameters: Record) -> float:
-    """Return the underspeed ratio (0..1): the priority of speed over altitude (`_detectUnderspeed`).
+    """Return the underspeed ratio (0..1), which is the priority of speed over altitude (`_detectUnderspeed`).
 
     airspeed: equivalent, m/s.
     """

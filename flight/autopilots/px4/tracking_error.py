@@ -1,4 +1,4 @@
-"""Deviation of PX4 from the legs of a plan: corners flown in the plane by its own guidance.
+"""Compute PX4's deviation from the legs of a plan by flying corners with its own guidance in the plane.
 
 Each corner is flown in still air, at a constant ground speed, by `flight.autopilots.px4.navigator` and the lag of the
 bank.  For wind, the excursion in still air at the highest ground speed on the leg is taken, increased by `WIND_SPREAD`.
@@ -66,16 +66,17 @@ def tracking_error(
     *,
     turbulence: Turbulence = "none",
 ) -> TrackingError:
-    """Return the room that a plan leaves for PX4's deviations at an equivalent airspeed (m/s).
+    """Return the margins that a plan needs for PX4's deviations at an equivalent airspeed (m/s).
 
-    nav: accuracy of navigation.  turbulence: of the wind.
+    nav: accuracy of navigation.
+    turbulence: turbulence of the wind.
 
     >>> from flight.autopilots.px4.parameters import Px4Parameters
     >>> error = tracking_error(Px4Parameters.defaults("1.16"), 25.0, "gnss")
     >>> round(error.lag, 3), error.corner_acceptance(math.radians(30.0), 25.0)
     (3.5, 56.0)
     """
-    acceptance, excursion, before, after = _corners(parameters, airspeed)
+    acceptance, excursion, before, after = _corner_tables(parameters, airspeed)
     navigation_error = _NAVIGATION_SIGMAS * ERRORS[nav][0]
     made = parameters
     return TrackingError(
@@ -98,8 +99,11 @@ def tracking_error(
 def altitude_miss_probability(acceptance: float, climb: float, sink: float, turbulence: Turbulence) -> float:
     """Return the probability that gusts carry the aircraft beyond the altitude tolerance at a waypoint.
 
-    acceptance: NAV_FW_ALT_RAD, m.  climb, sink: spare rates of the aircraft, m/s: an up- or downdraft that exceeds them
-    carries the aircraft off until it ends.  Computed for moderate turbulence only, 0 for any other.
+    acceptance: NAV_FW_ALT_RAD, m.
+    climb, sink: rates that the aircraft has in reserve, m/s; an up- or downdraft that exceeds them carries the aircraft
+        off until the draft ends.
+
+    The probability is computed for moderate turbulence only; for any other turbulence it is 0.
 
     >>> round(altitude_miss_probability(10.0, 4.0, 4.0, "moderate"), 3)
     0.013
@@ -110,13 +114,13 @@ def altitude_miss_probability(acceptance: float, climb: float, sink: float, turb
         return 0.0
     gust, extra_rate = 0.1 * W20[turbulence], acceptance / _GUST_DURATION_S
     return (
-        2.0 * _exceedance(acceptance / _ALTITUDE_SIGMA_MODERATE_M)
-        + _exceedance((climb + extra_rate) / gust)
-        + _exceedance((sink + extra_rate) / gust)
+        2.0 * _exceedance_probability(acceptance / _ALTITUDE_SIGMA_MODERATE_M)
+        + _exceedance_probability((climb + extra_rate) / gust)
+        + _exceedance_probability((sink + extra_rate) / gust)
     )
 
 
-def _exceedance(deviations: float) -> float:
+def _exceedance_probability(deviations: float) -> float:
     """Return the probability that a normal variable exceeds this many standard deviations, on one side."""
     return 0.5 * math.erfc(deviations / math.sqrt(2.0))
 
@@ -126,7 +130,7 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 
 
 @lru_cache(maxsize=8)
-def _corners(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
+def _corner_tables(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
     """Return tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
     _fill(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, waypoint_column(3))
@@ -157,7 +161,7 @@ def _fill(
 def _fly_corner(
     parameters: Record, airspeed: float, turn: float, speed: float, waypoints: Records
 ) -> tuple[float, float]:
-    """Return the greatest distance from the two legs, and the length of the second until it is settled, m.
+    """Return the maximum distance from the two legs, and the length of the second leg until the flight settles, m.
 
     The first leg leads north to the origin.  turn: rad, to the right.  speed: over the ground, m/s.
     """

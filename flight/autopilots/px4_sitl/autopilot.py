@@ -1,4 +1,4 @@
-"""PX4 itself as an autopilot: its SITL program, in lockstep with planfly's physics."""
+"""Implement PX4 itself as an autopilot, by its SITL program in lockstep with planfly's physics."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from flight.simulation.setup import FlightSetup
 
 @dataclass(frozen=True)
 class Px4Sitl(ProgramAutopilot, Px4):
-    """PX4 itself.  Before the flight its law answers for it."""
+    """PX4 itself.  Before the flight, its control law stands in for the program."""
 
     log_suffix: ClassVar = ".ulg"
 
@@ -30,12 +30,12 @@ class Px4Sitl(ProgramAutopilot, Px4):
 
     @classmethod
     def flying(cls, law: Px4, binary: Path) -> Self:
-        """Return the program's autopilot in place of its law."""
+        """Return the program's autopilot in place of its control law."""
         return cls(law.parameters, binary=binary)
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return an empty list: it needs only the servo map, which ArduPlane's program reports if missing."""
+        """Return an empty list, because it needs only the servo map, which ArduPlane's program reports if missing."""
         return []
 
     @property

@@ -1,4 +1,4 @@
-"""Flight of PX4 itself, as a program in lockstep with planfly's physics."""
+"""Fly PX4 itself, as a program in lockstep with planfly's physics."""
 
 import contextlib
 from collections.abc import Iterator
@@ -74,7 +74,7 @@ class Px4Flight(SitlFlight):
                 if (link.news.version or _FIRST_WITHOUT_ANTICIPATION) < _FIRST_WITHOUT_ANTICIPATION
                 else NEWEST_PX4
             )
-            flown = replace(autopilot.of_release(version), program=_program(link, digest, given))
+            flown = replace(autopilot.of_release(version), program=_program_of_messages(link, digest, given))
             self.setup = replace(setup, autopilot=flown)
             self._stack = stack.pop_all()
 
@@ -85,7 +85,7 @@ class Px4Flight(SitlFlight):
 
     @property
     def _is_ending(self) -> bool:
-        """True once it has reached its last waypoint, if it circles about that, or as in the base class."""
+        """True once it has reached its last waypoint, if it circles there; otherwise as in the base class."""
         circles = self._workspace.path["waypoint"]["ends"][self.setup.route.legs]
         return self._link.news.reached >= self.last_item if circles else super()._is_ending
 
@@ -114,7 +114,7 @@ def _has_started(process: AutopilotProcess) -> bool:
     return any(STARTED in line for line in process.lines())
 
 
-def _program(link: AutopilotLink, digest: str, given: GivenParameters) -> AutopilotProgram:
+def _program_of_messages(link: AutopilotLink, digest: str, given: GivenParameters) -> AutopilotProgram:
     """Return the program that flew, from its messages."""
     news = link.news
     unknown = given.changed.keys() - news.parameters.keys()

@@ -1,4 +1,4 @@
-"""Parameters of PX4 for a flight: from the simulation, the aircraft, and the user on top."""
+"""Collect PX4's parameters for a flight from the simulation, the aircraft, and, with priority, the user."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""PX4's simulator link in lockstep: sensor messages, the socket, and the exchange.
+"""Implement PX4's simulator link in lockstep, with sensor messages, socket and exchange.
 
 PX4 connects to the simulator by TCP with MAVLink.  Each HIL_SENSOR sets its clock and triggers a step; once its outputs
 run, it answers each with one HIL_ACTUATOR_CONTROLS.  Follows PX4's
@@ -93,7 +93,7 @@ class Sensors:
         self._random = random.Random(1)
 
     def measured(self, motion: BodyMotion) -> Any:
-        """Return HIL_SENSOR: inertial sensors, magnetometer, barometer and Pitot tube."""
+        """Return HIL_SENSOR, with inertial sensors, magnetometer, barometer and Pitot tube."""
         dither = self._random.uniform
         field = to_body((motion.roll, motion.pitch, motion.yaw), self._field)
         pressure, temperature, density = atmosphere(self._home[2] - motion.down)
@@ -138,7 +138,7 @@ class Sensors:
 
 
 def between(before: BodyMotion, after: BodyMotion) -> BodyMotion:
-    """Return the motion half way between two; their courses must differ by less than half a turn."""
+    """Return the motion halfway between two motions, whose courses must differ by less than half a turn."""
     middle = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
     made = BodyMotion(*middle)
     return made._replace(yaw=before.yaw + 0.5 * math.remainder(after.yaw - before.yaw, 2.0 * math.pi))
@@ -213,21 +213,21 @@ class SimulatorPort:
             return
 
     def answer(self, patience: float) -> tuple[float, ...] | None:
-        """Return HIL_ACTUATOR_CONTROLS.controls (16,), or None if none arrives in time, s by the clock.
+        """Return HIL_ACTUATOR_CONTROLS.controls (16,), or None if it does not arrive within `patience` s by the clock.
 
         Raise FlightError for a program that ends.
         """
-        if not self._answers and not (self._read(patience) and self._answers):
+        if not self._answers and not (self._receive_data(patience) and self._answers):
             began = self._clock()
             while not self._answers:
-                if not self._read(patience):
+                if not self._receive_data(patience):
                     self.watch()
                     if patience <= _CHECK_INTERVAL_S or self._clock() - began > patience:
                         return None
         return self._answers.pop(0)
 
     def awaited_answer(self) -> tuple[float, ...]:
-        """Return the answer of a PX4 whose outputs run, which answers every step.
+        """Wait for the answer of PX4 with running outputs, which answers every step, and return it.
 
         Raise FlightError if there is no answer.
         """
@@ -236,8 +236,8 @@ class SimulatorPort:
             raise FlightError(f"silent for {SILENCE:.0f} s; ended", field="simulator")
         return answer
 
-    def _read(self, patience: float) -> bool:
-        """Read what arrives within a time, s, at most `_CHECK_INTERVAL_S`; return True if anything did."""
+    def _receive_data(self, patience: float) -> bool:
+        """Read data for up to `patience` s, but at most `_CHECK_INTERVAL_S`, and return True if any arrived."""
         if self._stream is None:
             raise ValueError("PX4 has not connected")
         wait = min(patience, _CHECK_INTERVAL_S)
@@ -283,9 +283,10 @@ _EARLY_ANSWER_TIMEOUT_S = 0.01
 
 
 class HilLockstep(Lockstep):
-    """Exchange over that socket: two steps of PX4, which samples its sensors at 250 Hz, in each frame.
+    """Exchange over a `SimulatorPort`, with two steps of PX4, which samples its sensors at 250 Hz, in each frame.
 
-    servos: outputs of the controls; the throw of each is PX4's -1..1 (throttle 0..1).  The others as in `Lockstep`.
+    servos: outputs of the controls; the throw of each is PX4's -1..1 (throttle 0..1).  The other parameters are those
+    of `Lockstep`.
     """
 
     def __init__(
@@ -328,7 +329,7 @@ class HilLockstep(Lockstep):
         self._owes = True
 
     def boot(self, rail: RailEnd, started: Callable[[], bool], patience: float, seconds: float) -> None:
-        """Start PX4 with its clock at rest: it gets a step only where it waits for one.
+        """Start PX4 with its clock at rest, and trigger a step only when PX4 waits for one.
 
         started: returns True once its start-up script has ended.  patience: s by the clock without an answer before a
         step.  Raise FlightError if the script does not end within ``seconds`` by the clock.

@@ -1,4 +1,4 @@
-"""Preparation of PX4 before it flies: parameters, mission, home, arming, and mission mode on the rail."""
+"""Prepare PX4 before it flies, by parameters, mission, home, arming, and mission mode on the rail."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -34,7 +34,7 @@ class Px4Preflight(Conversation):
     """The conversation with one PX4."""
 
     def meet(self, parameters: Iterable[str]) -> Talk:
-        """Identify it, and read the given parameters as far as it has them.
+        """Identify the autopilot, and read those of the given parameters that it has.
 
         Raise FlightError if it is not PX4.
         """
@@ -58,7 +58,7 @@ class Px4Preflight(Conversation):
         yield from self._send_until_accepted(Command.DO_SET_MODE, lambda: self._set_mode(_MANUAL, 0), "MANUAL")
         yield from self._send_until_accepted(
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
-            lambda: self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1),
+            lambda: self._send_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1),
             "arming",
         )
 
@@ -75,14 +75,14 @@ class Px4Preflight(Conversation):
 
     def disarm(self) -> None:
         """Disarm it, which closes its log."""
-        self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, _FORCE_DISARMING)
+        self._send_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, _FORCE_DISARMING)
 
     def _set_mode(self, main: int, sub: int) -> None:
-        self._command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main, sub)
+        self._send_command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main, sub)
 
 
 def counted_from_0(items: Iterable[MissionItem]) -> list[MissionItem]:
-    """Return a mission's items numbered as in PX4: from 0, as PX4 stores home separately.
+    """Renumber a mission's items from 0, as in PX4, which stores home separately.
 
     ArduPlane numbers them from 1.
 

@@ -1,4 +1,4 @@
-"""Start of PX4's program: the files in its folder, and its command line."""
+"""Start PX4's program, with the files in its folder and its command line."""
 
 import shutil
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""Conversation with a SITL autopilot before it flies, with the aircraft held on its rail.
+"""Talk to a SITL autopilot before it flies, while the aircraft is held on its rail.
 
 A conversation is a generator.  Each time it is resumed, some more of the autopilot's time has passed, and the link has
 taken in what the autopilot has sent.
@@ -46,14 +46,14 @@ _MISSION_RESULTS = {number: entry.name for number, entry in mavlink.enums["MAV_M
 
 
 class _Stopwatch:
-    """Time since a moment, in the autopilot's time and by the clock."""
+    """Time since a given moment, both in the autopilot's time and by the clock."""
 
     def __init__(self, now: Callable[[], float], clock: Callable[[], float]) -> None:
         self._now, self._clock = now, clock
         self._moments = now(), clock()
 
     def longer_than(self, seconds: float) -> bool:
-        """Return True if more of the autopilot's time has passed, and enough by the clock."""
+        """Return True if more than this time of the autopilot has passed, and enough time by the clock."""
         began, by_clock = self._moments
         return self._now() - began > seconds and self._clock() - by_clock > min(seconds, _MIN_REAL_TIME_S)
 
@@ -61,7 +61,9 @@ class _Stopwatch:
 class Awaited(NamedTuple):
     """A state that an autopilot has to reach.
 
-    field: its name.  seconds: timeout.  failed: message after the timeout.
+    field: name of the state.
+    seconds: timeout, s.
+    failed: message after the timeout.
     """
 
     field: str
@@ -72,7 +74,9 @@ class Awaited(NamedTuple):
 class Conversation:
     """The conversation with one autopilot.
 
-    link: to the autopilot.  now: the autopilot's time, s.  clock: real time, s.
+    link: connection to the autopilot.
+    now: function for the autopilot's time, s.
+    clock: function for real time, s.
     """
 
     def __init__(
@@ -82,10 +86,11 @@ class Conversation:
         self._news = link.news
 
     def _identify(self, kind: str, wanted: dict[int, int], parameters: Iterable[str]) -> Talk:
-        """Identify the autopilot, request messages, and read the given parameters, as far as it has them.
+        """Identify the autopilot, request messages, and read those of the given parameters that it has.
 
         Raise FlightError if it is not a fixed wing.
-        kind: expected autopilot, in words.  wanted: intervals in microseconds by the number of the message.
+        kind: expected autopilot, in words.
+        wanted: requested intervals in microseconds by the number of the message.
         """
         news = self._news
         heard = Awaited("heartbeat", HEARTBEAT_TIMEOUT_S, "said nothing over MAVLink")
@@ -98,9 +103,9 @@ class Conversation:
                 allowed="1, a fixed wing, flies",
             )
         for message, interval in wanted.items():
-            self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval)
-        self._command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
-        self._command(mavlink.MAV_CMD_DO_SEND_BANNER)
+            self._send_command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval)
+        self._send_command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+        self._send_command(mavlink.MAV_CMD_DO_SEND_BANNER)
         names = list(parameters)
         for k in range(0, len(names), _PARAMETERS_PER_REQUEST):
             yield from self._read_parameters(names[k : k + _PARAMETERS_PER_REQUEST])
@@ -114,7 +119,7 @@ class Conversation:
         yield from self._wait_until(
             lambda: news.ekf & _REQUIRED_EKF_FLAGS == _REQUIRED_EKF_FLAGS and not news.ekf & lost,
             Awaited("EKF", POSITION_TIMEOUT_S, "did not come to know where it is (EKF)"),
-            lambda: self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval),
+            lambda: self._send_command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval),
         )
 
     def _wait_until(self, done: Callable[[], bool], awaited: Awaited, again: Callable[[], None] | None = None) -> Talk:
@@ -122,7 +127,7 @@ class Conversation:
         started, asked = self._start_stopwatch(), None
         while not done():
             if started.longer_than(awaited.seconds):
-                message = f"{awaited.failed} within {awaited.seconds:.0f} s{self._last_text()}"
+                message = f"{awaited.failed} within {awaited.seconds:.0f} s{self._last_status_text()}"
                 raise FlightError(message, field=awaited.field)
             if again is not None and (asked is None or asked.longer_than(AGAIN)):
                 asked = self._start_stopwatch()
@@ -132,7 +137,7 @@ class Conversation:
     def _start_stopwatch(self) -> _Stopwatch:
         return _Stopwatch(self._now, self._clock)
 
-    def _last_text(self) -> str:
+    def _last_status_text(self) -> str:
         return f"; it last said: {self._news.texts[-1]}" if self._news.texts else ""
 
     def _send_heartbeat(self) -> None:
@@ -142,7 +147,7 @@ class Conversation:
             )
         )
 
-    def _command(self, command: int, *params: float) -> None:
+    def _send_command(self, command: int, *params: float) -> None:
         numbers = [float(value) for value in (*params, *(0.0,) * (7 - len(params)))]
         self._link.send(mavlink.MAVLink_command_long_message(SYSTEM, COMPONENT, int(command), 0, *numbers))
 
@@ -200,7 +205,7 @@ class Conversation:
                     else (f" at item {asked} ({command_name(items[asked].command)})")
                 )
                 name = "no answer" if result is None else _MISSION_RESULTS.get(result, str(result))
-                message = f"refused the {what}{item}: {name}{self._last_text()}"
+                message = f"refused the {what}{item}: {name}{self._last_status_text()}"
                 raise FlightError(message, field=what, value=name)
             yield from self._wait(AGAIN)
 

@@ -1,4 +1,4 @@
-"""Lockstep exchange with an autopilot: its outputs move the controls, and its sensors get the result."""
+"""Exchange data with an autopilot in lockstep: its outputs move the controls, and its sensors get the result."""
 
 import math
 import struct
@@ -24,7 +24,7 @@ _METRES_PER_RADIAN = math.degrees(METRES_A_DEGREE)
 
 
 class BodyMotion(NamedTuple):
-    """Motion of the aircraft as the autopilot's sensors are to measure it.
+    """Motion of the aircraft, as it is given to the autopilot's sensors.
 
     time: s.  roll_rate..yaw_rate: rad/s about the body's axes.
     force_x..force_z: specific force along the body's axes, m/s^2; at rest 0, 0, -9.81.
@@ -92,8 +92,14 @@ _EARTH_RADIUS_M = 6_371_000.0
 class RailEnd:
     """End of the rail, and the aircraft's motion there: trimmed level flight, or a launch.
 
-    lat, lon: rad.  amsl: m.  roll, pitch, yaw: rad.  course: of the rail, rad.  ground_speed: m/s.
-    wind_north, wind_east: m/s.  incline: of the rail above level, rad.  push: acceleration along it, m/s^2.
+    lat, lon: rad.
+    amsl: m.
+    roll, pitch, yaw: rad.
+    course: course of the rail, rad.
+    ground_speed: m/s.
+    wind_north, wind_east: m/s.
+    incline: slope of the rail above level, rad.
+    push: acceleration along the rail, m/s^2.
     """
 
     lat: float
@@ -116,7 +122,7 @@ class RailEnd:
 
 
 def rail_end(state: Record, wind: tuple[float, float, float]) -> RailEnd:
-    """Return the rail to a trimmed flight.
+    """Return the rail that leads to a trimmed flight.
 
     state: a record of `flight.dynamics.state.STATE`.  wind: north, east, down, m/s.
     """
@@ -234,7 +240,7 @@ class Lockstep(ABC):
     def _receive_commands(self) -> Commands:
         """Wait for the commands of the next frame.
 
-        Raise FlightError for a program that ends or falls silent.
+        Raise FlightError for a program that ends or stops answering.
         """
 
     @abstractmethod
@@ -269,7 +275,7 @@ class Lockstep(ABC):
         )
 
     def step(self) -> None:
-        """Run one frame of flight with the present controls: JSBSim steps, and the autopilot gets the motion."""
+        """Run one frame of flight with the present controls: step JSBSim, and send the motion to the autopilot."""
         self._access.run()
         lat, lon, amsl, vn, ve, vd, roll, pitch, yaw, p, q, r, airspeed = [
             get() * factor for get, factor in self._motion

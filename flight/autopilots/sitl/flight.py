@@ -1,4 +1,4 @@
-"""Flight of an autopilot's program in lockstep with planfly's physics."""
+"""Fly an autopilot's program in lockstep with planfly's physics."""
 
 import contextlib
 import math
@@ -55,11 +55,11 @@ _SEARCHED_PIECES = 4
 
 @compiled
 def autopilot_tick(block: Floats, heights: Heights) -> int:
-    """Run a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
+    """Run a tick on the block of a `flight.simulation.tick.Workspace`, as the tick of a control law does.
 
-    The other program has set the commands in the block.  The flight completes where it passes the end of the path, once
-    the program reports that only this end lies ahead; an RTL completes in its loiter, a loiter without end after
-    `UNLIMITED`, and a mission whose last waypoint is circled about completes after one lap.
+    The autopilot's program has set the commands in the block.  The flight completes where it passes the end of the
+    path, once the program reports that only this end lies ahead; an RTL completes in its loiter, a loiter without end
+    after `UNLIMITED`, and a mission whose last waypoint is circled about completes after one lap.
     """
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
     path: Record = block[WORKSPACE_NUMBERS:].view(PATH_ROW)
@@ -90,8 +90,8 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
 def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record) -> None:  # pragma: no cover
     """Fill leg, distance, cross-track and altitude error of the memory from the nearest path piece.
 
-    The search starts at the last piece.  A piece against the direction of flight is not begun: the way back of an
-    out-and-back leg lies on the way out.
+    The search starts at the last piece.  A piece against the direction of flight is not begun, because the way
+    back of an out-and-back leg lies on the way out.
     true: a record of `flight.guidance.navigation_error.MOTION`.
     """
     k, nearest, distance, cross_track = memory.piece, math.inf, 0.0, 0.0
@@ -195,7 +195,7 @@ class SitlFlight(ProgramFlight):
         super().__init__(setup, aircraft, load_gains(aircraft), gear=gear)
         self._release: Release | None = None
         self._rail = self._make_rail(setup)
-        self._disturb(setup)
+        self._start_disturbances(setup)
         self._mission = uploaded_mission(setup)
         if self._ways:
             self.max_ticks += int(GROUND_PATIENCE / self.dt)
@@ -219,7 +219,7 @@ class SitlFlight(ProgramFlight):
 
     @property
     def _is_ending(self) -> bool:
-        """True if by the program's own account only the end of its mission lies ahead."""
+        """True if the program reports that only the end of its mission lies ahead."""
         return self._link.news.mission_item >= self.last_item
 
     @abstractmethod
@@ -240,11 +240,9 @@ class SitlFlight(ProgramFlight):
         return self._lockstep.time
 
     def prepare(self) -> None:
-        """Make the autopilot settle, accept the mission and fly to the first waypoint.
+        """Make the autopilot settle, accept the mission, and fly to the first waypoint; for a take-off, launch it.
 
         Raise FlightError as the class does.
-
-        For a take-off it is launched instead, or left to roll.
         """
         with self._name_program():
             self._prepare_program()
@@ -267,7 +265,7 @@ class SitlFlight(ProgramFlight):
 
     @contextlib.contextmanager
     def _name_program(self, kind: type[FlightError] = FlightError) -> Iterator[None]:
-        """Yield name the program in its errors, and raise them as an error of this kind."""
+        """Yield; raise any error of the program meanwhile as an error of this kind that names the program."""
         try:
             yield
         except FlightError as error:
@@ -275,13 +273,13 @@ class SitlFlight(ProgramFlight):
             raise kind.from_error(error, "" if named else self._binary) from error
 
     def _make_rail(self, setup: FlightSetup) -> RailEnd:
-        """Trim the aircraft at its release: before the first waypoint, straight and level, without ground.
+        """Trim the aircraft at its release before the first waypoint, straight and level and without ground.
 
-        For a take-off the rail is the launch's rail.
+        For a take-off, return the rail of the launch.
         """
-        start, points = self._start(setup), setup.route.waypoints
+        start, points = self._find_start(setup), setup.route.waypoints
         if self._ways.take_off is not None:
-            self._trim(setup.mission.source, start)
+            self._start_trimmed(setup.mission.source, start)
             aircraft = self.fdm.aircraft
             self._release = find_release(setup, self.map, self._ground, aircraft, self._ways.take_off)
             return launch_rail(self._release, self._ways.take_off)
@@ -289,7 +287,7 @@ class SitlFlight(ProgramFlight):
         back = points[0, :2] - step / np.hypot(*step) * max(RUN_IN, RUN_IN_SECONDS * start.airspeed)
         lat, lon = (float(value) for value in to_geo(setup.scenario.origin, *back))
         begin = replace(start, lat_deg=lat, lon_deg=lon, slope=0.0, ground=min(0.0, start.amsl - 1000.0))
-        self._trim(setup.mission.source, begin)
+        self._start_trimmed(setup.mission.source, begin)
         return rail_end(self.fdm.read(), start.wind)
 
     def _hold_during(self, talk: Talk) -> None:
@@ -303,7 +301,7 @@ class SitlFlight(ProgramFlight):
                 return
 
     def _poll_link(self) -> None:
-        """Read the autopilot's messages, above all the item that it flies."""
+        """Read the autopilot's messages, of which the item being flown is the most important."""
         self._link.poll()
         self._workspace.on_last_leg[0] = self._is_ending
 
@@ -334,7 +332,7 @@ class SitlFlight(ProgramFlight):
         self._loop = self._lockstep.make_loop(own, self._steps, gusts=self._windy, ground=self._ground.known)
 
     def _run_in(self) -> None:
-        """Fly to the first waypoint in the mean wind, without ground; an error on the way ends it early."""
+        """Fly to the first waypoint in the mean wind, without ground; an error meanwhile ends the run-in early."""
         work, timing, steps = self._work, self._work.timing, self._steps
         self._scale()
         tick = partial(autopilot_tick, self._workspace.block, Ground(None).heights)

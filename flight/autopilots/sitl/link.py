@@ -1,4 +1,4 @@
-"""MAVLink connection to an autopilot's program: messages to it, and the state from its messages."""
+"""Connect to an autopilot's program by MAVLink: send messages, and collect its state from its messages."""
 
 import socket
 import struct
@@ -21,13 +21,17 @@ _MAX_RECEIVE_BYTES = 65536
 class AutopilotNews:
     """State of an autopilot from its messages; None or empty for what it has not sent.
 
-    vehicle: MAV_TYPE.  autopilot: MAV_AUTOPILOT.  mode: its own number.
+    vehicle: MAV_TYPE.
+    autopilot: MAV_AUTOPILOT.
+    mode: number that the autopilot gives its mode.
     ekf: flags of EKF_STATUS_REPORT or ESTIMATOR_STATUS.
-    mission_item: number of the item that it flies.  reached: number of the last item that it reached.
+    mission_item: number of the item being flown.
+    reached: number of the last item reached.
     texts: STATUSTEXT, in order.
     parameters: by name, as it has them.
     acknowledged: the result by command, MAV_RESULT.
-    requested: the mission item it last asked for.  mission_result: MAV_MISSION_RESULT of the upload.
+    requested: the mission item that it requested last.
+    mission_result: MAV_MISSION_RESULT of the upload.
     version: AUTOPILOT_VERSION.flight_sw_version.
     """
 
@@ -70,18 +74,18 @@ class AutopilotLink(ABC):
         self._mav = mavlink.MAVLink(None, _SYSTEM, _COMPONENT)
         self._mav.robust_parsing = True
         self._handlers = {
-            "HEARTBEAT": self._heartbeat,
-            "STATUSTEXT": self._text,
-            "EKF_STATUS_REPORT": self._ekf,
-            "ESTIMATOR_STATUS": self._ekf,
-            "MISSION_CURRENT": self._mission_current,
-            "MISSION_ITEM_REACHED": self._mission_item_reached,
-            "PARAM_VALUE": self._parameter,
-            "COMMAND_ACK": self._command_ack,
-            "MISSION_REQUEST": self._mission_request,
-            "MISSION_REQUEST_INT": self._mission_request,
-            "MISSION_ACK": self._mission_ack,
-            "AUTOPILOT_VERSION": self._version,
+            "HEARTBEAT": self._on_heartbeat,
+            "STATUSTEXT": self._on_text,
+            "EKF_STATUS_REPORT": self._on_ekf,
+            "ESTIMATOR_STATUS": self._on_ekf,
+            "MISSION_CURRENT": self._on_mission_current,
+            "MISSION_ITEM_REACHED": self._on_mission_item_reached,
+            "PARAM_VALUE": self._on_parameter,
+            "COMMAND_ACK": self._on_command_ack,
+            "MISSION_REQUEST": self._on_mission_request,
+            "MISSION_REQUEST_INT": self._on_mission_request,
+            "MISSION_ACK": self._on_mission_ack,
+            "AUTOPILOT_VERSION": self._on_version,
         }
 
     @abstractmethod
@@ -114,41 +118,41 @@ class AutopilotLink(ABC):
         self._mav.seq = (self._mav.seq + 1) % 256
         self._transmit(data)
 
-    def _heartbeat(self, message: Any) -> None:
+    def _on_heartbeat(self, message: Any) -> None:
         if message.get_srcComponent() != mavlink.MAV_COMP_ID_AUTOPILOT1:
             return
         self.news.vehicle, self.news.autopilot = int(message.type), int(message.autopilot)
         self.news.mode = int(message.custom_mode)
         self.news.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
 
-    def _text(self, message: Any) -> None:
+    def _on_text(self, message: Any) -> None:
         self.news.texts.append(str(message.text))
 
-    def _ekf(self, message: Any) -> None:
+    def _on_ekf(self, message: Any) -> None:
         self.news.ekf = int(message.flags)
 
-    def _mission_current(self, message: Any) -> None:
+    def _on_mission_current(self, message: Any) -> None:
         self.news.mission_item = int(message.seq)
 
-    def _mission_item_reached(self, message: Any) -> None:
+    def _on_mission_item_reached(self, message: Any) -> None:
         self.news.reached = int(message.seq)
 
-    def _parameter(self, message: Any) -> None:
+    def _on_parameter(self, message: Any) -> None:
         value, form = float(message.param_value), _INTEGER_FORMATS.get(message.param_type)
         if form is not None and self.news.autopilot == mavlink.MAV_AUTOPILOT_PX4:
             (value,) = struct.unpack(form, struct.pack("<f", value))
         self.news.parameters[str(message.param_id)] = float(value)
 
-    def _command_ack(self, message: Any) -> None:
+    def _on_command_ack(self, message: Any) -> None:
         self.news.acknowledged[int(message.command)] = int(message.result)
 
-    def _mission_request(self, message: Any) -> None:
+    def _on_mission_request(self, message: Any) -> None:
         self.news.requested = int(message.seq)
 
-    def _mission_ack(self, message: Any) -> None:
+    def _on_mission_ack(self, message: Any) -> None:
         self.news.mission_result = int(message.type)
 
-    def _version(self, message: Any) -> None:
+    def _on_version(self, message: Any) -> None:
         self.news.version = int(message.flight_sw_version)
 
 
@@ -197,7 +201,7 @@ class TcpLink(AutopilotLink):
 class UdpLink(AutopilotLink):
     """A socket to which the program sends.
 
-    theirs: the port on which it listens; free now.
+    theirs: the port on which the program listens; free now.
     """
 
     def __init__(self) -> None:
@@ -228,7 +232,7 @@ class UdpLink(AutopilotLink):
 
 
 def free_ports(count: int) -> list[int]:
-    """Return ports that are free now, for what the program opens without anything connecting to it."""
+    """Return ports that are free now, for sockets of the program that nothing connects to."""
     sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
     try:
         for opened in sockets:

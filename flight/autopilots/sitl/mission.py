@@ -1,4 +1,4 @@
-"""Mission that an autopilot is given to fly: the items of the route, and one extra waypoint.
+"""Build the mission that an autopilot gets to fly, from the items of the route and one extra waypoint.
 
 Items that a flight from air to air cannot contain, a take-off or a landing, become waypoints where the route has them.
 An extra waypoint, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it accepts a
@@ -69,17 +69,17 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
     if not any(item.has_position for item in kept):
         kept = _route_items(route, origin)
     elif route.items[-1] == -1 and kept[-1].command != Command.NAV_LOITER_UNLIM:
-        kept.append(_waypoint(kept[-1].seq + 1, route.waypoints[-1], 0.0, origin))
+        kept.append(_make_waypoint(kept[-1].seq + 1, route.waypoints[-1], 0.0, origin))
     if (route.return_from >= 0 and not lands) or kept[-1].command == Command.NAV_LOITER_UNLIM:
-        return UploadedMission(_home(setup), _renumber(kept), setup.mission.rally)
+        return UploadedMission(_home_for_upload(setup), _renumber(kept), setup.mission.rally)
     if setup.autopilot.loiter_rules.ends_in_circle and ends_at_plain_waypoint(route, setup.mission):
-        return UploadedMission(_home(setup), _renumber(kept))
-    kept.append(_waypoint(kept[-1].seq + 1, _extra_point(route), 0.0, origin))
-    return UploadedMission(_home(setup), _renumber(kept), setup.mission.rally if lands else ())
+        return UploadedMission(_home_for_upload(setup), _renumber(kept))
+    kept.append(_make_waypoint(kept[-1].seq + 1, _extra_point(route), 0.0, origin))
+    return UploadedMission(_home_for_upload(setup), _renumber(kept), setup.mission.rally if lands else ())
 
 
 def _unchanged_mission(setup: FlightSetup, ways: GroundWays) -> UploadedMission:
-    """Return the mission as in its file, with its home; without an altitude home is on the ground."""
+    """Return the mission as in its file, with its home; a home without an altitude is put on the ground."""
     home, mission = setup.mission.home, setup.mission
     if home is None or ways.take_off is None or ways.approach is None:
         raise ValueError("a mission from the ground to the ground has a home, a take-off and a landing")
@@ -96,11 +96,11 @@ def _unchanged_mission(setup: FlightSetup, ways: GroundWays) -> UploadedMission:
 def _place_item(
     item: MissionItem, route: Route, rows: NDArray[np.intp], origin: GeoOrigin, before: list[MissionItem]
 ) -> MissionItem:
-    """Return the item of a place: a loiter about its own center, or a waypoint where the route has it."""
+    """Return the item of a place, which is a loiter about its own center, or a waypoint at the route's position."""
     last = route.waypoints[rows[-1]]
     loiter = loiter_of(item)
     if loiter is None:
-        return _waypoint(item.seq, last, float(route.acceptance[rows[-1]]), origin)
+        return _make_waypoint(item.seq, last, float(route.acceptance[rows[-1]]), origin)
     lat, lon = item.lat_deg, item.lon_deg
     if not item.has_position:
         centre = next(place for place in reversed(before) if place.has_position and is_navigation(place.command))
@@ -110,11 +110,11 @@ def _place_item(
 
 
 def _route_items(route: Route, origin: GeoOrigin) -> list[MissionItem]:
-    """Return items for a route without a mission: its waypoints, and its speeds where they change."""
+    """Return the items of a route without a mission, which are its waypoints and its changes of speed."""
     items: list[MissionItem] = []
     speed = math.nan
     for k, point in enumerate(route.waypoints):
-        items.append(_waypoint(len(items) + 1, point, float(route.acceptance[k]), origin))
+        items.append(_make_waypoint(len(items) + 1, point, float(route.acceptance[k]), origin))
         if k < len(route.airspeed) and route.airspeed[k] != speed:
             speed = float(route.airspeed[k])
             change = (0.0, speed, -1.0, 0.0)
@@ -124,7 +124,7 @@ def _route_items(route: Route, origin: GeoOrigin) -> list[MissionItem]:
     return items
 
 
-def _waypoint(seq: int, point: Floats, acceptance: float, origin: GeoOrigin) -> MissionItem:
+def _make_waypoint(seq: int, point: Floats, acceptance: float, origin: GeoOrigin) -> MissionItem:
     lat, lon = to_geo(origin, point[0], point[1])
     place = (on_grid(float(lat)), on_grid(float(lon)), float(point[2]))
     return MissionItem(seq, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0, acceptance, 0.0, 0.0), *place)
@@ -137,7 +137,7 @@ def _extra_point(route: Route) -> Floats:
 
 
 def _renumber(kept: list[MissionItem]) -> tuple[MissionItem, ...]:
-    """Return items numbered from 1; a jump goes to the first remaining item from its target on."""
+    """Renumber items from 1, and let each jump lead to the first remaining item at or after its target."""
     items = []
     for number, item in enumerate(kept, 1):
         params = item.params
@@ -148,7 +148,7 @@ def _renumber(kept: list[MissionItem]) -> tuple[MissionItem, ...]:
     return tuple(items)
 
 
-def _home(setup: FlightSetup) -> Home:
+def _home_for_upload(setup: FlightSetup) -> Home:
     """Return the mission's home, or the start's position, at an altitude that lets the motor run.
 
     An RTL measures its altitudes from home: there the mission's home is used.

@@ -1,4 +1,4 @@
-"""Process of an autopilot's program: started in a folder of its own, ended with the flight."""
+"""Run an autopilot's program as a process in its own folder, and end it with the flight."""
 
 import contextlib
 import ctypes
@@ -29,7 +29,9 @@ _PR_SET_PDEATHSIG = 1
 def check_binary(binary: Path, kind: str) -> str:
     """Return the SHA-256, as hex, of an autopilot's program.
 
-    Raise FlightError, in one line, for a file that cannot be run.  kind: expected autopilot.
+    Raise FlightError, in one line, for a file that cannot be run.
+
+    kind: name of the expected autopilot.
 
     >>> try:
     ...     check_binary(Path("missing/arduplane"), "ArduPlane")
@@ -68,7 +70,7 @@ class Launch:
 
 
 class AutopilotProcess:
-    """The running program; a context manager, after which it, its children and its folder are gone.
+    """The running program as a context manager; leaving it removes the program, its children and its folder.
 
     A guard does the same if planfly is killed.
 
@@ -99,7 +101,7 @@ class AutopilotProcess:
         def begin() -> None:
             """Register the process group with the guard before the program runs.
 
-            Registered afterwards, it would be left over if planfly were killed in between.
+            If it were registered later, it would remain if planfly were killed in between.
             """
             # Before Python restores the default of the signal, with which a dead guard would end this process here.
             signal.signal(signal.SIGPIPE, signal.SIG_IGN)
@@ -148,9 +150,9 @@ class AutopilotProcess:
         raise FlightError(how + (f": {words[-1]}" if words else ""), file=self.binary, field="exit code", value=code)
 
     def end(self, answer: Callable[[], bool]) -> None:
-        """Ask the program to end, so that it closes its log; kill it if it does not.
+        """Ask the program to end, so that it closes its log, and kill it if it does not end.
 
-        answer: answers it a frame of physics meanwhile; returns False if there was no request.
+        answer: answers one physics request of the program meanwhile; returns False if there was none.
         """
         if self._signal(signal.SIGTERM):
             until = time.monotonic() + _GRACE_S
@@ -181,7 +183,7 @@ class AutopilotProcess:
         return not self._ended
 
     def _is_alive(self) -> bool:
-        """Return True if the program or its children run; an ended program that was not waited for does not."""
+        """Return True if the program or its children run; an ended program that was not waited for does not count."""
         self._process.poll()
         return self._signal(0)
 

@@ -1,4 +1,4 @@
-"""Servo outputs of an autopilot and the controls that they move, from the aircraft's `ardupilot.toml`."""
+"""Map an autopilot's servo outputs to the controls that they move, from the aircraft's `ardupilot.toml`."""
 
 import math
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ _MAX_OUTPUT = 32
 class ServoOutput:
     """One control's servo: the value is linear in the pulse between its knots, and constant beyond them.
 
-    number: of the output, from 1.
+    number: number of the output, from 1.
     pulses: (k,) microseconds, increasing.
     values: (k,) the control at these pulses: rad as in `flight.dynamics.state.Commands`, or 0..1 of the throttle.
     """
@@ -34,7 +34,7 @@ class ServoOutput:
 
     @property
     def rest(self) -> float:
-        """Pulse at the center of the throw: the knot whose value is nearest to zero."""
+        """Pulse at the center of the throw, which is the knot whose value is nearest to zero."""
         return min(zip(self.pulses, self.values, strict=True), key=lambda knot: abs(knot[1]))[0]
 
     def value(self, pulse: float) -> float:
@@ -55,7 +55,7 @@ class ServoOutput:
         return values[-1]
 
     def at_share(self, share: float) -> float:
-        """Return the control at a fraction of the throw, -1..1: 0 is the center, each end its end pulse.
+        """Return the control at a fraction of the throw, from -1 and 1 at the end pulses to 0 at the center.
 
         >>> ServoOutput(2, (1100.0, 1500.0, 1900.0), (0.5, 0.0, -0.5)).at_share(0.5)
         -0.25
@@ -118,13 +118,13 @@ def load_servo_map(aircraft: Aircraft) -> ServoMap:
     if set(table) != set(FUNCTIONS):
         raise FlightError(f"{file}: tables {', '.join(sorted(table))}: {', '.join(FUNCTIONS)} are expected", file=file)
     try:
-        outputs = {name: _output(name, entry) for name, entry in table.items()}
+        outputs = {name: _parse_output(name, entry) for name, entry in table.items()}
     except ValueError as error:
         raise FlightError(f"{file}: {error}", file=file) from None
     return ServoMap(**outputs)
 
 
-def _output(name: str, entry: Any) -> ServoOutput:
+def _parse_output(name: str, entry: Any) -> ServoOutput:
     unit = _UNITS[name]
     key = f"value_{unit}" if unit else "value"
     if not isinstance(entry, dict) or set(entry) != {"output", "pulse_us", key}:

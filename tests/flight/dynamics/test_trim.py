@@ -28,7 +28,7 @@ from flight.dynamics.trim import (
     idle,
     linearise,
     slowest,
-    solve,
+    solve_trim,
     straight,
 )
 from tests.kernels.processors import NUMPY_ON_BASELINE_CPU
@@ -181,7 +181,7 @@ class LinearAircraft:
 
 def test_held_quantities_stay_and_the_others_balance() -> None:
     aircraft = LinearAircraft()
-    found = solve(aircraft.balance, {"airspeed": 28.0, "climb": 0.1}, LIMITS)
+    found = solve_trim(aircraft.balance, {"airspeed": 28.0, "climb": 0.1}, LIMITS)
     assert found is not None
     # 3 m/s faster: alpha less by 0.012, elevator more by 0.03; a slope of 0.1 takes 0.2 more throttle and 0.0003.
     wanted = [28.0, 0.1, 0.038, 0.01, -0.07, 0.02, -0.01, 0.5 + 0.2 + 0.012 * 0.1 / 4.0]
@@ -198,7 +198,7 @@ def test_what_the_stops_do_not_allow_is_no_flight(airspeed: float, climb: float,
         asked.append(values)
         return aircraft.balance(values)
 
-    trimmed = solve(balance, {"airspeed": airspeed, "climb": climb}, (0.3, 0.4, 0.3))
+    trimmed = solve_trim(balance, {"airspeed": airspeed, "climb": climb}, (0.3, 0.4, 0.3))
     assert (trimmed is not None) == found
     # Where steps get nowhere the search ends: most of an envelope's time went into flights that there are not.
     assert len(asked) < 100
@@ -215,14 +215,14 @@ def test_a_surface_that_moves_nothing_is_left_alone() -> None:
         # As JSBSim leaves: 1e-8 of the longest column.
         return aircraft.balance(unmoved) + 1e-13 * np.cos(np.arange(6.0) + next(calls))
 
-    found = solve(balance, {"airspeed": 28.0, "climb": 0.1}, LIMITS)
+    found = solve_trim(balance, {"airspeed": 28.0, "climb": 0.1}, LIMITS)
     assert found is not None
     assert found[QUANTITIES.index("rudder")] == 0.0
     assert found[QUANTITIES.index("throttle")] == pytest.approx(0.7003, abs=1e-6)
 
 
 def test_a_balance_that_is_not_a_number_is_no_flight() -> None:
-    assert solve(lambda _: np.full(6, math.nan), {"airspeed": 25.0, "climb": 0.0}, LIMITS) is None
+    assert solve_trim(lambda _: np.full(6, math.nan), {"airspeed": 25.0, "climb": 0.0}, LIMITS) is None
 
 
 def test_each_kind_of_trim_holds_its_two_quantities() -> None:

@@ -36,7 +36,7 @@ def airborne(points: object, **keywords: object) -> Gliding:
 def test_a_route_starts_at_its_first_waypoint_on_its_first_leg() -> None:
     points = [[0.0, 0.0, 500.0], [1000.0, 1000.0, 600.0]]
     setup = MAKE(points, wind=(6.0, 270.0))
-    start = Gliding(setup, AEROSONDE, load_gains(AEROSONDE))._start(setup)
+    start = Gliding(setup, AEROSONDE, load_gains(AEROSONDE))._find_start(setup)
     assert (start.amsl, start.ground, start.airspeed) == (500.0, 100.0, 25.0)
     assert start.course == pytest.approx(math.pi / 4.0, abs=1e-6)
     assert start.slope == pytest.approx(math.atan2(100.0, math.hypot(1000.0, 1000.0)))
@@ -49,7 +49,7 @@ def test_a_start_in_the_ground_is_refused() -> None:
     low = setup.route.waypoints - [0.0, 0.0, 51.0]
     setup = replace(setup, route=replace(setup.route, waypoints=low))
     with pytest.raises(FlightError, match="start at 99 m AMSL: not above the terrain, which is at 100 m"):
-        Gliding(setup, AEROSONDE, load_gains(AEROSONDE))._start(setup)
+        Gliding(setup, AEROSONDE, load_gains(AEROSONDE))._find_start(setup)
 
 
 def test_a_flight_may_take_its_length_at_its_slowest_ground_speed_and_more() -> None:
@@ -99,14 +99,14 @@ def test_a_flight_that_still_circles_when_its_time_is_over_says_so() -> None:
     setup = setup_of(wp(0, -1500), wp(0, 0, 100, 18, p="3 0 150 0"), wp(1500, 1500))
     for leg, said in ((0, "circled: at the loiter of item 2, "), (setup.route.legs - 1, "time limit: ")):
         flight = Gliding(setup, AEROSONDE, load_gains(AEROSONDE))
-        flight._disturb(setup)
+        flight._start_disturbances(setup)
         flight.max_ticks, flight.memory.leg = 0, leg
         assert flight.block(10)[1] == f"{said}not finished after 0 s"
 
 
 def test_a_block_ends_with_the_time() -> None:
     flight = airborne([[0.0, 0.0, 500.0], [0.0, 300.0, 500.0]])
-    flight._disturb(MAKE(np.array([[0.0, 0.0, 500.0], [0.0, 300.0, 500.0]])))
+    flight._start_disturbances(MAKE(np.array([[0.0, 0.0, 500.0], [0.0, 300.0, 500.0]])))
     flight.max_ticks = 0
     rows, ended = flight.block(10)
     assert len(rows) == 0

@@ -154,6 +154,6 @@ def test_whoever_launches_waits_for_all_of_the_motor_where_it_runs_before(
     autopilot = ArduPlaneSitl(parameters.changed(TKOFF_THR_MINACC=least), binary=fake_autopilot("none"))
     with AutopilotFlight(setup, AEROSONDE, autopilot, {}) as flight:
         began = flight.exchanged
-        for _ in flight._run_up():
+        for _ in flight._wait_for_thrust():
             flight._lockstep.hold(flight._rail)
         assert flight.exchanged - began == pytest.approx(seconds, abs=0.01)
