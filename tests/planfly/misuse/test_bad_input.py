@@ -226,7 +226,7 @@ def test_a_broken_mission_is_an_error_case_in_the_xml(
     )
     (case,) = suite
     assert case[0].tag == "error"
-    assert case[0].attrib["message"] == line.removeprefix("planfly: ")
+    assert case[0].attrib["message"] == line.removeprefix("planfly: ").rstrip("\n")
     (tmp_path / "m.xml").write_text("mine", encoding="utf-8")
     assert "exists; --overwrite replaces it" in refused([command, "m.waypoints", "--junit", "m.xml"], tmp_path, capsys)
     assert (tmp_path / "m.xml").read_text() == "mine"
