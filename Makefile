@@ -42,7 +42,7 @@ TESTED := $(VENV)/.ready-test
 BUILD_PAGES := $(BIN)/python -m sphinx -W -q -b html -d build/docs-trees docs build/docs
 
 # make low, make newest: the tests with the lowest versions supported, and with the newest there are
-.PHONY: demo test lint bench soak wheels low newest dev docs setup clients clean
+.PHONY: demo test lint bench soak wheels low newest dev docs tables setup clients clean
 
 demo: setup
 	$(BIN)/planfly run jacksboro --seed 1
@@ -54,6 +54,10 @@ test:
 	echo "tested with the versions of constraints.txt:"; \
 	{ $(BIN)/uv pip list --python $(BIN)/python || $(BIN)/python -m pip list; } 2>/dev/null | grep -i -E "$(DIRECT)"; \
 	$(IN_MEMORY); $(BIN)/python -m pytest $(SPREAD)
+
+# The tables of docs/ that the code knows, written into the pages.
+tables: $(TESTED)
+	cd docs && ../$(BIN)/python -m making
 
 # What is seen without running anything: style, types, and the pages of docs/.
 lint: $(TESTED)

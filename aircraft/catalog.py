@@ -8,6 +8,7 @@ copies an aircraft under a new name.
 import hashlib
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
@@ -182,7 +183,8 @@ def read_aircraft(folder: Path) -> Aircraft:
     try:
         table = read_toml(file, "aircraft")
     except OSError as error:
-        raise FlightError(f"{file}: {error.strerror}", file=file) from None
+        advice = _toml_advice(folder) if isinstance(error, FileNotFoundError) else ""
+        raise FlightError(f"{file}: {error.strerror}{advice}", file=file) from None
     except ValueError as error:  # a TOML or a UTF-8 error
         raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from None
     title = table.pop("title", folder.name)
@@ -202,6 +204,17 @@ def read_aircraft(folder: Path) -> Aircraft:
             value=values["airspeed"],
         )
     return Aircraft(name=folder.name, title=title, folder=folder, model=model, **values)
+
+
+def _toml_advice(folder: Path) -> str:
+    """Return what to do about a folder with a JSBSim model and without metadata; "" for another folder."""
+    models = sorted(file.stem for file in folder.glob("*.xml"))
+    if not models:
+        return ""
+    return (
+        f": beside its JSBSim model ({', '.join(models[:3])}) a folder needs {folder.name}.toml;"
+        f" planfly aircraft --new FOLDER makes one with all files to begin with"
+    )
 
 
 def _numbers(table: dict[str, Any]) -> dict[str, float]:
@@ -266,14 +279,18 @@ _RESERVED_NAMES = ("ardupilot", "draws", "gains", "posterior", "uncertainty", "R
 # Suffixes of the files that are copied.
 _SUFFIXES = frozenset({".xml", ".toml", ".parm", ".md", ".csv"})
 # Entry of a metadata file for a model that JSBSim ships.
-_SHIPPED_ENTRY = re.compile(r"^(\s*shipped_by_jsbsim\s*=\s*)true\b", re.MULTILINE)
+_SHIPPED_ENTRY = re.compile(r"^([ \t]*shipped_by_jsbsim\s*=\s*)\S.*\n", re.MULTILINE)
 
 
-def make_own_folder(folder: Path, source: Aircraft) -> tuple[str, ...]:
+def make_own_folder(
+    folder: Path, source: Aircraft, model: Mapping[str, bytes] | None = None, *, overwrite: bool = False
+) -> tuple[str, ...]:
     """Create a folder with the same aircraft under the folder's name, completely or not at all.
 
-    A model that ships with JSBSim stays there, and the metadata name it. Return the names of the created files, sorted.
-    Raise FlightError if the folder exists, its parent does not, or its name is not valid for a model; OSError if it
+    model: the files of a model that ships with JSBSim, by name, to be copied; without them the model stays there, and
+    the metadata name it.
+    overwrite: True replaces the folder of an aircraft.
+    Return the names of the created files, sorted.  Raise FlightError as `check_new_folder` does; OSError if the folder
     cannot be written.
 
     >>> from tempfile import TemporaryDirectory
@@ -284,16 +301,27 @@ def make_own_folder(folder: Path, source: Aircraft) -> tuple[str, ...]:
     ('README.md', 'ardupilot.parm', 'ardupilot.toml', 'gains.toml', 'mine.toml')
     1124.9
     """
-    target = check_new_folder(folder)
-    files = _renamed(source, target.name)
-    write_folder(target, files)
+    target = check_new_folder(folder, overwrite=overwrite)
+    files = _renamed(source, target.name, model or {})
+    write_own_folder(target, files)
     return tuple(sorted(files))
 
 
-def check_new_folder(folder: Path) -> Path:
+def write_own_folder(target: Path, files: Mapping[str, bytes]) -> None:
+    """Write the files of an aircraft into a folder, completely or not at all.
+
+    In a folder that exists they replace the aircraft's files; files of other kinds stay.
+    """
+    stays = [file.name for file in target.iterdir() if file.suffix not in _SUFFIXES] if target.exists() else []
+    new = {name.split("/")[0] for name in files}
+    write_folder(target, files, stays=[name for name in stays if name not in new])
+
+
+def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
     """Return the absolute path of a folder in which an aircraft is to be created.
 
-    Raise FlightError if it exists, its parent does not, or its name is not valid for a model.
+    overwrite: True accepts the folder of an aircraft that exists.
+    Raise FlightError if it exists otherwise, its parent does not, or its name is not valid for a model.
     """
     target = folder.absolute()
     if _NAME.fullmatch(target.name) is None or target.name in _RESERVED_NAMES:
@@ -301,15 +329,18 @@ def check_new_folder(folder: Path) -> Path:
             f"a folder's name of letters, digits, '.', '_' and '-' is expected, none of {', '.join(_RESERVED_NAMES)}"
         )
         raise FlightError(f"{folder}: {allowed}", file=folder, value=target.name, allowed=allowed)
-    if target.exists() or target.is_symlink():
-        raise FlightError(f"{folder}: exists; name a folder that does not", file=folder)
+    if overwrite and target.exists() and not target.is_symlink():
+        if not (target / f"{target.name}.toml").is_file():
+            raise FlightError(f"{folder}: is not the folder of an aircraft, with {target.name}.toml", file=folder)
+    elif target.exists() or target.is_symlink():
+        raise FlightError(f"{folder}: exists; overwrite=True replaces it, or name another folder", file=folder)
     if not target.parent.is_dir():
         raise FlightError(f"{folder}: its folder {target.parent} does not exist", file=folder)
     return target
 
 
-def _renamed(source: Aircraft, name: str) -> dict[str, bytes]:
-    """Return the contents of the new folder by path: the aircraft's files, with its own two renamed."""
+def _renamed(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return the contents of the new folder by path: the aircraft's files and the model's, with its own two renamed."""
     folders = [source.folder, *(folder for folder in source.model_folders if source.folder in folder.parents)]
     found = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]
     files = {}
@@ -320,5 +351,8 @@ def _renamed(source: Aircraft, name: str) -> dict[str, bytes]:
         own = where if where.stem != source.name else where.with_name(f"{name}{where.suffix}")
         files[str(own)] = file.read_bytes()
     metadata = files[f"{name}.toml"].decode("utf-8").replace(f"{source.name}.xml", f"{name}.xml")
-    files[f"{name}.toml"] = _SHIPPED_ENTRY.sub(rf'\g<1>"{source.name}"', metadata).encode()
+    shipped = f"{source.model.shipped}.xml"
+    files |= {f"{name}.xml" if file == shipped else file: data for file, data in model.items()}
+    entry = "" if model else rf'\g<1>"{source.model.shipped}"\n'
+    files[f"{name}.toml"] = _SHIPPED_ENTRY.sub(entry, metadata).encode()
     return files

@@ -34,7 +34,7 @@ html_math_renderer = "mathml"
 
 
 def _fill(app: Sphinx, docname: str, source: list[str]) -> None:
-    source[0] = filled(source[0])
+    source[0] = filled(source[0], built=True)
 
 
 def _docstring(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:

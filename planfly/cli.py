@@ -10,7 +10,7 @@ from planfly.runtime.process_setup import prepare_process, with_large_stack
 from planfly.terminal.arguments import ASKS_COMPLETION, answer_shell
 from planfly.terminal.command_parser import coloured, error_text
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
-from planfly.terminal.output import asked_output, open_standard_streams, printable, safe_streams
+from planfly.terminal.output import asked_output, give_junit_error, open_standard_streams, printable, safe_streams
 from planfly.terminal.signal_watch import end_process, ended_by_signals
 from world.errors import CrashError, PlanflyError
 from world.interruption import Interrupted
@@ -64,7 +64,11 @@ def _carried_out(argv: Sequence[str] | None) -> int:
     args = line.parse_args(argv)
     try:
         with asked_output(args):
-            return find_command(args.command)(args)
+            try:
+                return find_command(args.command)(args)
+            except PlanflyError as error:
+                give_junit_error(args, error_text(error, line.commands[args.command]))
+                raise
     except PlanflyError as error:
         code = FAULT if isinstance(error, CrashError) or _is_machines(error.__cause__) else BAD_INPUT
         return _fail(code, error_text(error, line.commands[args.command]))

@@ -35,7 +35,6 @@ LONGER = {
     "logs/verdict/returns/glide_reach.py:_look_ahead": 66,
     "logs/verdict/rules/loiter_rule.py:_loiter_finding": 68,
     "logs/views/exports/log_files.py:_topics": 100,
-    "planfly/api/identifying.py:identify_aircraft": 61,
     "planfly/campaigns/pictures.py:draw_go_no_go": 67,
     "planner/search/replan.py:replan": 61,
     "tests/instrumented_flights.py:px4_topics": 70,

@@ -187,9 +187,10 @@ def write_whole(path: Path, data: str | bytes) -> None:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
-def write_folder(path: Path, files: Mapping[str, bytes]) -> None:
-    """Make a new folder with files by their paths within it, whole or not at all.
+def write_folder(path: Path, files: Mapping[str, bytes], stays: Iterable[str] | None = None) -> None:
+    """Make a folder with files by their paths within it, whole or not at all.
 
+    stays: names of what a folder that exists keeps if it is replaced; None replaces none.
     Raises OSError, which names the folder, and leaves nothing.
 
     >>> from tempfile import TemporaryDirectory
@@ -205,7 +206,15 @@ def write_folder(path: Path, files: Mapping[str, bytes]) -> None:
             for name, content in files.items():
                 (temporary / name).parent.mkdir(parents=True, exist_ok=True)
                 (temporary / name).write_bytes(content)
-            temporary.rename(path)
+            if stays is not None and path.is_dir():
+                for name in stays:
+                    (path / name).rename(temporary / name)
+                old = temporary.with_name(f"{temporary.name}.old")
+                path.rename(old)
+                temporary.rename(path)
+                shutil.rmtree(old)
+            else:
+                temporary.rename(path)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
 

@@ -55,6 +55,21 @@ def public_names() -> str:
     return "\n\n".join(parts)
 
 
+def name_tables() -> str:
+    """One table per kind, with the first sentence of each name's docstring."""
+    parts = []
+    for kind, title in _TITLES.items():
+        names = [name for name in dict.fromkeys((*_ORDER, *planfly.__all__)) if kind_of(name) == kind]
+        rows = [f"| `planfly.{name}` | {_first_sentence(name)} |" for name in names]
+        parts.append("\n".join([f"## {title}", "", "| name | what it is |", "|---|---|", *rows]))
+    return "\n\n".join(parts)
+
+
+def _first_sentence(name: str) -> str:
+    text = inspect.getdoc(getattr(planfly, name)) or ""
+    return " ".join(text.partition("\n\n")[0].split()).replace("|", "\\|")
+
+
 def _entry(kind: str, name: str) -> str:
     if kind == "function":
         return f".. autofunction:: planfly.{name}"

@@ -12,6 +12,7 @@ import math
 import os
 import struct
 import sys
+import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -46,7 +47,7 @@ from flight.dynamics.jsbsim_properties import (
     PropertyAccess,
     Setter,
 )
-from flight.dynamics.model_check import check_model, try_model
+from flight.dynamics.model_check import check_model, jsbsim_reason, try_model
 from flight.dynamics.state import STATE
 from flight.dynamics.trim import Engine, Trim, air_velocity, body_axes, euler, first_guess, straight
 from world.arrays import Floats
@@ -58,22 +59,30 @@ from world.kernels import Record, field_names
 # Suppression of JSBSim's output.
 
 
-@contextmanager
-def silence() -> Iterator[None]:
-    """Discard standard output, because JSBSim prints its banner at every debug level.
+# Largest amount of what JSBSim prints that is read, bytes.
+_MAX_PRINTED_BYTES = 2**20
 
-    Its C++ side writes to file descriptor 1, its Python side to ``sys.stdout``.
+
+@contextmanager
+def silence() -> Iterator[Callable[[], str]]:
+    """Keep standard output off the terminal: JSBSim prints its banner at every debug level.
+
+    JSBSim's C++ side writes to file descriptor 1, its Python side to ``sys.stdout``.  Yield a function that returns
+    what both printed.
     """
     sys.stdout.flush()
     saved = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 1)
-        with contextlib.redirect_stdout(io.StringIO()):
-            yield
+        with tempfile.TemporaryFile() as printed, contextlib.redirect_stdout(io.StringIO()) as python_side:
+            os.dup2(printed.fileno(), 1)
+
+            def text() -> str:
+                own = os.pread(printed.fileno(), _MAX_PRINTED_BYTES, 0).decode(errors="replace")
+                return own + python_side.getvalue()
+
+            yield text
     finally:
         os.dup2(saved, 1)
-        os.close(nowhere)
         os.close(saved)
 
 
@@ -105,7 +114,15 @@ MASS_TOLERANCE = 0.01
 
 
 def load_model(
-    instance: Any, copy: Path, aircraft: Aircraft, dt: float, *, flat_earth: bool, tried: bool, gear: Gear | None = None
+    instance: Any,
+    copy: Path,
+    aircraft: Aircraft,
+    dt: float,
+    printed: Callable[[], str],
+    *,
+    flat_earth: bool,
+    tried: bool,
+    gear: Gear | None = None,
 ) -> None:
     """Check a model, copy it into an empty folder, and load it from there.
 
@@ -113,6 +130,7 @@ def load_model(
 
     instance: a JSBSim instance without a model, made for this folder.
     dt: time step, s.
+    printed: returns what JSBSim has printed.
     flat_earth, tried, gear: see `Fdm`.
 
     Raise FlightError for a model that is missing, refused or not loadable.
@@ -148,7 +166,8 @@ def load_model(
         message = " ".join(str(error).split()).replace(str(folder), str(aircraft.model_file.parent))
         raise FlightError(f"{aircraft.model_file}: JSBSim: {message}", file=aircraft.model_file) from None
     if not loaded:
-        raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model", file=aircraft.model_file)
+        reason = jsbsim_reason(printed()) or "no reason is given"
+        raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model: {reason}", file=aircraft.model_file)
     _check_mass(instance, aircraft)
 
 
@@ -514,7 +533,7 @@ def _apply_variation(properties: PropertyAccess, aircraft: Aircraft, variation: 
 
 
 def _new_instance(aircraft: Aircraft, dt: float, flat_earth: bool, tried: bool, gear: Gear | None) -> jsbsim.FGFDMExec:
-    with silence(), temporary_folder("planfly-model-") as copy:
+    with silence() as printed, temporary_folder("planfly-model-") as copy:
         instance = jsbsim.FGFDMExec(str(copy))
-        load_model(instance, copy, aircraft, dt, flat_earth=flat_earth, tried=tried, gear=gear)
+        load_model(instance, copy, aircraft, dt, printed, flat_earth=flat_earth, tried=tried, gear=gear)
     return instance

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
+from xml.etree import ElementTree
 from xml.parsers import expat
 
 from aircraft.catalog import MAX_MODEL_BYTES, Aircraft, model_hash
@@ -167,6 +168,15 @@ def check_model(
     return {name: reader.without_channels() for name, reader in readers.items()}
 
 
+def shipped_model(aircraft: Aircraft) -> dict[str, bytes]:
+    """Return the files of a model that ships with JSBSim by name, so that `check_model` accepts a copy of them.
+
+    Channels are removed, and entities of a document type are written out.
+    """
+    files = check_model(aircraft.model_file, lambda _: True, aircraft.model_folders, shipped=True)
+    return {name: ElementTree.tostring(ElementTree.fromstring(data)) for name, data in files.items()}
+
+
 def _read(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
     reader = _Reader(file, main=main, remove_channels=remove_channels)
     reader.read()
@@ -201,13 +211,15 @@ _TIMEOUT_S = 60.0
 _REFUSED = 3
 # Program of that process.
 _TRIAL_PROGRAM = f"""
+import contextlib
 import sys
 from pathlib import Path
 from aircraft.catalog import read_aircraft
-from flight.dynamics.fdm import Fdm
+from flight.dynamics import fdm as loading
 from world.errors import FlightError
+loading.silence = lambda: contextlib.nullcontext(str)
 try:
-    fdm = Fdm(read_aircraft(Path(sys.argv[1])), tried=True)
+    fdm = loading.Fdm(read_aircraft(Path(sys.argv[1])), tried=True)
     fdm.move_to(500.0)
     fdm.balance(fdm.first_guess())
     fdm.step(10)
@@ -223,18 +235,16 @@ def try_model(aircraft: Aircraft) -> None:
     Raise FlightError if that process dies. If it only refuses the model, nothing is raised, because loading the model
     in this process will refuse it again, with the reason.
     """
-    code = _try(str(aircraft.folder), model_hash(aircraft))
+    code, reason = _try(str(aircraft.folder), model_hash(aircraft))
     if code not in {0, _REFUSED}:
         how = "hangs" if code is None else "aborts the process"
-        raise FlightError(
-            f"{aircraft.model_file}: JSBSim {how} with this model, probably over an undefined property",
-            file=aircraft.model_file,
-        )
+        why = reason or "probably over an undefined property"
+        raise FlightError(f"{aircraft.model_file}: JSBSim {how} with this model: {why}", file=aircraft.model_file)
 
 
 @cache
-def _try(folder: str, _version: str) -> int | None:
-    """Return the exit code of the process, or None on timeout."""
+def _try(folder: str, _version: str) -> tuple[int | None, str]:
+    """Return the exit code of the process, or None on timeout, and the reason that JSBSim prints."""
     # The child process finds planfly's packages where this process found them.
     root = str(Path(__file__).parents[2])
     paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
@@ -247,5 +257,30 @@ def _try(folder: str, _version: str) -> int | None:
             timeout=_TIMEOUT_S,
         )
     except subprocess.TimeoutExpired:
-        return None
-    return done.returncode
+        return None, ""
+    return done.returncode, jsbsim_reason((done.stdout + b"\n" + done.stderr).decode(errors="replace"))
+
+
+# End of JSBSim's banner.
+_END_OF_BANNER = "JSBSim startup beginning ..."
+# Lines that state no reason: notes, the frames of C++ and of Python.
+_NO_REASON = re.compile(
+    r"(?:Engine|Tank) \w+ ignored|terminate called|Traceback|Fatal Python error|\s*File |Current thread"
+)
+# Folders before a file's name: a model is loaded from a copy.
+_FOLDERS = re.compile(r"(?:[^\s\"']*/)+")
+# Sequences that colour a terminal.
+_COLOURS = re.compile(r"\x1b\[[0-9;]*m")
+# Largest number of lines of a reason.
+_MAX_REASON_LINES = 4
+
+
+def jsbsim_reason(printed: str) -> str:
+    r"""Return the reason for which JSBSim does not load a model, from what it prints, in a line; "" if it states none.
+
+    >>> jsbsim_reason("JSBSim startup beginning ...\n\nIn file /tmp/a/m.xml: line 91\n Unknown engine type\n")
+    'In file m.xml: line 91 Unknown engine type'
+    """
+    said = _COLOURS.sub("", printed).rpartition(_END_OF_BANNER)[2].splitlines()
+    lines = [" ".join(_FOLDERS.sub("", line).split()) for line in said if line.strip() and not _NO_REASON.match(line)]
+    return " ".join(line.removeprefix("what(): ") for line in lines[:_MAX_REASON_LINES])

@@ -5,7 +5,7 @@ six body accelerations vanish. Speeds and angles are relative to the air mass.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol, get_args
 
@@ -20,10 +20,16 @@ from world.least_squares import least_squares
 # ----------------------------------------------------------------------
 # Running engine in a JSBSim model: its speed is a state of its own, which must settle before a measurement.
 
-# Time step in which an engine's speed settles, s.
+# First time step in which an engine's speed settles, s.
 _SETTLE_STEP_S = 0.2
-# Largest number of such steps.
+# Number of such steps before the step follows the engine's own time constant.
+_FIRST_SETTLE_STEPS = 25
+# Largest number of steps.
 _MAX_SETTLE_STEPS = 300
+# Range of the following steps, s.
+_SETTLE_STEP_RANGE_S = (1e-4, 60.0)
+# Largest change of the step from one to the next, a factor.
+_MAX_STEP_CHANGE = 4.0
 # Change of the rates below which they are steady, ft/s^2 and rad/s^2.
 _STEADY_RATE_CHANGE = 1e-10
 # Largest number of steps in which derivatives settle at constant engine speed.
@@ -64,16 +70,24 @@ class Engine:
 
         Without ``spin`` the engine keeps its speed, and only quantities that depend on their own derivative (the lift
         of a changing angle of attack) settle.
+
+        A light propeller follows within milliseconds, and would swing in longer steps; a heavy one takes a minute.  A
+        step of the engine's time constant leads to its steady speed at once, as in Newton's method.
         """
-        self._exec.set_dt(_SETTLE_STEP_S if spin else 0.0)
-        before = [0.0] * 6
-        for _ in range(_MAX_SETTLE_STEPS if spin else _MAX_RATE_STEPS):
+        steps = [_SETTLE_STEP_S, _SETTLE_STEP_S] if spin else [0.0, 0.0]
+        self._exec.set_dt(steps[1])
+        before, change_before = [0.0] * 6, [0.0] * 6
+        for number in range(_MAX_SETTLE_STEPS if spin else _MAX_RATE_STEPS):
             self._exec.run()
             now = [rate() for rate in self._rates]
             # Without NumPy, which takes as long for six numbers as JSBSim for its step.
-            if all(abs(a - b) < _STEADY_RATE_CHANGE for a, b in zip(now, before, strict=True)):
+            change = [a - b for a, b in zip(now, before, strict=True)]
+            if all(abs(one) < _STEADY_RATE_CHANGE for one in change):
                 break
-            before = now
+            if spin and number >= _FIRST_SETTLE_STEPS:
+                steps = [steps[1], settle_step(steps, change_before, change)]
+                self._exec.set_dt(steps[1])
+            before, change_before = now, change
         self._exec.set_dt(self._dt)
 
     def release(self) -> None:
@@ -81,6 +95,27 @@ class Engine:
         for integrator, usual in zip(self._integrators, self._usual, strict=True):
             integrator(usual)
         self._freeze(0.0)
+
+
+def settle_step(steps: Sequence[float], before: Sequence[float], change: Sequence[float]) -> float:
+    """Return the time constant with which quantities settle, s, as the next step, in Euler's method.
+
+    steps: the step before the last, and the last one, s.  before, change: the changes in them.
+
+    A change that falls to 0.9 in equal steps of 0.2 s has a time constant of 2 s, of which 4 times 0.2 s are taken; one
+    that swings, with -3 times the change before, has one of 0.05 s.
+
+    >>> settle_step((0.2, 0.2), (1.0,), (0.9,)), settle_step((0.2, 0.2), (0.1,), (-0.3,))
+    (0.8, 0.05)
+    """
+    largest = max(range(len(before)), key=lambda k: abs(before[k]))
+    step = steps[1]
+    if before[largest] == 0.0 or not math.isfinite(change[largest]):
+        return step
+    left = 1.0 - change[largest] / before[largest] * steps[0] / step
+    constant = steps[0] / left if left > 0.0 else math.inf
+    low, high = _SETTLE_STEP_RANGE_S
+    return min(max(constant, step / _MAX_STEP_CHANGE, low), step * _MAX_STEP_CHANGE, high)
 
 
 # Elements of a trim vector (8,), in this order, SI and radians: climb is the flight-path angle to the air mass, bank is

@@ -35,6 +35,24 @@ def junit_text(verdicts: Mapping[str, Presentation]) -> str:
         ElementTree.SubElement(suite, "system-out").text = _plain(
             "\n".join([verdict.headline, *verdict.details]), keep="\n"
         )
+    return _document_text(root)
+
+
+def junit_error_text(name: str, message: str) -> str:
+    """Write the text of the file for a plan or a flight that could not be judged: one case, an error.
+
+    name: of the plan or flight.  message: the reason in a line.
+    """
+    root = ElementTree.Element("testsuites")
+    suite = ElementTree.SubElement(
+        root, "testsuite", name=_plain(name), tests="1", failures="0", errors="1", skipped="0"
+    )
+    case = ElementTree.SubElement(suite, "testcase", classname="planfly", name="verdict")
+    ElementTree.SubElement(case, "error", message=_plain(message))
+    return _document_text(root)
+
+
+def _document_text(root: ElementTree.Element) -> str:
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 

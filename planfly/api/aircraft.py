@@ -12,6 +12,7 @@ from aircraft.model_writer import Layout
 from flight.autopilots.catalog import AUTOPILOTS
 from flight.dynamics.characteristics import Mode, StepResponse, TrimRow, modes_at, step_responses, trim_table
 from flight.dynamics.envelope_tables import load_envelope
+from flight.dynamics.model_check import shipped_model
 from planfly.flight_options import takes_options
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
@@ -90,10 +91,13 @@ class DataSheetOptions(TypedDict, total=False):
 def new_aircraft(
     folder: str | Path,
     source: str | Path | None = None,
+    *,
+    overwrite: bool = False,
     **given: Unpack[DataSheetOptions],
 ) -> Aircraft:
-    """Make the folder of a new aircraft, which must not exist.
+    """Make the folder of a new aircraft.
 
+    overwrite: True replaces the folder of an aircraft, and keeps files of other kinds in it.
     Without numbers it holds copies of another aircraft's files: source is that aircraft, a name or a folder (the
     Aerosonde if not given).  With numbers it holds a model that matches them, scaled from published aircraft of its
     class, and a list of what is unknown; mass, span, cruise and stall are needed, the others are estimated if missing.
@@ -119,7 +123,9 @@ def new_aircraft(
     """
     stated = {name: value for name, value in given.items() if value is not None}
     if not stated:
-        make_own_folder(Path(folder), _opened("aerosonde" if source is None else source))
+        copied = _opened("aerosonde" if source is None else source)
+        model = shipped_model(copied) if copied.model.shipped else None
+        make_own_folder(Path(folder), copied, model, overwrite=overwrite)
         return find_aircraft(str(Path(folder).absolute()))
     if source is not None:
         raise PlanflyError.of_argument(
@@ -132,7 +138,9 @@ def new_aircraft(
     numbers = {name: cast("float | None", value) for name, value in given.items() if name not in texts}
     sheet = parse_sheet(numbers, battery=given["battery"], prop=given["prop"], layout=given["layout"])
     with stage(f"making {Path(folder).name}", "making"):
-        return make_data_sheet_folder(Path(folder), sheet, None if params is None else Path(params))
+        return make_data_sheet_folder(
+            Path(folder), sheet, None if params is None else Path(params), overwrite=overwrite
+        )
 
 
 @with_warm_up()

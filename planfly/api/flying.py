@@ -36,7 +36,7 @@ from planfly.workflow import pipeline
 from planfly.workflow.airframe import airframe_of
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
 from planfly.workflow.open_flight import open_flight
-from planfly.workflow.output_paths import file_target, refuse_existing
+from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, file_target, prepare_folder, refuse_existing
 from planfly.workflow.pipeline import PlanThenFly, autopilot_log, fly_and_judge
 from planfly.workflow.suggestion_trials import judge_mission
 from planner.plan import Plan
@@ -259,6 +259,9 @@ def _log_target(
     if program is not None:
         refuse_existing(autopilot_log(target, program), overwrite, source)
     target.parent.mkdir(parents=True, exist_ok=True)
+    if log == FLY_LOG:
+        # The report and its pictures are of the flight before.
+        prepare_folder(target.parent, LOG_FIGURES)
     say_replaced(target, *((autopilot_log(target, program),) if program is not None else ()))
     return target
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aircraft.catalog import Aircraft, check_new_folder, find_aircraft, read_aircraft
+from aircraft.catalog import Aircraft, check_new_folder, find_aircraft, read_aircraft, write_own_folder
 from aircraft.identification.estimate import Estimate, estimate_model
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from logs.importers.motion import MotionLog
@@ -34,7 +34,7 @@ from planfly.workflow.data_sheets import parse_sheet
 from world.arrays import Floats
 from world.errors import FlightError, LogError, PlanflyError
 from world.extras import needs_extra
-from world.files import whole_path, write_folder
+from world.files import whole_path
 from world.scenario_tables import names_folder
 
 # Largest ratio of stated and base mass or span, either way, for which the base is still a usable prior.
@@ -92,11 +92,12 @@ def identify_aircraft(
     battery: str | None = None,
     base: str | Path = "aerosonde",
     check: str | Path | None = None,
+    overwrite: bool = False,
 ) -> IdentifiedAircraft:
     """Make the folder of an aircraft from flight logs of ArduPlane or PX4, with a list of what is unknown.
 
     logs: `.BIN` or `.ulg` of one aircraft with one mass, with inertial sensors and servo outputs.
-    folder: the folder to make, which must not exist.
+    folder: the folder to make.  overwrite: True replaces the folder of an aircraft.
     mass: kg, in flight.  span: of the wing, m.  area: of the wing, m^2; None takes the ratio of area to squared span
     from the base.
     battery: volts and capacity, "44.4V,888Wh"; None takes the battery of the base.
@@ -104,16 +105,13 @@ def identify_aircraft(
     check: a log that is not among `logs`, to replay with both models.
     Raises a `planfly.PlanflyError` for logs that cannot be used; nothing is written then.
     """
-    target = check_new_folder(Path(folder))
+    target = check_new_folder(Path(folder), overwrite=overwrite)
     paths = [Path(one) for one in ([logs] if isinstance(logs, str | Path) else logs)]
     if not paths:
         raise PlanflyError.of_argument("logs", "", "at least one log is expected", shown="")
     prior = _base(base)
-    stated = {
-        "mass": mass,
-        "span": span,
-        "area": area if area is not None else prior.wing_area * (span / prior.wing_span) ** 2,
-    }
+    area = prior.wing_area * (span / prior.wing_span) ** 2 if area is None else area
+    stated = {"mass": mass, "span": span, "area": area}
     _check_stated(stated, prior)
     volts, energy = prior.battery_voltage, prior.battery_energy
     if battery is not None:
@@ -138,7 +136,7 @@ def identify_aircraft(
     replays = () if checked is None else _replay(found, files, target.name, checked)
     with stage("drawing", "drawing an identification"):
         files["identify.html"] = _page(found, replays, None if check is None else Path(check).name, target.name)
-    write_folder(target, {name: text.encode() for name, text in files.items()})
+    write_own_folder(target, {name: text.encode() for name, text in files.items()})
     slow = slow_logs([one for one, _, _ in read])
     return IdentifiedAircraft(
         read_aircraft(target), estimate, *_intervals(found), replays, without_current(records), slow, _wide(found)

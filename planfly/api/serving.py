@@ -42,8 +42,8 @@ def serve(
 ) -> None:
     """Serve a MAVLink vehicle in a simulated world until ``stop`` returns True; needs ``planfly[live]``.
 
-    mission: the file of the first mission; None waits for an upload.
-    options: as of `planfly.fly`; without a mission the scenario is "jacksboro-air" unless another is named.
+    mission: the file of the first mission; None waits for an upload into the scenario that the options name.
+    options: as of `planfly.fly`.
     to: addresses of ground stations, IP:PORT, one or several.  bind: address of the vehicle.
     allow: IP addresses beyond this machine that may talk to it.  sign_key: a file with a MAVLink signing key.
     speed: times real time, 0.1 to 100.  log: the folder of the flight logs.

@@ -11,7 +11,7 @@ from planfly.terminal.exit_codes import verdict_code
 from planfly.terminal.options import call, flight_options, log_rate_option, result_options, world_options
 from planfly.terminal.output import give_answer, give_junit
 from planfly.terminal.results import print_returns, print_verdict, print_warnings
-from planfly.workflow.output_paths import RUN_FOLDER
+from planfly.workflow.output_paths import FLY_LOG
 
 if TYPE_CHECKING:
     from planfly import FlownMission
@@ -36,7 +36,7 @@ def fly_options(line: LineParser) -> None:
     log.add_argument(
         "--log",
         metavar="FILE",
-        help="file for the flight log (default: runs/<mission>-seed<N>/flight.mcap, overwritten)",
+        help="file for the flight log (default: runs/<mission>-fly-seed<N>/flight.mcap, overwritten)",
     )
     log_rate_option(log)
     result_options(parser, junit=True)
@@ -45,7 +45,7 @@ def fly_options(line: LineParser) -> None:
 def fly(args: argparse.Namespace) -> int:
     """Fly a mission into a log; the exit code follows the verdict."""
     named = args.log is not None
-    log = args.log if named else f"{RUN_FOLDER}/flight.mcap"
+    log = args.log if named else FLY_LOG
     flown = call(planfly.fly, args, log=log, overwrite=args.overwrite or not named)
     print_warnings([*flown.mission.warnings, *flown.setup.scenario.notes])
     print_verdict(flown.verdict, flown.setup.notes)

@@ -8,11 +8,11 @@ from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import (
     call,
+    flown_by_options,
     own_link_options,
     print_at_once,
     steering_options,
     stop_signals,
-    time_option,
     world_options,
 )
 
@@ -36,7 +36,8 @@ def serve_options(line: LineParser) -> None:
         parser.add_argument("mission", metavar="MISSION", nargs="?", help="a mission file to begin with"),
         files(*MISSIONS),
     )
-    time_option(world_options(parser))
+    world_options(parser)
+    flown_by_options(parser)
     steering_options(parser)
     parser.add_argument(
         "--to",

@@ -59,8 +59,6 @@ from world.frames import to_geo
 from world.interruption import end_with_parent
 from world.scenario import Scenario, in_the_air
 
-# Scenario of ``planfly serve`` if none is given.
-DEFAULT_SCENARIO = "jacksboro-air"
 # Duration of a loiter in LOITER and GUIDED in one log, s: each lap of a loiter is laid out, and judged, separately.
 HELD = 900.0
 # Greatest number of texts about one verdict; the log has the rest.
@@ -99,8 +97,12 @@ def open_served(options: ServeOptions) -> ServedScenario:
     if options.mission:
         setup = open_flight(options.mission, options.flown)
         return ServedScenario(setup.scenario, airframe_of(setup), setup.seed, setup.mission)
+    named = options.flown.get("scenario")
+    if named is None:
+        allowed = "a mission, or a scenario to wait for an upload in, is expected: `scenario` NAME"
+        raise PlanflyError(f"mission: none is named; {allowed}", field="scenario", allowed=allowed)
     fences = read_named_fences(options.flown.get("fence") or ())
-    scenario = named_scenario(options.flown.get("scenario") or DEFAULT_SCENARIO, options.flown)
+    scenario = named_scenario(named, options.flown)
     scenario, seed = fences.on_scenario(scenario), options.flown.get("seed")
     return ServedScenario(scenario, load_airframe(scenario), choose_seed(scenario, seed), None, fences.items)
 

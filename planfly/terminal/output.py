@@ -535,6 +535,16 @@ def give_junit(args: argparse.Namespace, verdicts: Mapping[str, "Verdict"]) -> N
         write_whole(Path(args.junit), junit_text({name: verdict.present() for name, verdict in verdicts.items()}))
 
 
+def give_junit_error(args: argparse.Namespace, message: str) -> None:
+    """Write an error as JUnit XML if requested.  message: the line that the command ends with."""
+    target = getattr(args, "junit", None)
+    if target is not None:
+        from logs.verdict.junit import junit_error_text
+
+        judged = next(getattr(args, name) for name in ("what", "mission", "scenario", "log") if hasattr(args, name))
+        write_whole(Path(target), junit_error_text(str(judged), message))
+
+
 def _refuse_inputs(target: Path, args: argparse.Namespace) -> None:
     """Refuse to write the answer to a file that another argument of the command line names."""
     named = [

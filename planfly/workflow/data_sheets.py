@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aircraft.catalog import Aircraft, check_new_folder, read_aircraft
+from aircraft.catalog import Aircraft, check_new_folder, read_aircraft, write_own_folder
 from aircraft.data_sheet import (
     FUEL_HEAT,
     RANGES,
@@ -38,7 +38,7 @@ from flight.dynamics.trim import Simulator, Trim, fastest, full_throttle, idle, 
 from flight.guidance.model_gains import AMSL, gains_of_model, gains_text, idle_throttle
 from world.arrays import Floats
 from world.errors import FlightError
-from world.files import temporary_folder, write_folder
+from world.files import temporary_folder
 
 # ----------------------------------------------------------------------
 # A file of ArduPlane parameters contains measured values where it differs from the defaults of ArduPlane.
@@ -294,16 +294,22 @@ class Performance:
 
 
 def make_data_sheet_folder(
-    folder: Path, sheet: DataSheet, parameters: Path | None = None, made: SizedAircraft | None = None
+    folder: Path,
+    sheet: DataSheet,
+    parameters: Path | None = None,
+    made: SizedAircraft | None = None,
+    *,
+    overwrite: bool = False,
 ) -> Aircraft:
     """Make the folder of an aircraft from its data sheet, completely or not at all.
 
     parameters: file of ArduPlane parameters, which fill the gaps of the sheet.
     made: sized aircraft, for a class other than the default class of the layout.
+    overwrite: True replaces the folder of an aircraft.
     Raises FlightError, in one line with the allowed range, for a sheet of no small aircraft, a folder that exists, and
     an aircraft that cannot be made to fly; ParameterError for a file that cannot be read; OSError.
     """
-    target = check_new_folder(folder)
+    target = check_new_folder(folder, overwrite=overwrite)
     stated = {} if parameters is None else stated_parameters(parameters)
     if made is None:
         sheet = with_parameters(sheet, stated)
@@ -311,7 +317,7 @@ def make_data_sheet_folder(
         made = size_aircraft(check_sheet(sheet))
     with temporary_folder("planfly-sheet-") as place:
         files = _make_files(made, target.name, place, stated)
-    write_folder(target, {name: text.encode() for name, text in files.items()})
+    write_own_folder(target, {name: text.encode() for name, text in files.items()})
     return read_aircraft(target)
 
 

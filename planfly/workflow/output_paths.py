@@ -9,6 +9,8 @@ from world.errors import PlanflyError
 RESULTS = Path("runs")
 # Default folder of a run as a pattern: {name} is the name of the scenario or mission, {seed} is the seed.
 RUN_FOLDER = "runs/{name}-seed{seed}"
+# Default log of a flight as a pattern, in a folder that no run writes its pictures to.
+FLY_LOG = "runs/{name}-fly-seed{seed}/flight.mcap"
 
 # Files of `planfly.run`.
 RUN_FILES = (

@@ -182,6 +182,23 @@ def test_the_same_aircraft_under_another_name(name: str, tmp_path: Path) -> None
     assert states[0] == states[1]
 
 
+def test_a_folder_is_replaced_only_if_asked_and_only_if_it_is_an_aircrafts(tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    make_own_folder(folder, load_aircraft("aerosonde"))
+    (folder / "uncertainty.toml").write_text("of the aircraft before", encoding="utf-8")
+    (folder / "flight.BIN").write_bytes(b"my log")
+    with pytest.raises(FlightError, match="exists; overwrite=True replaces it"):
+        make_own_folder(folder, load_aircraft("zagi"))
+    make_own_folder(folder, load_aircraft("zagi"), overwrite=True)
+    assert read_aircraft(folder).mass == load_aircraft("zagi").mass
+    assert (folder / "flight.BIN").read_bytes() == b"my log"
+    assert not (folder / "uncertainty.toml").exists()
+    (tmp_path / "photos").mkdir()
+    with pytest.raises(FlightError, match=r"photos: is not the folder of an aircraft, with photos\.toml"):
+        make_own_folder(tmp_path / "photos", load_aircraft("zagi"), overwrite=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "photos"]
+
+
 def test_a_folder_made_from_a_folder_brings_its_engines(tmp_path: Path) -> None:
     first = tmp_path / "first"
     make_own_folder(first, load_aircraft("aerosonde"))
@@ -204,7 +221,7 @@ def test_a_folder_made_from_a_folder_brings_its_engines(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("folder", "said"),
     [
-        ("there", "there: exists; name a folder that does not"),
+        ("there", "there: exists; overwrite=True replaces it, or name another folder"),
         ("nowhere/mine", "its folder .*nowhere does not exist"),
         ("my plane", "a folder's name of letters, digits"),
         ("gains", "none of ardupilot, draws, gains, posterior, uncertainty, README"),

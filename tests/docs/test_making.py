@@ -1,11 +1,12 @@
 """What pages take from the code: placeholders, docstrings and units as they are laid out."""
 
 import sys
+from pathlib import Path
 
 import pytest
 
 from flight.mission.commands import SUPPORT
-from tests.docs.page_blocks import ROOT
+from tests.docs.page_blocks import PAGES, ROOT
 
 sys.path.insert(0, str(ROOT / "docs"))
 from making.docstrings import as_rst
@@ -17,9 +18,20 @@ from making.tolerances import tolerance_list
 sys.path.pop(0)
 
 
+@pytest.mark.parametrize("page", [page for page in PAGES if "<!-- made: " in page.read_text(encoding="utf-8")], ids=str)
+def test_pages_hold_their_tables_as_the_code_is(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert filled(text) == text, "make tables writes the tables anew"
+
+
 def test_a_placeholder_that_is_none_is_noticed() -> None:
     with pytest.raises(KeyError, match="nothing"):
-        filled("text\n<!-- made: nothing -->\n")
+        filled("text\n<!-- made: nothing -->\n<!-- end of nothing -->\n")
+    with pytest.raises(ValueError, match="a table has no end"):
+        filled("text\n<!-- made: extras -->\n")
+    old = "<!-- made: extras -->\nof yesterday\n<!-- end of extras -->\n"
+    assert "of yesterday" not in filled(old)
+    assert filled(filled(old)) == filled(old)
     assert filled("in a line <!-- made: nothing --> it is text") == "in a line <!-- made: nothing --> it is text"
 
 

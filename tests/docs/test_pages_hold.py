@@ -1,26 +1,25 @@
 """The pages name what is there: every rule, tolerance, command, option and public name; links lead somewhere."""
 
+import json
 import math
 import re
 import shlex
-import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import numpy as np
 import pytest
 
 import planfly
+from logs.recording.reader import read_log
 from logs.verdict import tolerances
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules.registry import RULES
 from planfly.commands.registry import build_parser
 from planfly.terminal.exit_codes import EXIT_CODES
 from tests.docs.page_blocks import PAGES, ROOT
+from tests.planfly.made_plans import default_run
 from world.elevation_formats import SUFFIXES
-
-sys.path.insert(0, str(ROOT / "docs"))
-from making.placeholders import filled
-
-sys.path.pop(0)
 
 ALL = [ROOT / "README.md", *PAGES]
 _CODE = re.compile(r"(?<!`)`(planfly [^`]+)`(?!`)")
@@ -28,7 +27,7 @@ _LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
 def text_of(name: str) -> str:
-    return filled((ROOT / "docs" / name).read_text(encoding="utf-8"))
+    return (ROOT / "docs" / name).read_text(encoding="utf-8")
 
 
 def section(text: str, title: str) -> str:
@@ -43,6 +42,25 @@ def section_of_table(name: str, head: str) -> str:
 
 def numbers(value: object) -> list[float]:
     return list(value.values()) if isinstance(value, dict) else [float(value)]  # type: ignore[arg-type]
+
+
+def test_the_first_flight_is_as_its_page_says() -> None:
+    """Lines of its output, lengths of path and route to 0.1 km, and the number of air-defence units."""
+    page = text_of("first-flight.md")
+    _, said, files = default_run()
+    printed = said.splitlines()
+    for block in re.findall(r"^```text\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
+        assert [line for line in block.splitlines() if line not in printed] == []
+    plan = json.loads(files["plan.json"])
+    path = np.linalg.norm(np.diff(plan["waypoints_east_north_amsl_m"], axis=0), axis=1).sum() / 1000.0
+    words = " ".join(page.split())
+    assert f"plans a path of {path:.1f} km" in words
+    assert len(plan["scenario"]["threats"]) == 15
+    with TemporaryDirectory() as folder:
+        log = Path(folder, "flight.mcap")
+        log.write_bytes(files["flight.mcap"])
+        route = read_log(log).setup.route.waypoints
+    assert f"{np.linalg.norm(np.diff(route[:, :2], axis=0), axis=1).sum() / 1000.0:.1f} km in all" in words
 
 
 def test_every_rule_has_a_section_with_the_tolerances_that_it_uses() -> None:

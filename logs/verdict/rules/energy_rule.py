@@ -36,7 +36,11 @@ def energy_findings(
     measured = setup.source is not None and not geometric
     most = used * (1.0 + (0.0 if measured else UNDECIDED_FRACTION * setup.envelope.power_sd))
     doubt = not faults and not guessed and used <= usable < most
-    if math.isnan(used):
+    if used == 0.0 and predicted == 0.0:
+        # A model without a reading of power reads as 0 W.
+        used, predicted = math.nan, math.nan
+        reason = "the aircraft's model states no power, so that no energy is known"
+    elif math.isnan(used):
         reason = "the aircraft's power is not known at these speeds" if geometric else "nothing was flown"
     else:
         reason = _used_text(requirements, used, current) + (" by prediction" if geometric else "")

@@ -53,8 +53,7 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
     commanded = float(requirements.route.airspeed[leg])
     slowest, fastest, faults = _level_flight_range(requirements, leg, commanded)
     command = float(requirements.setup.route.airspeed[leg])
-    true = "" if command == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
-    notes = [f"{command:.1f} m/s{true} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"]
+    notes = [_command_text(command, commanded, slowest, fastest)]
     notes += [*_speed_range_notes(requirements, command), *_short_leg_notes(requirements, leg, commanded)]
     margin = min(commanded - slowest, fastest - commanded)
     at_least = commanded - slowest <= fastest - commanded
@@ -109,6 +108,14 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
         check=check,
         facts=facts,
     )
+
+
+def _command_text(command: float, commanded: float, slowest: float, fastest: float) -> str:
+    """Describe a commanded airspeed, equivalent and true, among those of level flight; all m/s."""
+    true = "" if command == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
+    if not (math.isfinite(slowest) and math.isfinite(fastest)):
+        return f"{command:.1f} m/s{true} commanded, and no level flight is known"
+    return f"{command:.1f} m/s{true} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"
 
 
 def _flown_command(requirements: RouteRequirements, leg: int) -> float:

@@ -98,7 +98,7 @@ class Tried:
         self.folders.append(arguments[-1])
         if self.code is None:
             raise subprocess.TimeoutExpired(arguments, 60.0)
-        return subprocess.CompletedProcess(arguments, self.code)
+        return subprocess.CompletedProcess(arguments, self.code, b"", b"")
 
 
 @pytest.fixture

@@ -340,3 +340,30 @@ def test_a_trim_is_the_same_to_the_last_digit_on_other_processors() -> None:
         found.append(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
     assert found[0].count("Trim(") == 9
     assert len(set(found)) == 1
+
+
+class HeldPropeller:
+    """A propeller in a steady flow, in JSBSim's place: its speed follows its steady one with a time constant, s."""
+
+    def __init__(self, constant: float) -> None:
+        self.constant, self.speed, self.dt = constant, 10.0, 0.0
+
+    def set_dt(self, dt: float) -> None:
+        self.dt = dt
+
+    def run(self) -> None:
+        self.speed = max(0.0, self.speed + self.dt * (500.0 - self.speed) / self.constant)
+
+    def getter(self, _name: str) -> Callable[[], float]:
+        return lambda: self.speed
+
+    def setter(self, _name: str) -> Callable[[float], None]:
+        return lambda _value: None
+
+
+@pytest.mark.parametrize("constant", [0.0005, 0.02, 0.15, 3.0, 40.0, 300.0])
+def test_an_engine_settles_whatever_its_time_constant(constant: float) -> None:
+    propeller = HeldPropeller(constant)
+    Engine(propeller, 1.0 / 120.0, propeller.getter, propeller.setter).settle(spin=True)
+    assert propeller.speed == pytest.approx(500.0, abs=1e-8)
+    assert propeller.dt == 1.0 / 120.0

@@ -11,6 +11,8 @@ import pytest
 import planfly
 from aircraft.catalog import load_aircraft
 from flight.dynamics.envelope_tables import load_envelope
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.trim import straight
 from logs.recording.reader import read_log
 from logs.views import aircraft as drawn
 from planfly.cli import main
@@ -33,6 +35,63 @@ def undrawn(monkeypatch: pytest.MonkeyPatch, unrendered: None) -> None:
     """Pictures with nothing in them: drawing is most of what a description takes."""
     for name in ("draw_envelope", "draw_trims", "draw_steps"):
         monkeypatch.setattr(drawn, name, lambda *_: None)
+
+
+def test_a_copy_of_an_aircraft_has_its_model_even_if_jsbsim_ships_it() -> None:
+    """`mine/mine.xml` is the JSBSim model, with the engine, propeller and systems that it names; it flies alike."""
+    assert main(["aircraft", "--new", "./mine", "--from", "c172x"]) == 0
+    assert {"mine.xml", "eng_io320.xml", "prop_75in2f.xml"} <= {file.name for file in Path("mine").iterdir()}
+    assert "shipped" not in Path("mine/mine.toml").read_text()
+    states = []
+    for aircraft in (load_aircraft("c172x"), planfly.aircraft("./mine")):
+        assert not aircraft.model.shipped or aircraft.name == "c172x"
+        fdm = Fdm(aircraft)
+        fdm.start(46.0, 8.0, 600.0, 1.0, aircraft.airspeed)
+        fdm.step(60)
+        states.append(fdm.read())
+    assert states[0] == states[1]
+
+
+@pytest.mark.parametrize("inertia", ["30"])
+def test_the_weight_of_a_propeller_does_not_change_a_trim(inertia: str) -> None:
+    """The copy's steady flight is that of the original, which has 1.67 slug ft2."""
+    planfly.new_aircraft("mine", "c172x")
+    propeller = Path("mine/prop_75in2f.xml")
+    text = propeller.read_text()
+    assert "<ixx> 1.67 </ixx>" in text
+    propeller.write_text(text.replace("<ixx> 1.67 </ixx>", f"<ixx> {inertia} </ixx>"))
+    both = (load_aircraft("c172x"), planfly.aircraft("./mine"))
+    own, other = (straight(Fdm(aircraft), 50.0, 500.0) for aircraft in both)
+    assert own is not None
+    assert other is not None
+    assert np.abs(own.vector() - other.vector()).max() < 1e-4
+
+
+def test_a_model_that_cannot_be_loaded_is_refused_with_jsbsims_reason(capsys: pytest.CaptureFixture[str]) -> None:
+    planfly.new_aircraft("mine", "c172x")
+    model = Path("mine/mine.xml")
+    whole = model.read_text()
+    for broken, reason in (
+        (whole.replace('<engine file="eng_io320">', '<engine file="prop_75in2f">'), "Unknown engine type"),
+        (whole.replace("mass_balance", "weights"), "No mass_balance element was found"),
+    ):
+        model.write_text(broken)
+        assert main(["aircraft", "./mine"]) == 2
+        said = capsys.readouterr().err.splitlines()[-1]
+        assert "mine/mine.xml: JSBSim cannot load this model: " in said
+        assert reason in said
+    Path("mine/mine.toml").unlink()
+    assert main(["aircraft", "./mine"]) == 2
+    assert "planfly aircraft --new FOLDER makes one" in capsys.readouterr().err
+
+
+def test_a_new_aircraft_replaces_another_one_only_with_overwrite(capsys: pytest.CaptureFixture[str]) -> None:
+    sheet = ["aircraft", "--new", "./mine", "--mass", "2.1", "--span", "1.6", "--cruise", "15", "--stall", "10"]
+    assert main(["aircraft", "--new", "./mine"]) == 0
+    assert main(sheet) == 2
+    assert "mine: exists; --overwrite replaces it, or name another folder" in capsys.readouterr().err
+    assert main([*sheet, "--overwrite"]) == 0
+    assert planfly.aircraft("./mine").mass == 2.1
 
 
 def test_without_a_name_it_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
@@ -91,7 +150,7 @@ def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
         (["aerosonde", "--out", "full"], "exists and is not empty"),
         (["aerosond"], "did you mean 'aerosonde'?"),
         (["full"], "did you mean './full'?"),
-        (["--new", "./full"], "full: exists; name a folder that does not"),
+        (["--new", "./full"], "full: exists; --overwrite replaces it, or name another folder"),
         (["--new", "./mine", "--from", "zeppelin"], "no aircraft called 'zeppelin'"),
         (["mine", "--new", "./mine"], "--new takes the folder alone"),
         (["--from", "aerosonde"], "--from: goes with --new"),

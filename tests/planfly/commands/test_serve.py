@@ -346,6 +346,9 @@ def test_the_default_scenario_stands_by(serve: Callable[..., Served]) -> None:
         (["none.waypoints"], "no such file"),
         (["--sign-key", "none"], "none: cannot be read"),
         (["--allow", "300.1.1.1"], "--allow 300.1.1.1"),
+        ([], "mission: none is named; a mission, or a scenario to wait for an upload in, is expected: --scenario NAME"),
+        (["--aircraft", "nothing", "--scenario", "jacksboro-air"], "no aircraft called 'nothing'"),
+        (["--wind", "8", "--scenario", "jacksboro-air"], "--wind"),
     ],
 )
 def test_bad_usage_is_refused(

@@ -58,7 +58,7 @@ EVERY = {
         Given(
             ("studio", "short.waypoints", "--scenario", "field.toml", "--no-browser", "--port", "0", "--keep", "kept")
         ),
-        Given(("serve", "--bind", "127.0.0.1:0", "--to", "127.0.0.1:9", "--log", "logs")),
+        Given(("serve", "--scenario", "field.toml", "--bind", "127.0.0.1:0", "--to", "127.0.0.1:9", "--log", "logs")),
         Given(("check", "flight.mcap", "--json", "new.json"), (0, 4), "new.json"),
         Given(("returns", "plan.json", "--every", "20", "--json", "new.json"), (0, 4), "new.json"),
         Given(("survey", "lines.waypoints", "--aircraft", "x8", "--out", "out"), (0, 4), "out"),

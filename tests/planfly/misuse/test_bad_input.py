@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -169,9 +170,9 @@ LOGS = {
 }
 
 
-def refused(argv: list[str], folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """Run a command that must be refused; its line on standard error."""
-    before = sorted(path.name for path in folder.rglob("*"))
+def refused(argv: list[str], folder: Path, capsys: pytest.CaptureFixture[str], *, leaves: tuple[str, ...] = ()) -> str:
+    """Run a command that must be refused; its line on standard error.  leaves: names of the files that it writes."""
+    before = sorted([*(path.name for path in folder.rglob("*")), *leaves])
     code = main(argv)
     captured = capsys.readouterr()
     assert code == 2, captured.err
@@ -211,6 +212,24 @@ def test_a_malformed_file_of_zones(name: str, tmp_path: Path, capsys: pytest.Cap
 def test_a_malformed_mission(name: str, command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / name).write_text(MISSIONS[name], encoding="utf-8")
     assert name in refused([command, name], tmp_path, capsys)
+
+
+@pytest.mark.parametrize("command", ["fly", "check"])
+def test_a_broken_mission_is_an_error_case_in_the_xml(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "m.waypoints").write_text("no mission", encoding="utf-8")
+    line = refused([command, "m.waypoints", "--junit", "m.xml"], tmp_path, capsys, leaves=("m.xml",))
+    (suite,) = ElementTree.parse(tmp_path / "m.xml").getroot()
+    assert suite.attrib == {"name": "m.waypoints"} | dict.fromkeys(("tests", "errors"), "1") | dict.fromkeys(
+        ("failures", "skipped"), "0"
+    )
+    (case,) = suite
+    assert case[0].tag == "error"
+    assert case[0].attrib["message"] == line.removeprefix("planfly: ").rstrip("\n")
+    (tmp_path / "m.xml").write_text("mine", encoding="utf-8")
+    assert "exists; --overwrite replaces it" in refused([command, "m.waypoints", "--junit", "m.xml"], tmp_path, capsys)
+    assert (tmp_path / "m.xml").read_text() == "mine"
 
 
 @pytest.mark.parametrize("name", FENCES)

@@ -46,7 +46,7 @@ PAPER = ("paper", "--problems", "7", "--runs", "3", "--jobs", "2", "--out", "out
 FLY = ("fly", "long.waypoints", "--scenario", "field.toml", "--log", "f.mcap")
 CAMPAIGN = ("campaign", "round.waypoints", "--scenario", "field.toml", "--workers", "2", "--out", "out")
 WINDS = ("winds", *CAMPAIGN[1:])
-SERVE = ("serve", "--bind", "127.0.0.1:0", "--to", "127.0.0.1:9", "--log", "logs")
+SERVE = ("serve", "--scenario", "field.toml", "--bind", "127.0.0.1:0", "--to", "127.0.0.1:9", "--log", "logs")
 
 
 @dataclass(frozen=True)
