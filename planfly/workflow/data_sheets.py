@@ -470,7 +470,7 @@ def arduplane_parameters(aircraft: Aircraft, flown: Performance, fdm: Fdm, state
 
 
 def servo_text(aircraft: Aircraft, flown: Performance) -> str:
-    """Return the text of ``ardupilot.toml`` with the servo outputs of unmixed controls; the model contains the mixer."""
+    """Return the text of ``ardupilot.toml``, the servo outputs of unmixed controls; the model contains the mixer."""
     elevator, aileron, rudder = (
         math.degrees(value) for value in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)
     )

@@ -82,7 +82,7 @@ def _nearest_passing_value(current: float, step: float, far: float, passes: Call
 
 
 def _deviation_at_failure(failed: Finding, findings: tuple[Finding, ...]) -> float | None:
-    """Return the cross-track or altitude error where the flight failed, m, as in `DecidingParameter`; None if unknown."""
+    """Return the cross-track or altitude error where the flight failed, m, or None if unknown."""
     if failed.rule == "corridor":
         return failed.flown
     if failed.place.kind != "leg" or failed.rule not in ("clearance", "height"):

@@ -194,7 +194,7 @@ OneRound = Callable[[Scenario], tuple[Verdict, bool]]
 
 
 def refine(scenario: Scenario, most: int, one_round: OneRound, keep: Callable[[int], None]) -> tuple[Verdict, Rounds]:
-    """Plan and fly in rounds, each with limits tightened by the previous round, until a round flies or must be the last.
+    """Plan and fly in rounds, each with limits tightened by the previous round, until one flies or none can follow.
 
     most: maximum number of rounds after the first.
     one_round: plans in a scenario and flies; returns the verdict, and whether the plan was flown.
