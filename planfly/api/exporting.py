@@ -204,7 +204,7 @@ def _read_log(path: Path, *, coloured: bool) -> _Source:
 
 
 def _read_mission(path: Path, options: MissionOptions, *, placed: bool, coloured: bool) -> _Source:
-    """Read a plan or a mission file, and place the mission in its scenario if a target, a plan or a fence needs this."""
+    """Read a plan or a mission file; place the mission in its scenario if a target, a plan or a fence needs this."""
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
