@@ -82,7 +82,7 @@ def new_scenario(
 
 
 def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
-    """Return the file to write.  Raises PlanflyError for an invalid folder, or without `overwrite` if the file exists."""
+    """Return the file to write.  Raises PlanflyError for an invalid folder, and without `overwrite` for an old file."""
     if not name.isprintable() or not 1 <= len(name) <= 100:
         allowed = "a folder with a name of 1 to 100 printable characters is expected"
         raise PlanflyError.of_argument("folder", folder, allowed, shown=ascii(str(folder)))

@@ -148,7 +148,7 @@ def _search_and_write(
 
 
 def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
-    """Return the check made between generations, which returns "interrupted", "budget" after `seconds`, or "" to go on."""
+    """Return the check made between generations; it returns "interrupted", "budget" after `seconds`, or "" to go on."""
     deadline = None if seconds is None else time.monotonic() + seconds
 
     def ends() -> str:

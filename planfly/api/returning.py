@@ -105,7 +105,7 @@ class ReturnsFound:
 
     @property
     def lines_of_program(self) -> tuple[str, ...]:
-        """Lines on the worst returns by the ArduPlane program and by the simulated ArduPlane; empty without a program."""
+        """Lines on the worst returns by the ArduPlane program and the simulated ArduPlane; empty without a program."""
         if self.by_program is None:
             return ()
         return (self.by_program.headline(), *self.by_program.lines(self.returns, self.setup.scenario))

@@ -53,7 +53,7 @@ def serve(
     stop: polled continuously.
     on_message: called with one line for each event.
 
-    A script must call this function under ``if __name__ == "__main__":``, because the flight processes import the script.
+    A script must call this function under ``if __name__ == "__main__":``, because flight processes import the script.
     Raises a `planfly.PlanflyError` for bad input.
     """
     # Imported here: only this function needs MAVLink.
