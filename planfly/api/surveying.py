@@ -210,7 +210,7 @@ def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyFound:
 
 
 def _write_results(found: SurveyFound, out: str | Path | None, overwrite: bool) -> SurveyFound:
-    """Write the picture of the lines and the remedied missions if a folder is named; return the result with its files."""
+    """Write the picture of the lines and the remedied missions if a folder is named; return the result with files."""
     if out is None:
         return found
     folder, chart = clean_folder(out, SURVEY_FILES, overwrite=overwrite), survey_chart(found.setup, found.track)

@@ -228,7 +228,7 @@ def error_text(error: PlanflyError, parser: CommandParser) -> str:
     'a.gif: exists; --overwrite replaces it'
     """
     options, text = parser.keywords(), str(error)
-    # If a keyword changes a scenario wrongly, the error has the keyword as its file.  A real file may have the same name.
+    # An error in a scenario that a keyword changed has the keyword as its file.  A real file may have the same name.
     of_keyword = error.file in options and bool(error.field)
     begin = f"{error.file}: " if error.file and not of_keyword else ""
     head = error.file if of_keyword else error.argument

@@ -297,7 +297,7 @@ def own_link_options(parser: CommandParser, *, bind: str) -> None:
 
 @contextlib.contextmanager
 def stop_signals() -> Iterator[Callable[[], bool]]:
-    """Handle SIGINT and SIGTERM, and yield a function that returns True after one, so that logs can be closed properly."""
+    """Yield a function that returns True after SIGINT or SIGTERM, which then do not interrupt the closing of logs."""
     asked = False
 
     def ask(_number: int, _frame: FrameType | None) -> None:

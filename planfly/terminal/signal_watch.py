@@ -33,8 +33,8 @@ _COMPILERS = ("numba", "llvmlite")
 def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
     """Raise `Interrupted` for SIGINT and SIGTERM, and end the process by force ``grace`` seconds after a signal.
 
-    Compiled code and compilers can delay Python's signal handlers, and waits for other processes can be long.  Therefore
-    a thread kills this process's children, removes its unfinished files and ends it with exit code 128 plus the number
+    Compiled code and compilers can delay Python's signal handlers, and waits for other processes can be long.  A thread
+    therefore kills this process's children, removes its unfinished files and ends it with exit code 128 plus the number
     of the signal.  The thread keeps watching after this block until the process has ended, so use this block as the
     outermost block of a program.
 
@@ -146,7 +146,7 @@ def _kill_children_and_exit(code: int) -> NoReturn:
         for child in multiprocessing.active_children() if multiprocessing is not None else ():
             child.kill()
             killed.add(child.pid)
-        # A killed child may still complete a file that it was writing, so the first tries to remove its folder may fail.
+        # A killed child may still complete a file that it was writing, so removing its folder may fail at first.
         if all([remove_unfinished(), *map(remove_temporary_folders, killed)]) or time.monotonic() > until:
             os._exit(code)
         time.sleep(_RETRY_INTERVAL_S)
