@@ -267,9 +267,9 @@ def _print_limits(chosen: "Aircraft", envelope: "Envelope") -> None:
         f" level flight at sea level {slow:.1f}..{fast:.1f} m/s"
     )
     print(
-        f"  limits   bank {_to_degrees(chosen.max_bank):.0f}, pitch {_to_degrees(chosen.max_pitch):.0f}, elevator"
-        f" {_to_degrees(chosen.max_elevator):.0f}, aileron {_to_degrees(chosen.max_aileron):.0f}, rudder"
-        f" {_to_degrees(chosen.max_rudder):.0f} deg either way; {braking}"
+        f"  limits   bank {_deg(chosen.max_bank):.0f}, pitch {_deg(chosen.max_pitch):.0f}, elevator"
+        f" {_deg(chosen.max_elevator):.0f}, aileron {_deg(chosen.max_aileron):.0f}, rudder"
+        f" {_deg(chosen.max_rudder):.0f} deg either way; {braking}"
     )
     if envelope.source:
         climb, descent = math.degrees(envelope.climb_sd), math.degrees(envelope.descent_sd)
@@ -286,8 +286,8 @@ def _print_trims(trims: "tuple[TrimRow, ...]", amsl: float) -> None:
     for row in trims:
         trim = row.trim
         print(
-            f"  {trim.airspeed:8.1f}{_to_degrees(trim.alpha):8.2f}{_to_degrees(trim.elevator):10.2f}{_to_degrees(trim.aileron):9.2f}"
-            f"{_to_degrees(trim.rudder):8.2f}{100.0 * trim.throttle:10.1f}{row.power / 1000.0:9.3f}"
+            f"  {trim.airspeed:8.1f}{_deg(trim.alpha):8.2f}{_deg(trim.elevator):10.2f}{_deg(trim.aileron):9.2f}"
+            f"{_deg(trim.rudder):8.2f}{100.0 * trim.throttle:10.1f}{row.power / 1000.0:9.3f}"
             f"{row.endurance / 3600.0:11.2f}{row.endurance * trim.airspeed / 1000.0:8.0f}"
         )
 
@@ -331,7 +331,7 @@ def _print_turns(chosen: "Aircraft") -> None:
     for speed in (*speeds, chosen.airspeed + _WIND_MPS):
         cells = "".join(f"{turn_radius(speed, math.radians(bank)):12.0f}" for bank in _BANKS_DEG)
         print(f"  {speed:<8.1f}{cells}" + ("  (cruise in a 10 m/s tailwind)" if speed == speeds[1] + _WIND_MPS else ""))
-    bank = _to_degrees(chosen.max_bank)
+    bank = _deg(chosen.max_bank)
     print(f"\nshortest leg between two equal turns, m, at {bank:.0f} deg of bank, by ground speed and turn")
     print("  m/s     " + "".join(f"{turn:>8.0f} deg" for turn in _TURNS_DEG))
     for speed in (*speeds, chosen.airspeed + _WIND_MPS):
@@ -341,12 +341,12 @@ def _print_turns(chosen: "Aircraft") -> None:
         )
 
 
-def _to_degrees(angle: float) -> float:
+def _deg(angle: float) -> float:
     return math.degrees(angle)
 
 
 def _angle_pair(climb: float, descent: float) -> str:
     def one(angle: float) -> str:
-        return "-" if math.isnan(angle) else f"{_to_degrees(angle):.1f}"
+        return "-" if math.isnan(angle) else f"{_deg(angle):.1f}"
 
     return f"{one(climb)} / {one(descent)}"

@@ -1,7 +1,7 @@
-"""Editing context of a mission: places of its items, its route, and its geometric verdict.
+"""Place the items of an edited mission, lay out its route, and judge its geometry.
 
-Scenario and aircraft are loaded once.  An unchanged mission is judged as it was opened, a plan with its certificate;
-a changed mission is judged like a mission file.
+Scenario and aircraft are loaded once.  An unchanged mission is judged as it was opened, and a plan with its
+certificate; a changed mission is judged like a mission file.
 """
 
 import math
@@ -29,7 +29,7 @@ from world.arrays import Floats
 from world.frames import to_geo, to_map
 from world.scenario import Scenario
 
-# Distance from the edge of its scenario, m, at which a mission without a given scenario gets a new one around it.
+# Distance from the edge of its scenario, m, at which a mission without a given scenario gets a new scenario around it.
 _EDGE_DISTANCE_M = 500.0
 _NO_FENCES = NamedFences()
 _DEFAULT_PARAMETERS = SetParameters()
@@ -47,13 +47,15 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class EditContext:
-    """Everything that a mission under edit is judged with.
+    """Everything that an edited mission is judged with.
 
-    scenario: its world; airframe: the aircraft loaded for it; seed: seed of its flight.
+    scenario: scenario of the mission.
+    airframe: the aircraft loaded for this scenario.
+    seed: seed of the flight.
     opened: the setup as it was opened, with its plan if there is one.
     terrain: elevation file named for a mission without a scenario, or None.
-    planned: true if the acceptance radii were set by planfly, and follow the turns.
-    fences: fences named with a mission; their zones are part of every scenario that is made around it.
+    planned: True if planfly set the acceptance radii, which then follow the turns.
+    fences: fences named with a mission; their zones are part of every scenario that is made around the mission.
     parameters: parameters of the autopilot that were set in the studio.
     """
 
@@ -70,7 +72,7 @@ class EditContext:
     def of(
         cls, setup: FlightSetup, terrain: str | Path | None = None, fences: NamedFences = _NO_FENCES
     ) -> "EditContext":
-        """Make the desk of an opened mission or plan."""
+        """Make the editing context of an opened mission or plan."""
         return cls(
             setup.scenario,
             airframe_of(setup),
@@ -82,7 +84,7 @@ class EditContext:
         )
 
     def flown_as(self, scenario: Scenario, parameters: SetParameters) -> "EditContext":
-        """Return the context of the same mission in other weather, or with another aircraft or autopilot.
+        """Return the context of the same mission in another scenario, with its weather, aircraft and autopilot.
 
         The certificate of a plan applies only to the world in which it was planned.
         """
@@ -96,7 +98,7 @@ class EditContext:
         return replace(self, opened=setup, planned=True)
 
     def around(self, mission: Mission) -> "EditContext":
-        """Return the context, in a new scenario if the mission has left the one that was made around it."""
+        """Return the context, with a new scenario if the mission has left the scenario that was made around it."""
         if not self.scenario.external:
             return self
         points = self.points(mission)[:, :2]
@@ -122,10 +124,10 @@ class EditContext:
         return place_stops(mission, self.scenario.origin, self.scenario.terrain, vertical_legs=True)
 
     def points(self, mission: Mission, placed: PlacedMission | None = None) -> Floats:
-        """Return east, north and altitude AMSL of each place of `edits.places`, (n, 3) m.
+        """Return east, north and altitude AMSL of each place of `edits.places`, (n, 3), m.
 
-        The altitude of a landing is the altitude of its touchdown.  An item that no flight reaches has the altitude
-        that it states, NaN if not known.
+        The altitude of a landing is that of its touchdown.  An item that no flight reaches has its stated altitude, or
+        NaN if this is unknown.
         """
         placed = self.placed(mission) if placed is None else placed
         heights = {stop.stop.item: float(stop.position[2]) for stop in reversed(placed.stops)}
@@ -140,7 +142,7 @@ class EditContext:
         return np.stack([east, north, up], axis=1)
 
     def _stated_altitude(self, mission: Mission, item: MissionItem, east: float, north: float) -> float:
-        """Return the altitude AMSL that an item states, m; NaN if it states none, or over unknown ground."""
+        """Return the altitude AMSL that an item states, m, or NaN if the item or the terrain does not determine it."""
         if item.frame in AMSL:
             return item.alt
         terrain, home = self.scenario.terrain, mission.home
@@ -163,7 +165,7 @@ class EditContext:
         return float(lat), float(lon)
 
     def retuned(self, mission: Mission, index: int) -> Mission:
-        """Adapt the acceptance radii of a planned mission to its turns near an item."""
+        """Return a planned mission with its acceptance radii near an item adapted to its turns; other missions stay."""
         if not self.planned:
             return mission
         own = places(mission)
@@ -174,7 +176,7 @@ class EditContext:
         radii = acceptance_radii(self.scenario, points, frame.airspeed, frame.max_bank, frame.limits.tracking)
         items = list(mission.items)
         for k, radius in zip(chain, radii.tolist(), strict=True):
-            # The turn at an end of the chain is not known, unless it is an end of the mission, which has no turn.
+            # The turn at an end of the chain is unknown, except at an end of the mission, which has no turn.
             inner = k not in (chain[0], chain[-1]) or k in (own[0], own[-1])
             if inner and items[k].command == Command.NAV_WAYPOINT:
                 params = items[k].params
@@ -182,7 +184,7 @@ class EditContext:
         return replace(mission, items=tuple(items))
 
     def _planned_points(self, mission: Mission, chosen: tuple[int, ...]) -> Floats:
-        """Return the places of a planned mission, AMSL; a landing has the altitude of the item before it."""
+        """Return chosen places of a planned mission with altitude AMSL; a landing has the previous item's altitude."""
         items = [mission.items[k] for k in chosen]
         east, north = to_map(self.scenario.origin, [one.lat_deg for one in items], [one.lon_deg for one in items])
         up = [one.alt for one in items]
@@ -195,8 +197,8 @@ class EditContext:
     # Verdicts.
 
     def setup(self, mission: Mission) -> FlightSetup:
-        """Make the flight setup of a mission.  Raises MissionError for one that cannot be laid out."""
-        # The mission of the setup names its autopilot; its items are the opened ones.
+        """Return the flight setup of a mission.  Raises MissionError for a mission without a valid route."""
+        # Compare the items, because the mission of the setup names its autopilot and is therefore another object.
         if mission.items is self.opened.mission.items and self.scenario is self.opened.scenario:
             return self.opened
         return make_setup(self.scenario, self.airframe, mission, self.seed, placed=self.placed(mission))
@@ -208,14 +210,14 @@ class EditContext:
         return Judged(mission, setup, requirements, judge_geometry(setup, requirements))
 
     def route(self, mission: Mission) -> Route:
-        """Lay out the route of a mission, without the notes for people."""
+        """Return the route of a mission, without the notes for the user."""
         frame, fly_over = self.airframe, self.scenario.flight.fly_over
         rules = frame.autopilot.route_rules
         laid = lay_route(self.placed(mission), frame.airspeed, fly_over, frame.limits, rules)
         return with_end_courses(laid, self.scenario, frame.limits)
 
     def part(self, mission: Mission, route: Route) -> FlightSetup:
-        """Make a setup of a part of the route, whose legs and corners are judged; nothing is flown."""
+        """Return a setup for judging the legs and corners of a part of the route; nothing is flown."""
         frame = self.airframe
         return FlightSetup(
             scenario=self.scenario,
