@@ -105,8 +105,8 @@ def _with_extreme_legs(desk: EditContext, route: Route, part: Route, *, ahead: b
         direction = np.array([0.0, 1.0])
     steps = _APPENDED_LEG_LENGTH_M * np.arange(1.0, count + 1.0)[:, None] * direction / float(np.hypot(*direction))
     points = np.column_stack([part.waypoints[end, :2] + steps, heights])
-    # The first appended leg keeps the airspeed at the end of the part.  Each further leg has the airspeed for its pair of
-    # altitudes.
+    # The first appended leg keeps the airspeed at the end of the part.  Each further leg has the airspeed for the pair
+    # of altitudes at its ends.
     onward = np.concatenate([part.airspeed[end : end + 1 or None], speeds])
     order = slice(None, None, -1) if ahead else slice(None)
 
