@@ -326,7 +326,7 @@ class Draw:
 def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
     r"""Draw a flight's numbers.
 
-    The random numbers are from ``SeedSequence(seed, spawn_key=(index,))``.  No draw depends on another draw, so that any
+    The random numbers are from ``SeedSequence(seed, spawn_key=(index,))``.  No draw depends on another draw, so any
     order, any number of workers and any part of a campaign give the same flights.
 
     seed: seed of the campaign.

@@ -249,7 +249,7 @@ class _Known:
         self.flown = {number: flown for number, (_, flown) in known.items()}
 
     def missing(self, asked: list[AskedFlight]) -> list[AskedFlight]:
-        """Return the requested flights that the table lacks.  Raises StoreError if a number has another request there."""
+        """Return the requested flights that the table lacks.  Raises StoreError if a number has another request."""
         for one in asked:
             if self._asked.get(one.number, one) != one:
                 path = self._store.path

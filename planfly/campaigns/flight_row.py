@@ -103,8 +103,8 @@ def clearance_profile(route: Route, track: Track) -> Singles:
 def waypoint_crossings(route: Route, track: Track) -> Singles:
     """Return the distance right of and above each of s stops at closest approach, m, (s, 2); NaN if not reached.
 
-    A stop is a waypoint, or the corner at which a loiter or a return starts, because the number of later corners differs
-    between flights.  Right is relative to the mean of the incoming and outgoing courses.
+    A stop is a waypoint, or the corner at which a loiter or a return starts; later corners are left out, because their
+    number differs between flights.  Right is relative to the mean of the incoming and outgoing courses.
     """
     points = route.waypoints
     out = np.full((len(points), 2), np.nan, dtype=np.float32)

@@ -33,7 +33,7 @@ MAX_FAILED_STARTS = 10
 _copies: list[CampaignCopy] = []
 
 
-def _load_campaign(copy: CampaignCopy) -> None:
+def _begin(copy: CampaignCopy) -> None:
     """Load the campaign in a worker process."""
     _copies.append(copy)
 
@@ -70,7 +70,7 @@ class _Worker:
             # The pool has one process, so that its flight is known if the process dies.
             self._pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=end_with_parent)
             # The campaign is not an argument of the process, because the start would wait for the imports it needs.
-            self._started = self._pool.submit(_load_campaign, self._copy)
+            self._started = self._pool.submit(_begin, self._copy)
             self.processes = [child for child in active_children() if child not in others]
         return self._pool.submit(_fly_request, request)
 
