@@ -120,7 +120,7 @@ def winds_page(name: str, figure: Figure, found: WindsFound, rows: Sequence[tupl
 
 
 def _draw_both_widths(figure: Figure, words: str) -> Markup:
-    """Return a picture for a page in two widths, for desktops and phones, and change the figure to the narrow layout."""
+    """Return a picture for a page in two widths, for desktops and phones; change the figure to the narrow layout."""
     wide = page_svg(figure, words)
     narrow = page_svg(narrowed(figure), f"{words} (narrow)")
     return Markup(f'<div class="wide">{wide}</div><div class="narrow">{narrow}</div>')

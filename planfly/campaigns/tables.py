@@ -1,8 +1,8 @@
 """Tables of flights: SQLite files that are written flight by flight, and read as rows or as columns.
 
 The table of a campaign has one row per flight, keyed by the index of its draw.  The table of a search for winds has one
-row per flight, in the order of requests.  One process at a time holds a table; opening it drops all rows with a wrong
-checksum.
+row per flight, in the order of requests.  One process at a time can lock a table; opening a table drops all rows with a
+wrong checksum.
 """
 
 import errno
@@ -70,7 +70,7 @@ def row_values(row: FlightRow) -> dict[str, Any]:
 
 
 def row_of(index: int, known: Mapping[str, Any]) -> FlightRow:
-    """Return the row with a draw's index and these values by column."""
+    """Return the row with a draw's index and the given values by column."""
     margins = []
     for rule in RULE_WORDS.values():
         if (place := known[rule.place_column]) is not None:
@@ -84,7 +84,7 @@ def row_of(index: int, known: Mapping[str, Any]) -> FlightRow:
 
 
 def same_flight(one: FlightRow, other: FlightRow) -> bool:
-    """Return True if two rows hold the same flight, whatever machine flew it and however fast."""
+    """Return True if two rows describe the same flight; the machine and its speed may differ."""
     mine, theirs = (row_values(replace(row, made_of="")) for row in (one, other))
     same = all(mine[name] == theirs[name] for name in ROW_COLUMNS if name not in RUN_DEPENDENT_COLUMNS)
     return same and one.draw.index == other.draw.index
@@ -93,12 +93,12 @@ def same_flight(one: FlightRow, other: FlightRow) -> bool:
 # ----------------------------------------------------------------------
 # Create the file or open it to resume, lock it for one process, and refuse other contents.
 
-# Largest number of flights of a table whose settings state none, and largest credible number in a damaged table.
+# Maximum number of flights of a table whose settings state none, and of a flight's number in a damaged table.
 _MAX_FLIGHTS = 100_000
 
 
 class StoreError(PlanflyError):
-    """The table of a campaign cannot be opened, or belongs to another campaign."""
+    """Raised if the table of a campaign cannot be opened, or belongs to another campaign."""
 
 
 @dataclass(frozen=True)
@@ -413,7 +413,7 @@ class Store(LockedTable):
         return [bool(n) for (n,) in self._connection.execute("SELECT LENGTH(clearance) FROM flights ORDER BY flight")]
 
     def closest(self, most: int) -> list[FlightRow]:
-        """Return the worst flights, first the lost flights, then those that failed, then the closest calls by margin."""
+        """Return the worst flights, first lost flights, then failed flights, then the closest calls by margin."""
         order = "CASE outcome WHEN 'lost' THEN 0 WHEN 'not flyable' THEN 1 ELSE 2 END, closeness IS NULL, closeness"
         rows = self._connection.execute(f"{_SELECT} ORDER BY {order}, flight LIMIT ?", (most,))
         return [_make_row(values) for values in rows]
