@@ -31,7 +31,7 @@ from world.scenario import Scenario, load_scenario, with_planner
 PROBLEMS = (7, 15, 30, 60)
 # Planner of the paper.
 PAPER = "umda"
-# Planners for comparison, which are the baselines of Figs. 9-12, the polar encoding with two ranges of its angle, because
+# Planners for comparison.  They are the baselines of Figs. 9-12, with two ranges of the polar encoding's angle, because
 # the paper states none, and a polar encoding of planfly.
 BASELINES = ("umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing")
 # The planner of the paper in a strip along the straight line, an addition of planfly that other encodings do not get.
@@ -186,7 +186,7 @@ def usable_cores() -> int:
 
 
 def _plan_in_processes(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPlan]:
-    """Yield results in the order of the tasks; the first task runs in this process and compiles kernels for the others."""
+    """Yield results in the order of the tasks; the first runs in this process and compiles kernels for the others."""
     yield plan_once(*tasks[0])
     if count == 1:
         yield from (plan_once(*task) for task in tasks[1:])
