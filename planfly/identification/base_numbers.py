@@ -77,7 +77,7 @@ class _Probe:
         self._pressure = read("aero/qbar-psf")() * 47.88025898033584 * self._area
 
     def coefficients(self) -> Coefficients:
-        """Return the coefficients by central differences about the trim, at closed throttle; the propeller may windmill."""
+        """Return coefficients by central differences about the trim at closed throttle; the propeller may windmill."""
         zero = self._at(0.0)
         # Fit drag over lift on the straight part of the lift curve.
         angles = np.radians([-2.0, 0.0, 2.0, 4.0, 6.0])

@@ -233,9 +233,9 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
     """Return the servo output of each control, by the log's SERVOn_* parameters.
 
     Full travel is the maximum deflection of the base aircraft.  In ArduPlane a longer pulse means roll to the right,
-    nose up and yaw to the right; the model's elevator and rudder have the opposite sign.  Elevons are returned as `LEFT`
-    and `RIGHT`, positive trailing edge down, in place of elevator and aileron.  Raises LogError for mixes that are not
-    modelled, and for elevons if the base has a tail.
+    nose up and yaw to the right; the model's elevator and rudder have the opposite sign.  Elevons are returned as
+    `LEFT` and `RIGHT`, positive trailing edge down, in place of elevator and aileron.  Raises LogError for mixes that
+    are not modelled, and for elevons if the base has a tail.
     """
     functions = _servo_functions(log)
     for number, kind in functions.items():

@@ -206,7 +206,7 @@ class _Trials:
         return self._fly(mission, self._airframe, what)
 
     def _passes(self, flown: _FlownMission | None) -> TypeGuard[_FlownMission]:
-        """Return True if all lines are usable, no other rule fails than before, and no failure gets noticeably worse."""
+        """Return True if all lines are usable, no other rule fails than before, and no failure is noticeably worse."""
         return (
             flown is not None
             and _all_lines_usable(flown[0])
