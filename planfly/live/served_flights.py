@@ -182,7 +182,7 @@ class ServedFlights:
             home = Home(start.lat_deg, start.lon_deg, start.amsl - (0.0 if math.isnan(start.height) else start.height))
         items = tuple(int(item) for item in setup.route.items)
         texts = mission_texts(setup, verdict)
-        # A mission that is not judged in full, for example because MAVSDK writes ground speeds, is armed with a warning.
+        # A mission that is not judged in full is armed with a warning; for example, MAVSDK writes ground speeds.
         arms = verdict.flies or verdict.undecided
         judged = MissionJudged(request.number, True, arms, texts, home, items, start)
         return PreparedFlight(setup, flight.map), judged

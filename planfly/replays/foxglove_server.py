@@ -65,7 +65,7 @@ def play_to_foxglove(
 
 
 def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: OriginGate) -> Any:
-    """Start the server behind the gate, with a certificate that no browser trusts, so that no page bypasses the gate."""
+    """Start the server behind the gate; its certificate, which no browser trusts, keeps pages from bypassing the gate."""
     certificate = temporary_certificate()
     try:
         server = foxglove.start_server(
