@@ -65,7 +65,7 @@ def play_to_foxglove(
 
 
 def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: OriginGate) -> Any:
-    """Start the server behind the gate; its certificate, which no browser trusts, keeps pages from bypassing the gate."""
+    """Start the server behind the gate; no browser trusts its certificate, so that no page can bypass the gate."""
     certificate = temporary_certificate()
     try:
         server = foxglove.start_server(
