@@ -256,7 +256,7 @@ __all__ = ["__version__", *_HOMES]
 
 
 def __getattr__(name: str) -> Any:
-    """Load what is asked for when it is first asked for: ``planfly --help`` needs none of it."""
+    """Return a public name, loading its module at the first use, because ``planfly --help`` needs no such module."""
     if name in _HOMES:
         from importlib import import_module
 
@@ -265,5 +265,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return the public names, whatever of planfly is loaded."""
+    """Return all public names, including those that are not loaded yet."""
     return sorted(__all__)

@@ -1,3 +1,3 @@
-"""The version of planfly, where every module can read it."""
+"""Define the version of planfly, which every module can read."""
 
 __version__ = "0.2.0"

@@ -1,4 +1,4 @@
-"""Allowed numbers and words of arguments: one table for keywords of the API and command-line options."""
+"""Define the allowed numbers and words of arguments, for keywords of the API and command-line options."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -10,8 +10,9 @@ from world.errors import ArgumentError
 class Range(NamedTuple):
     """Range of allowed values of a number.
 
-    low, high: both allowed, unless `above` excludes low or `below` excludes high.
-    expected: text of the error.  integer: True if only whole numbers are allowed.
+    low, high: minimum and maximum, which are allowed unless `above` excludes low or `below` excludes high.
+    expected: text of the error.
+    integer: True if only whole numbers are allowed.
     """
 
     low: float
@@ -92,9 +93,9 @@ CHOICES: Mapping[str, tuple[Any, ...]] = {
 
 
 def check_arguments(**given: Any) -> None:
-    """Refuse the first number or word that is outside its range; None means not given.
+    """Raise ArgumentError for the first number or word that is outside its range.
 
-    given: by the name in `RANGES` or `CHOICES`.  Raises ArgumentError.
+    given: values by their name in `RANGES` or `CHOICES`; None is a value that was not given.
 
     >>> check_arguments(seed=3, log_hz=60, max_hours=None)
     >>> check_arguments(directions=3)
@@ -127,7 +128,7 @@ CAMERA = "the sensor across the way and along it and the focal length, mm, and m
 
 
 def is_wind(speed: float, from_deg: float) -> bool:
-    """Return True if a steady wind is allowed: speed, m/s, and the direction it comes from, degrees.
+    """Return True if the speed of a steady wind, m/s, and the direction from which it blows, degrees, are allowed.
 
     >>> is_wind(8.0, 270.0), is_wind(float("nan"), 0.0)
     (True, False)

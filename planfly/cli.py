@@ -1,4 +1,7 @@
-"""The command line: arguments in, one line for an error, an exit code out.  Heavy imports wait for the command."""
+"""Run a command of the command line, print an error in one line, and return the exit code.
+
+Heavy imports are left to the commands.
+"""
 
 import errno
 import os
@@ -15,39 +18,39 @@ from planfly.terminal.signal_watch import end_process, ended_by_signals
 from world.errors import CrashError, PlanflyError
 from world.interruption import Interrupted
 
-# Too few descriptors, of this process or of all, too little memory, and a disk that fails.
+# Errors of the machine, which are too few descriptors of the process or the system, too little memory, and disk errors.
 _MACHINES = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EIO)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Carry one command out, and return its exit code.
+    """Run one command, and return its exit code.
 
-    argv: without the program's name; None takes the process's, which SIGINT and SIGTERM then end in time.
+    argv: arguments without the program's name; None takes those of the process, which SIGINT and SIGTERM then end.
     """
     if argv is not None:
-        return _outcome(argv)
+        return _run_and_report(argv)
     prepare_process()
     open_standard_streams()
     if ASKS_COMPLETION in os.environ:
         answer_shell(build_parser())
     with ended_by_signals() as heard:
         try:
-            code = with_large_stack(lambda: _outcome(argv))
+            code = with_large_stack(lambda: _run_and_report(argv))
         except Exception:
             if not heard:
                 raise
-            # A compiler that is interrupted fails in ways of its own.
+            # An interrupted compiler may fail with any error.
             code = _fail(128 + heard[0], "interrupted")
     if heard:
-        # Taking an interpreter with compiled code down takes a second.
+        # End the process directly, because the shutdown of an interpreter with compiled code takes a second.
         end_process(code)
     return code
 
 
-def _outcome(argv: Sequence[str] | None) -> int:
+def _run_and_report(argv: Sequence[str] | None) -> int:
     try:
         with safe_streams():
-            return _carried_out(argv)
+            return _run_command(argv)
     except OSError as error:
         return _fail(FAULT, f"{error.filename or 'file'}: {error.strerror or error}")
     except MemoryError as error:
@@ -59,7 +62,7 @@ def _outcome(argv: Sequence[str] | None) -> int:
         return _fail(INTERRUPTED, "interrupted")
 
 
-def _carried_out(argv: Sequence[str] | None) -> int:
+def _run_command(argv: Sequence[str] | None) -> int:
     line = build_parser()
     args = line.parse_args(argv)
     try:
@@ -70,12 +73,12 @@ def _carried_out(argv: Sequence[str] | None) -> int:
                 give_junit_error(args, error_text(error, line.commands[args.command]))
                 raise
     except PlanflyError as error:
-        code = FAULT if isinstance(error, CrashError) or _is_machines(error.__cause__) else BAD_INPUT
+        code = FAULT if isinstance(error, CrashError) or _is_machine_error(error.__cause__) else BAD_INPUT
         return _fail(code, error_text(error, line.commands[args.command]))
 
 
-def _is_machines(cause: BaseException | None) -> bool:
-    """Return True if a file could not be read for want of what the machine gives, whatever the file holds."""
+def _is_machine_error(cause: BaseException | None) -> bool:
+    """Return True if a file could not be read because of an error of the machine, not because of its content."""
     return isinstance(cause, OSError) and cause.errno in _MACHINES
 
 

@@ -1,4 +1,4 @@
-"""Flight logs of planfly: recognise one, judge its flight, and say what of it is missing."""
+"""Recognise planfly's flight logs, judge their flights, and describe missing parts."""
 
 from pathlib import Path
 
@@ -8,12 +8,12 @@ from logs.verdict.verdict import Verdict
 from world.errors import PlanflyError
 
 MCAP_MAGIC = b"\x89MCAP"
-# How a flight ended whose log does not hold its end.
+# Reason for the end of a flight whose log does not contain the end.
 CUT_SHORT = "the log ends before the flight does"
 
 
 def is_log(path: Path) -> bool:
-    """Return True if a file is a flight log, by its first bytes or, failing those, its name.
+    """Return True if a file is a flight log, by its first bytes, or by its name if it has none.
 
     Raises PlanflyError for a file that cannot be read.
     """
@@ -35,5 +35,5 @@ def judge_log(log: FlightLog) -> Verdict:
 
 
 def loss_text(log: FlightLog) -> str:
-    """Say in a line what is missing in a log; "" for a complete log."""
+    """Describe the missing part of a log in a line; return "" for a complete log."""
     return "" if log.complete else f"{log.source}: incomplete: {log.problem}; it ends at {log.end_time:.1f} s"

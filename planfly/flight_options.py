@@ -1,4 +1,4 @@
-"""Options of a flight, named alike in keywords, the command line and a scenario, as one object."""
+"""Define the options of a flight, which have the same names in keywords, the command line and a scenario."""
 
 import functools
 import inspect
@@ -16,12 +16,12 @@ from world.files import did_you_mean, whole_path
 from world.scenario import Scenario, at_time, load_scenario, over_terrain, with_flight, with_wind
 from world.scenario_tables import Guidance, Navigation
 
-# Wind speed, m/s, and the direction it comes from, degrees.
+# Wind speed, m/s, and the direction from which the wind blows, degrees.
 Wind = tuple[float, float]
 # One file of fences, or several.
 FencePaths = str | Path | Sequence[str | Path]
 
-# Default limit of a simulated flight, h: longer than the endurance of planfly's aircraft.
+# Default limit of a simulated flight, h, which is longer than the endurance of planfly's aircraft.
 MAX_HOURS = 6.0
 # Default limit of the size of a log, MB; a log of 60 rows per second grows by some 20 MB per hour.
 MAX_MEGABYTES = 256.0
@@ -34,9 +34,10 @@ class FlightOptions(TypedDict, total=False):
     """Options of a flight.  A missing option, or None, keeps the value of the scenario.
 
     terrain: an elevation file that replaces the terrain of the scenario.
-    wind: speed, m/s, and the direction it comes from, degrees.  turbulence: "none", "light" or "moderate".
-    at: time of the flight, "START" or "START/END" by ISO 8601 with offsets from UTC; zones that are inactive then are
-    left out; None leaves none out.
+    wind: speed, m/s, and the direction from which the wind blows, degrees.
+    turbulence: "none", "light" or "moderate".
+    at: time of the flight, "START" or "START/END", in ISO 8601 with offsets from UTC; zones that are inactive at this
+    time are left out.  None keeps all zones.
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
     guidance: planfly's own law ("path", "l1", "vector-field") instead of the law of ArduPlane.
     autopilot: the simulated autopilot: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16",
@@ -74,7 +75,8 @@ class PlanOptions(FlightOptions, total=False):
 
     seed: of the search; None takes the seed of the scenario, or 1.
     algorithm: a name of ``planfly plan --help``; None for the default.
-    budget: largest number of evaluations.  seconds: time limit; the best path found is returned then.
+    budget: maximum number of evaluations.
+    seconds: time limit, after which the best path found is returned.
     stop: called between generations; once it returns True, the best path found is returned.
     """
 
@@ -88,8 +90,9 @@ class PlanOptions(FlightOptions, total=False):
 class LogOptions(MissionOptions, total=False):
     """Facts that a log of another program does not state.
 
-    plan: the mission that was to be flown; None for the mission in the log.
-    flight: number of the flight in the log, from 1.  datum: datum of the log's altitudes.
+    plan: the planned mission; None for the mission in the log.
+    flight: number of the flight in the log, from 1.
+    datum: datum of the log's altitudes.
     """
 
     plan: str | Path | None
@@ -121,10 +124,11 @@ class SimulationOptions(TypedDict, total=False):
 class CampaignOptions(MissionOptions, total=False):
     """Options of the flights of a campaign, and of its end.
 
-    spread: a TOML file of what varies; None takes planfly's default.
-    flights: number of flights.  prove: a probability to reach or miss.  at_least: a probability to judge after all
-    flights.
-    confidence: of each bound.
+    spread: a TOML file of the quantities that vary; None takes planfly's default.
+    flights: number of flights.
+    prove: a probability that the flights show to be reached or missed.
+    at_least: a probability to judge after all flights.
+    confidence: confidence level of each bound.
     """
 
     spread: str | Path | None
@@ -135,7 +139,7 @@ class CampaignOptions(MissionOptions, total=False):
 
 
 class WindsOptions(MissionOptions, total=False):
-    """Options of the flights of a search for the largest winds, and of its end.
+    """Options of the flights of a search for the strongest winds, and of the search's end.
 
     spread: a TOML file of what varies.  flights: largest number, for all directions.  confidence: of each interval.
     workers: processes on this machine; None for one per core.  scheduler: the address of a running dask scheduler.
@@ -164,7 +168,7 @@ _Given = TypeVar("_Given")
 
 
 def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
-    """Show options of ``Unpack[...]`` in a function's signature, fill in defaults, refuse other names.
+    """Return a function that shows its ``Unpack[...]`` options in its signature, fills in defaults, and refuses others.
 
     >>> from typing import Unpack
     >>> @takes_options
@@ -220,7 +224,7 @@ def mission_options(options: MissionOptions) -> MissionOptions:
 
 
 def named_fences(options: MissionOptions) -> list[str]:
-    """Return the names of the files of fences."""
+    """Return the names of the fence files."""
     fence = options.get("fence") or ()
     return [str(one) for one in ([fence] if isinstance(fence, str | Path) else fence)]
 

@@ -1,4 +1,4 @@
-"""Files of fences and zones that are named in addition to a mission's own fence and a scenario's zones."""
+"""Read files of fences and zones, and add them to a mission's own fence and a scenario's own zones."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,15 +16,15 @@ from world.scenario import Scenario, with_zones
 class NamedFences:
     """Content of the files.
 
-    items: of fences, which join the mission's own.
-    zones: of files of zones, by the file that each comes from; they join the scenario's.
+    items: fence items, which are added to the mission's own.
+    zones: zones by their file, which are added to the scenario's own.
     """
 
     items: tuple[MissionItem, ...] = ()
     zones: tuple[tuple[str, FileZones], ...] = ()
 
     def on_mission(self, mission: Mission) -> Mission:
-        """Return a mission with the fence items beside its own."""
+        """Return a mission with the fence items in addition to its own."""
         if not self.items:
             return mission
         warnings = mission.warnings
@@ -33,7 +33,7 @@ class NamedFences:
         return replace(mission, fences=numbered([*mission.fences, *self.items]), warnings=warnings)
 
     def on_scenario(self, scenario: Scenario) -> Scenario:
-        """Return a scenario with the zones beside its own.  Raises ScenarioError as `with_zones` does."""
+        """Return a scenario with the zones in addition to its own.  Raises the ScenarioError of `with_zones`."""
         for source, found in self.zones:
             scenario = with_zones(scenario, found.zones, source, found.notes)
         return scenario
@@ -42,8 +42,8 @@ class NamedFences:
 def read_named_fences(files: FencePaths) -> NamedFences:
     """Read one or more files of fences and zones, by the suffix of each.
 
-    Raises MissionError or ScenarioError for a file that cannot be read, that holds no fence, or one whose shapes are
-    none.
+    Raises MissionError or ScenarioError for a file that cannot be read, for a file without a fence, and for invalid
+    shapes.
 
     >>> read_named_fences([])
     NamedFences(items=(), zones=())
@@ -56,7 +56,7 @@ def read_named_fences(files: FencePaths) -> NamedFences:
             zones.append((str(file), read_zone_file(path, str(file))))
             continue
         found = read_fence(path)
-        # Shapes are checked while it is known which file they are from.
+        # Check the shapes here, because the file they are from is known only here.
         fence_zones(found, GeoOrigin(found[0].lat_deg, found[0].lon_deg), str(file))
         items += found
     return NamedFences(tuple(items), tuple(zones))

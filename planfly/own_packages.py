@@ -1,4 +1,4 @@
-"""The packages beside planfly that it is made of, and another's module that hides one of them."""
+"""Detect modules of other projects that hide planfly's top-level packages."""
 
 import sys
 from importlib.util import find_spec
@@ -6,21 +6,21 @@ from pathlib import Path
 from typing import NamedTuple
 
 PACKAGES = ("aircraft", "flight", "logs", "planner", "world")
-# As the command line ends for bad usage.
+# Exit code of the command line for bad usage.
 _BAD_USAGE = 2
 
 
 class Hidden(NamedTuple):
-    """Package of planfly that Python would not find.  found: the file that hides it.  own: file of the package."""
+    """Package of planfly that another module hides.  found: file of that module.  own: file of the package."""
 
     found: str
     own: str
 
 
 def hidden_package(home: Path) -> Hidden | None:
-    """Return the first package of planfly that a module of the same name hides, or None; nothing is imported.
+    """Return the first package of planfly that a module of the same name hides, or None, without importing anything.
 
-    home: the folder that planfly and its packages lie in.
+    home: the folder of planfly and its packages.
 
     >>> hidden_package(Path(__file__).parents[1]) is None
     True
@@ -49,9 +49,9 @@ def _same_file(found: str, own: Path) -> bool:
 
 
 def refuse_hidden_packages() -> None:
-    """Say in one line which file hides a package of ours, before an import deep inside meets it.
+    """Raise ImportError, with a one-line message, if a file hides a package of planfly.
 
-    Raises ImportError; the command line ends with exit code 2 instead.
+    The command line prints this line and ends with exit code 2.
 
     >>> refuse_hidden_packages()
     """
@@ -69,7 +69,7 @@ def refuse_hidden_packages() -> None:
 
 
 def _is_command() -> bool:
-    """Return True if Python was started for the command line: as ``planfly``, or as ``python -m planfly``."""
-    # While it looks for the module, Python says -m in its place; an embedded one may say nothing.
+    """Return True if Python was started for the command line, as ``planfly`` or as ``python -m planfly``."""
+    # While Python looks for the module, argv[0] is "-m"; an embedded interpreter may have no arguments.
     program = next(iter(getattr(sys, "argv", ())), "")
     return Path(program).stem == "planfly" or (program == "-m" and "planfly" in sys.orig_argv)

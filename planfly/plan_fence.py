@@ -1,4 +1,4 @@
-"""A plan's threats, area and zones as the fence of its mission, which the verdict finds kept."""
+"""Write a plan's threats, area and zones as a fence of its mission that the planned path does not violate."""
 
 from flight.mission.fences import fence_zones, with_fences
 from flight.mission.items import Mission, MissionItem
@@ -7,9 +7,9 @@ from logs.verdict.rules.fence_rule import zone_test
 
 
 def fence_of_plan(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
-    """Add the scenario of a plan to the fence of its mission, and note what a fence cannot hold.
+    """Return a plan's mission with the scenario in its fence, and notes on the contents that a fence cannot store.
 
-    Shapes that the verdict's rule `fence` would find violated by the planned path are left out, and named in the notes.
+    Shapes that the planned path violates by the verdict's rule `fence` are left out, and named in the notes.
 
     >>> from logs.recording.example_log import example_log
     >>> mission, notes = fence_of_plan(example_log().setup)

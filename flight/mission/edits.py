@@ -1,7 +1,7 @@
-"""Edits of a mission, each returning a new one: move, raise, insert, delete, change speed.
+"""Move, raise, insert and delete items of a mission, and change speeds; each function returns a new mission.
 
-An item keeps its frame and everything that was not edited, so that an unedited mission equals the opened one.
-Items are identified by their index in the list; numbers and targets of jumps follow insertions.
+An item keeps its frame and everything that was not edited, so that an unedited mission equals the opened mission.
+Items are identified by their index in the list; item numbers and jump targets are adapted to insertions.
 """
 
 import math
@@ -22,7 +22,7 @@ from flight.mission.items import (
 )
 from world.errors import MissionError
 
-# Greatest number of items under edit: a drag is judged fast enough for the hand, and the page draws all items.
+# Maximum number of edited items, so that a drag is judged while the hand moves, and the page draws all items.
 MAX_EDITED = 2_000
 # Commands that belong to the next place instead of the previous one.
 _COMMANDS_OF_NEXT_PLACE = (Command.DO_LAND_START, Command.DO_RETURN_PATH_START, Command.JUMP_TAG)
@@ -44,7 +44,7 @@ def places(mission: Mission) -> tuple[int, ...]:
 
 
 def checked_place(mission: Mission, index: int) -> MissionItem:
-    """Return the item to edit.  Raises MissionError if it does not exist or is no place."""
+    """Return the item to edit.  Raises MissionError if the item does not exist or is not a place."""
     if not 0 <= index < len(mission.items):
         raise MissionError.at(mission.source, "item", index, f"0..{len(mission.items) - 1} is expected")
     item = mission.items[index]
@@ -54,7 +54,7 @@ def checked_place(mission: Mission, index: int) -> MissionItem:
 
 
 def moved(mission: Mission, index: int, lat_deg: float, lon_deg: float) -> Mission:
-    """Move an item, at the same altitude in its frame.
+    """Return the mission with an item moved, at the same altitude in the item's frame.
 
     >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
     >>> moved(Mission(None, way), 1, 46.01, 8.00000004).items[1].lon_deg
@@ -65,7 +65,7 @@ def moved(mission: Mission, index: int, lat_deg: float, lon_deg: float) -> Missi
 
 
 def raised(mission: Mission, indices: Iterable[int], by: float) -> Mission:
-    """Raise items by metres, each in its frame; an item without altitude is unchanged.
+    """Return the mission with items raised, each in its frame; an item without altitude is not changed.  by: m.
 
     >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
     >>> [item.alt for item in raised(Mission(None, way), [1], 12.5).items]
@@ -79,9 +79,9 @@ def raised(mission: Mission, indices: Iterable[int], by: float) -> Mission:
 
 
 def at_height(mission: Mission, index: int, amsl: float, now: float) -> Mission:
-    """Set the altitude AMSL of an item from ``now`` to ``amsl``, m.
+    """Return the mission with the altitude AMSL of an item changed from ``now`` to ``amsl``, m.
 
-    An item without altitude gets one in the AMSL frame.
+    An item without altitude gets an altitude in the AMSL frame.
     """
     item = checked_place(mission, index)
     if math.isfinite(item.alt):
@@ -90,7 +90,7 @@ def at_height(mission: Mission, index: int, amsl: float, now: float) -> Mission:
 
 
 def next_index(mission: Mission, after: int) -> int:
-    """Return the index for a waypoint inserted behind a place: after all actions at that place.
+    """Return the index for a waypoint inserted behind a place, which is after all actions at that place.
 
     >>> way = [MissionItem(k, c, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 206), (3, 16))]
     >>> next_index(Mission(None, tuple(way)), 0)
@@ -105,10 +105,10 @@ def next_index(mission: Mission, after: int) -> int:
 
 
 def inserted(mission: Mission, after: int, lat_deg: float, lon_deg: float, height: float | None = None) -> Mission:
-    """Insert a waypoint behind a place, at `next_index`, in the frame of that place.
+    """Return the mission with a waypoint inserted behind a place, at `next_index`, in the frame of that place.
 
-    height: in that frame, m; None for the height of the place.  Raises MissionError for more items than a mission may
-    have.
+    height: altitude in that frame, m; None for the altitude of the place.
+    Raises MissionError if the mission already has the maximum number of items.
 
     >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
     >>> longer = inserted(Mission(None, way), 0, 46.01, 8.0)
@@ -133,9 +133,9 @@ def inserted(mission: Mission, after: int, lat_deg: float, lon_deg: float, heigh
 
 
 def deleted(mission: Mission, index: int) -> Mission:
-    """Delete a place; a jump to it goes to the next item.
+    """Return the mission without a place; a jump to this place then goes to the next item.
 
-    Raises MissionError if fewer than two places would be left.
+    Raises MissionError if fewer than two places would remain.
     """
     checked_place(mission, index)
     if len(places(mission)) <= 2:
@@ -143,13 +143,15 @@ def deleted(mission: Mission, index: int) -> Mission:
         raise MissionError(message, file=mission.source, field="items")
     seq = mission.items[index].seq
     items = [item for k, item in enumerate(mission.items) if k != index]
-    return replace(mission, items=tuple(_renumbered(item, seq, -1) for item in items))
+    return replace(mission, items=tuple(_renumber(item, seq, -1) for item in items))
 
 
 def at_speed(mission: Mission, index: int, airspeed: float, after: float) -> Mission:
-    """Set the airspeed of the leg to a place, m/s; after the place the previous airspeed applies again.
+    """Return the mission with another airspeed on the leg to a place; behind the place the airspeed `after` applies.
 
-    A change of speed directly before the place is edited instead of added.
+    If a change of speed is directly before the place, it is edited, and no item is added.
+
+    airspeed, after: m/s.
     """
     checked_place(mission, index)
     own = index > 0 and mission.items[index - 1].command == Command.DO_CHANGE_SPEED
@@ -171,26 +173,26 @@ def _speed_item(seq: int, airspeed: float) -> MissionItem:
 
 
 def _with_item(mission: Mission, index: int, item: MissionItem) -> Mission:
-    """Replace an item.  Raises MissionError for an invalid item."""
-    _check(mission, item)
+    """Return the mission with an item replaced.  Raises MissionError for an invalid item."""
+    _check_item(mission, item)
     return replace(mission, items=(*mission.items[:index], item, *mission.items[index + 1 :]))
 
 
 def _with_inserted_item(mission: Mission, index: int, item: MissionItem) -> Mission:
-    """Insert an item; the numbers of later items increase."""
-    _check(mission, item)
-    kept = [_renumbered(one, item.seq - 1, 1) for one in mission.items]
+    """Return the mission with an item inserted and later items renumbered.  Raises MissionError for an invalid item."""
+    _check_item(mission, item)
+    kept = [_renumber(one, item.seq - 1, 1) for one in mission.items]
     return replace(mission, items=(*kept[:index], item, *kept[index:]))
 
 
-def _check(mission: Mission, item: MissionItem) -> None:
+def _check_item(mission: Mission, item: MissionItem) -> None:
     problem = item_problem(item)
     if problem is not None:
         raise MissionError(**problem.at(mission.source, f"{mission.source}: item {item.seq}"))
 
 
-def _renumbered(item: MissionItem, beyond: int, by: int) -> MissionItem:
-    """Shift the number of an item, and the target of its jump, if beyond a number."""
+def _renumber(item: MissionItem, beyond: int, by: int) -> MissionItem:
+    """Return the item with its number and its jump target increased by `by`, each only if it is above `beyond`."""
     params = item.params
     if item.command == Command.DO_JUMP and params[0] > beyond:
         params = (params[0] + by, *params[1:])

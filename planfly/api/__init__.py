@@ -1,1 +1,1 @@
-"""The verbs of `import planfly`: each loads with its first use, and gives frozen data."""
+"""Functions of `import planfly`, each of which is loaded with its first use and returns frozen data."""

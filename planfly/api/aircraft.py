@@ -1,4 +1,4 @@
-"""Data, trims and modes of embedded aircraft and the user's own, and folders for new aircraft."""
+"""Return data, trims and modes of embedded and user-made aircraft, and make folders for new aircraft."""
 
 import shlex
 from collections.abc import Mapping
@@ -27,11 +27,14 @@ from world.scenario_tables import names_folder
 class AircraftNumbers:
     """Result of `planfly.describe_aircraft`.
 
-    aircraft: its metadata.  model_sha256: SHA-256 of its JSBSim model.
-    envelope: climb and descent by airspeed and height.
-    trims: level flight by airspeed.  modes: by airspeed, m/s.  cruise: modes in cruise.
+    aircraft: metadata of the aircraft.
+    model_sha256: SHA-256 of the JSBSim model.
+    envelope: climb and descent limits by airspeed and altitude.
+    trims: trimmed level flight by airspeed.
+    modes: modes of motion by airspeed, m/s.
+    cruise: modes of motion at cruise speed.
     steps: responses to steps of the controls.
-    lacking: files missing in its folder for a flight, a line each.
+    lacking: files that a flight needs and the aircraft's folder lacks, a line each.
     files: pictures written.
     """
 
@@ -51,9 +54,9 @@ def aircraft() -> dict[str, Aircraft]: ...
 @overload
 def aircraft(name: str | Path) -> Aircraft: ...
 def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
-    """Return an aircraft by name or folder: masses, speeds and limits, in SI units and radians.
+    """Return an aircraft by name or folder, with its masses, speeds and limits in SI units and radians.
 
-    name: None for all embedded ones by name.
+    name: name or folder; None returns all embedded aircraft by name.
     Raises a `planfly.PlanflyError` for an unknown name, and for a folder without an aircraft.
 
     >>> import planfly
@@ -102,15 +105,16 @@ def new_aircraft(
     Aerosonde if not given).  With numbers it holds a model that matches them, scaled from published aircraft of its
     class, and a list of what is unknown; mass, span, cruise and stall are needed, the others are estimated if missing.
 
-    mass: kg.  span: of the wing, m.  area: of the wing, m^2.
-    cruise, stall, top: airspeeds, m/s: usual, slowest and fastest level flight.
-    bank: steepest in turns, degrees.  climb: steepest at cruise, degrees.
-    battery: volts and capacity, "14.8V,5Ah" or "14.8V,74Wh".  motor: rpm per volt.  prop: inches, "12x6".
-    layout: "tail" (if not given), "wing" for a flying wing with elevons, "vtail" for a V-tail.
-    fuel: kg, for an aircraft that burns it.
-    params: a file of ArduPlane's parameters; cruise, stall, bank, climb and drag are taken from it if not given and if
-    it states them, other than ArduPlane's own values.
-    Raises a `planfly.PlanflyError` for bad input; nothing is made then.
+    mass: kg.  span: wing span, m.  area: wing area, m^2.
+    cruise, stall, top: airspeeds of usual, slowest and fastest level flight, m/s.
+    bank: maximum bank in turns, degrees.  climb: steepest climb at cruise, degrees.
+    battery: voltage and capacity, such as "14.8V,5Ah" or "14.8V,74Wh".  motor: rpm per volt.
+    prop: diameter and pitch in inches, such as "12x6".
+    layout: "tail" (default), "wing" for a flying wing with elevons, "vtail" for a V-tail.
+    fuel: fuel carried by an aircraft without a battery, kg.
+    params: a file of ArduPlane parameters.  Missing values of cruise, stall, bank, climb and drag are taken from this
+    file if they differ from ArduPlane's defaults.
+    Raises a `planfly.PlanflyError` for bad input; then nothing is made.
 
     >>> import planfly, tempfile
     >>> with tempfile.TemporaryDirectory() as place:
@@ -149,25 +153,26 @@ def describe_aircraft(
 ) -> AircraftNumbers:
     """Compute trims, modes, envelope and step responses of an aircraft, and draw them.
 
-    name: name of an embedded aircraft, or a folder.  motor_braking: True lets the motor brake in descents.
-    out: a folder for ``envelope.png``, ``trims.png`` and ``steps.png``; {name} in it stands for the aircraft's name;
-    None writes none.
+    name: name of an embedded aircraft, or a folder.
+    motor_braking: True lets the motor brake in descents.
+    out: a folder for ``envelope.png``, ``trims.png`` and ``steps.png``, in which {name} stands for the aircraft's name;
+    None writes no pictures.
     overwrite: True replaces existing pictures.
-    Raises a `planfly.PlanflyError` for bad input; nothing is written then.
+    Raises a `planfly.PlanflyError` for bad input; then nothing is written.
 
     >>> import planfly
     >>> numbers = planfly.describe_aircraft("aerosonde")
     >>> numbers.envelope.level_speeds(0.0)
     (15.9..., 32.4...)
     """
-    chosen = _opened(name)
+    chosen = _open_aircraft(name)
     identity = model_hash(chosen)
     # Invalid settings files are refused here.
     lacking = tuple(missing for kind in AUTOPILOTS for missing in kind.missing_files(chosen))
     folder = None if out is None else expand_path_pattern(out, chosen.name, 0)
     if folder is not None:
         refuse_folder(folder, overwrite)
-    # Everything is computed before anything is written.
+    # Compute all results before writing any file.
     with stage(f"trimming {chosen.name}", "trimming"):
         envelope = load_envelope(chosen, motor_braking=motor_braking)
         check_level_flight(chosen, envelope)
@@ -176,7 +181,7 @@ def describe_aircraft(
         cruise, steps = modes_at(chosen, chosen.airspeed), step_responses(chosen)
     files: tuple[Path, ...] = ()
     if folder is not None:
-        pictures = _draw(chosen, envelope, trims, modes, steps)
+        pictures = _draw_pictures(chosen, envelope, trims, modes, steps)
         prepare_folder(folder, tuple(pictures))
         for file, data in pictures.items():
             write_whole(folder / file, data)
@@ -184,8 +189,8 @@ def describe_aircraft(
     return AircraftNumbers(chosen, identity, envelope, trims, modes, cruise, steps, lacking, files)
 
 
-def _opened(name: str | Path) -> Aircraft:
-    """Return the aircraft with a name or in a folder.  Raises PlanflyError."""
+def _open_aircraft(name: str | Path) -> Aircraft:
+    """Return the aircraft with a name or in a folder.  Raises PlanflyError if there is none."""
     text = str(name.absolute()) if isinstance(name, Path) else name
     if not names_folder(text):
         return find_aircraft(text)
@@ -195,7 +200,7 @@ def _opened(name: str | Path) -> Aircraft:
     return find_aircraft(whole_path(Path(text)))
 
 
-def _draw(
+def _draw_pictures(
     chosen: Aircraft,
     envelope: Envelope,
     trims: tuple[TrimRow, ...],

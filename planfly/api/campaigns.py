@@ -1,4 +1,4 @@
-"""Probability that a mission flies, and its largest wind from each direction, by many flights."""
+"""Find the probability that a mission flies, and the strongest wind from each direction, by many flights."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -42,7 +42,7 @@ from world.extras import need_extra, needs_extra
 
 @dataclass(frozen=True, slots=True)
 class CampaignFlight:
-    """Result of `planfly.campaign_flight`: a flight of a campaign, flown again as in its table.
+    """Result of `planfly.campaign_flight`, a flight of a campaign flown again with the result in the table.
 
     row: outcome, reason for the end, and failed rules.  log: the file of its flight log.
     """
@@ -51,12 +51,12 @@ class CampaignFlight:
     log: Path
 
 
-def _open(
+def _open_base(
     target: Plan | str | Path, options: MissionOptions, dispersions: Dispersions, folder: OutputDirectory
 ) -> CampaignBase:
-    """Open the mission of a campaign, and its folder for the campaign.
+    """Open the mission of a campaign, and prepare the campaign's folder.
 
-    A scenario is planned if the folder holds no plan for it.  Raises PlanflyError; the folder then stays unchanged.
+    A scenario is planned if the folder has no plan for it.  Raises PlanflyError; then the folder is not changed.
     """
     named, flown = target if isinstance(target, Plan) else str(target), mission_options(options)
     is_planned = isinstance(named, Plan) or is_mission_file(named)
@@ -71,20 +71,20 @@ def _open(
     return folder.open(opened)
 
 
-def _line_of(target: Plan | str | Path, folder: Path) -> str:
-    """Return the target for the command line that repeats a campaign; a plan is in the campaign's folder."""
+def _command_line_target(target: Plan | str | Path, folder: Path) -> str:
+    """Return the target as the command line that repeats a campaign names it; a `Plan` is in the campaign's folder."""
     return str(folder / "plan.json") if isinstance(target, Plan) else str(target)
 
 
-def _repeated(base: CampaignBase, options: MissionOptions, spread: str | Path | None) -> dict[str, object]:
-    """Return the options of the command line that repeats a campaign."""
+def _command_line_options(base: CampaignBase, options: MissionOptions, spread: str | Path | None) -> dict[str, object]:
+    """Return the options of the command line that repeats a campaign, by name."""
     return {"seed": base.seed, "spread": spread} | {**mission_options(options), "fence": named_fences(options)}
 
 
-def _workers(count: int | None, scheduler: str | None, seed: int | None) -> Workers:
-    """Return the workers.
+def _make_workers(count: int | None, scheduler: str | None, seed: int | None) -> Workers:
+    """Check the number of workers, the scheduler and the seed, and return the workers.
 
-    Raises PlanflyError, before anything is planned, for a scheduler that may not be used.
+    Raises PlanflyError before anything is planned, for instance for a scheduler address that is not allowed.
     """
     check_arguments(workers=count, seed=seed)
     if scheduler is not None:
@@ -93,20 +93,20 @@ def _workers(count: int | None, scheduler: str | None, seed: int | None) -> Work
     return Workers(count, scheduler)
 
 
-def _dispersions(file: str | Path | None) -> Dispersions:
+def _read_spread(file: str | Path | None) -> Dispersions:
     return default_dispersions() if file is None else read_dispersions(Path(file))
 
 
 # ----------------------------------------------------------------------
-# Probability that a mission flies.
+# Find the probability that a mission flies.
 
 
 def continued_goal(
     folder: Path, flights: int | None, prove: float | None, at_least: float | None, confidence: float | None
 ) -> Goal:
-    """Return the goal of a resumed campaign: the requested goal, or its earlier goal if none is requested.
+    """Return the goal of a resumed campaign, which is the requested goal, or the earlier goal if none is requested.
 
-    Raises PlanflyError for numbers out of their ranges, and for a folder without a campaign.
+    Raises PlanflyError for numbers outside their ranges, and for a folder without a campaign.
     """
     asked = make_goal(flights, prove, at_least, confidence)
     return resumed_goal(None if (flights, prove, at_least) == (None, None, None) else asked, folder, confidence)
@@ -125,20 +125,21 @@ def campaign(
     overwrite: bool = False,
     **options: Unpack[CampaignOptions],
 ) -> CampaignResult:
-    """Fly a mission many times as `planfly.fly` does, with varied wind, aircraft, terrain and start.
+    """Fly a mission many times as `planfly.fly` does, with variations of wind, aircraft, terrain and start.
 
     target: an embedded scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
-    spread: a TOML file of what varies; None takes planfly's default.
+    spread: a TOML file of the quantities that vary; None takes planfly's default.
     flights: number of flights; None takes 300, or, with ``prove``, at most 5,000.  Without flights, ``prove`` and
     ``at_least``, a resumed campaign keeps its earlier goal.
-    prove: a probability; flights are flown until it is shown to be reached or missed.  at_least: a probability to judge
-    after all flights.  Only one of the two may be given.
-    confidence: of each bound; None takes 0.95, or the earlier value of a resumed campaign.
-    The other options are as of `planfly.fly`; seed: of plan and draws.
-    workers: processes on this machine; None for one per core.  scheduler: address of a running dask scheduler instead.
-    out: folder of the campaign's files; None keeps none.  resume: True continues the campaign in the folder.
-    overwrite: True replaces it.
-    A script must call it under ``if __name__ == "__main__":``, because workers import the script.
+    prove: a probability; flights are flown until they show whether the mission reaches it.
+    at_least: a probability to judge after all flights.  Only one of the two may be given.
+    confidence: confidence level of each bound; None takes 0.95, or the earlier value of a resumed campaign.
+    seed: seed of plan and draws.  The other options are those of `planfly.fly`.
+    workers: number of processes on this machine; None for one per core.
+    scheduler: address of a running dask scheduler, whose workers then fly.
+    out: folder of the campaign's files; None keeps no files.
+    resume: True continues the campaign in the folder.  overwrite: True replaces the campaign.
+    A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
     Raises a `planfly.PlanflyError` for bad input, which is also a ValueError for a number out of its range.
 
     >>> campaign("paper-07", prove=1.5)
@@ -146,27 +147,29 @@ def campaign(
     ...
     world.errors.ArgumentError: prove 1.5: at least 0.5 and below 1 is expected
     """
-    place_of_work = _workers(workers, scheduler, options["seed"])
+    place_of_work = _make_workers(workers, scheduler, options["seed"])
     asked = (options["flights"], options["prove"], options["at_least"], options["confidence"])
     goal, spread = make_goal(*asked), options["spread"]
     with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as place:
         if resume:
             goal = continued_goal(place.folder, *asked)
-        base = _open(target, options, _dispersions(spread), place)
-        line = campaign_line(_line_of(target, place.folder), goal, _repeated(base, options, spread))
-        return _flown(base, goal, place_of_work, place, line, keep=out is not None)
+        base = _open_base(target, options, _read_spread(spread), place)
+        line = campaign_line(
+            _command_line_target(target, place.folder), goal, _command_line_options(base, options, spread)
+        )
+        return _fly_and_summarise(base, goal, place_of_work, place, line, keep=out is not None)
 
 
-def _flown(
+def _fly_and_summarise(
     base: CampaignBase, goal: Goal, workers: Workers, place: OutputDirectory, line: str, *, keep: bool
 ) -> CampaignResult:
-    """Fly a campaign or the rest of it, and sum it up.  keep: True keeps its folder and writes its files."""
+    """Fly a campaign or its remaining flights, and sum it up.  keep: True keeps its folder and writes its files."""
     table = place.folder / DATABASE
     with open_store(base, goal, place.folder, resume=place.resume) as store:
         with stage("flying", "flying a campaign") as advance:
             estimate = fly_campaign(base, goal, workers, store, advance)
         brief = None if keep else summarise(base, goal, estimate, store)
-    # The store locks its table while it is open.
+    # The open store locks its table.
     if brief is not None:
         return CampaignResult(brief, read_table(table))
     with stage("reporting") as advance:
@@ -185,21 +188,22 @@ def campaign_flight(
 ) -> CampaignFlight:
     """Fly one flight of a campaign again, into a log in the campaign's folder.
 
-    target: as of the campaign, as are all other keywords.  index: of the flight, from 0.  out: the folder.
+    target: the campaign's target; all other keywords must also be those of the campaign.
+    index: number of the flight, from 0.  out: the campaign's folder.
     Raises a `planfly.PlanflyError` for bad input, and if the result of the flight differs from the table.
     """
     check_arguments(index=index, seed=options["seed"])
     folder = Path(out)
     goal = continued_goal(folder, options["flights"], options["prove"], options["at_least"], options["confidence"])
     place = OutputDirectory(folder, DATABASE, resume=True, overwrite=False)
-    base = _open(target, options, _dispersions(options["spread"]), place)
-    row = _row_of(base, goal, folder, index)
+    base = _open_base(target, options, _read_spread(options["spread"]), place)
+    row = _flight_row(base, goal, folder, index)
     log = folder / "flights" / f"flight-{index:06d}.mcap"
     log.parent.mkdir(exist_ok=True)
     return CampaignFlight(fly_row_again(base, row, log), log)
 
 
-def _row_of(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightRow:
+def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightRow:
     with open_store(base, goal, folder, resume=True) as store:
         row = store.flight(index)
         if row is None:
@@ -209,7 +213,7 @@ def _row_of(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightR
 
 
 # ----------------------------------------------------------------------
-# Largest wind from each direction in which a mission flies.
+# Find the strongest wind from each direction in which a mission flies.
 
 
 @needs_extra("campaigns")
@@ -226,16 +230,19 @@ def winds(
     overwrite: bool = False,
     **options: Unpack[WindsOptions],
 ) -> WindsFound:
-    """Find the largest wind from each direction in which a mission flies with a given probability.
+    """Find the strongest wind from each direction in which a mission flies with a given probability.
 
     target: an embedded scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
-    prove: the probability.  directions: 4 to 72.  most: largest wind to search, m/s.  flights: largest number, for
-    all directions together; None takes 5,000, or the earlier number of a resumed search.
-    confidence: of each interval.  spread, seed, workers, scheduler: as of `planfly.campaign`.
-    The other options are as of `planfly.fly`.
-    out: a folder for ``winds.html``, ``winds.png``, ``winds.json`` and the flights; None keeps none.
-    resume: True continues the search in the folder.  overwrite: True replaces it.
-    A script must call it under ``if __name__ == "__main__":``, because workers import the script.
+    prove: the probability.
+    directions: number of directions, 4 to 72.
+    most: maximum wind to search, m/s.
+    flights: maximum number of flights for all directions together; None takes 5,000, or the earlier number of a resumed
+    search.
+    confidence: confidence level of each interval.
+    spread, seed, workers, scheduler: see `planfly.campaign`.  The other options are those of `planfly.fly`.
+    out: a folder for ``winds.html``, ``winds.png``, ``winds.json`` and the flights; None keeps no files.
+    resume: True continues the search in the folder.  overwrite: True replaces the search.
+    A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
     Raises a `planfly.PlanflyError` for bad input, which is also a ValueError for a number out of its range.
 
     >>> winds("paper-07", directions=3)
@@ -245,14 +252,14 @@ def winds(
     """
     confidence, flights, spread = options["confidence"], options["flights"], options["spread"]
     check_arguments(prove=prove, confidence=confidence, directions=directions, most=most, flights=flights)
-    place_of_work = _workers(options["workers"], options["scheduler"], options["seed"])
+    place_of_work = _make_workers(options["workers"], options["scheduler"], options["seed"])
     with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as place:
         folder = place.folder
         goal = WindsGoal(prove, confidence, directions, most, asked_flights(flights, folder, resume=resume))
-        base = _open(target, options, _dispersions(spread).without(SEARCHED_QUANTITIES), place)
+        base = _open_base(target, options, _read_spread(spread).without(SEARCHED_QUANTITIES), place)
         with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
             found = find_winds(base, goal, place_of_work, store, advance)
         if out is not None:
-            line = winds_line(_line_of(target, folder), goal, _repeated(base, options, spread))
+            line = winds_line(_command_line_target(target, folder), goal, _command_line_options(base, options, spread))
             write_winds(folder, base, found, line)
     return found

@@ -17,7 +17,7 @@ from world.terrain_cut import COPERNICUS, Box, CutTerrain, cut_from_files, cut_f
 
 # Length of a degree of latitude, km.
 _DEGREE = 111.2
-# Largest absolute latitude of an area, degrees.
+# Maximum absolute latitude of an area, degrees.
 _MAX_LATITUDE_DEG = 84.0
 
 
@@ -34,14 +34,15 @@ def terrain(
     """Write the terrain of an area as a GeoTIFF, which the other functions of planfly read as terrain.
 
     out: the file.  overwrite: True replaces an existing file.
-    around: a mission file, all places of which are in the area; or box: its south, west, north and east edge, degrees.
-    margin: width of the ground added around them, km.
+    around: a mission file whose places the area contains.  Alternatively box: south, west, north and east edge of the
+    area, degrees.
+    margin: width of the terrain added on every side, km.
     source: a folder of tiles or an elevation file; or the address (http or https) of a server with GLO-30 tiles of the
-    Copernicus DEM, laid out as in the AWS registry of open data, which is the default; fetched parts are kept in the
-    user's cache.
-    sea: True treats degree cells for which the server has no tile as sea, at 0 m.  Otherwise they have no data: the
-    tiles of some countries are not published.
-    Raises a `planfly.PlanflyError` for bad input, and if the server cannot be reached; nothing is written then.
+    Copernicus DEM, laid out as in the AWS registry of open data.  This registry is the default.  Downloaded parts are
+    kept in the user's cache.
+    sea: True treats degree cells for which the server has no tile as sea, at 0 m.  Otherwise these cells have no data,
+    because the tiles of some countries are not published.
+    Raises a `planfly.PlanflyError` for bad input, and if the server cannot be reached; then nothing is written.
 
     >>> import planfly
     >>> planfly.terrain("dem.tif", box=(47.0, 8.0, 46.0, 9.0))
@@ -56,7 +57,7 @@ def terrain(
     if target.suffix.lower() not in (".tif", ".tiff"):
         raise PlanflyError(f"{target}: a name that ends with .tif is expected", file=target)
     refuse_existing(target, overwrite, Path(around) if around is not None else None)
-    area = _widened(_box(box) if box is not None else _around(Path(str(around))), margin)
+    area = _widen(_parse_box(box) if box is not None else _mission_box(Path(str(around))), margin)
     named = str(source)
     with stage("fetching terrain" if "://" in named else "cutting terrain") as advance:
         if "://" not in named:
@@ -66,16 +67,16 @@ def terrain(
             allowed = "a folder, or the address of one by http or https, is expected"
             raise ArgumentError.of_argument("source", named, allowed, shown=ascii(named))
         with tempfile.TemporaryDirectory() as instead:
-            return cut_from_server(named, area, target, _cache(Path(instead)), advance, sea=sea)
+            return cut_from_server(named, area, target, _cache_folder(Path(instead)), advance, sea=sea)
 
 
-def _box(given: Sequence[float]) -> Box:
-    """Return the box of an area.  Raises ArgumentError for an invalid one."""
+def _parse_box(given: Sequence[float]) -> Box:
+    """Return the box with the given edges.  Raises ArgumentError for invalid edges."""
     try:
         south, west, north, east = (float(value) for value in given)
     except (TypeError, ValueError):
         south = west = north = east = math.nan
-    # Written so that NaN fails; an area may lie across the 180th meridian, from 179 to -179 or to 181.
+    # NaN must fail these comparisons.  An area may lie across the 180th meridian, from 179 to -179 or to 181.
     around = east + 360.0 if east < west else east
     if not (
         -_MAX_LATITUDE_DEG <= south < north <= _MAX_LATITUDE_DEG
@@ -87,8 +88,8 @@ def _box(given: Sequence[float]) -> Box:
     return Box(south, west, north, around)
 
 
-def _around(file: Path) -> Box:
-    """Return the box of all items, home, fences and rally points of a mission.  Raises PlanflyError."""
+def _mission_box(file: Path) -> Box:
+    """Return the smallest box around all items, home, fences and rally points of a mission.  Raises PlanflyError."""
     mission = read_mission(file)
     places = [
         (one.lat_deg, one.lon_deg) for one in (*mission.items, *mission.fences, *mission.rally) if one.has_position
@@ -107,15 +108,15 @@ def _around(file: Path) -> Box:
     return Box(min(lats), min(lons), max(lats), max(lons))
 
 
-def _widened(box: Box, margin: float) -> Box:
-    """Return an area widened by a margin on every side.  margin: km."""
+def _widen(box: Box, margin: float) -> Box:
+    """Return the box widened by a margin on every side.  margin: km."""
     up = margin / _DEGREE
     across = up / math.cos(math.radians(min(_MAX_LATITUDE_DEG, max(abs(box.south), abs(box.north)))))
     return Box(box.south - up, box.west - across, box.north + up, box.east + across)
 
 
-def _cache(instead: Path) -> Path:
-    """Yield the cache of fetched parts; a temporary folder if the user's cache cannot be written."""
+def _cache_folder(instead: Path) -> Path:
+    """Return the cache folder of downloaded parts, or `instead` if the user's cache cannot be written."""
     folder = Path(user_cache_dir("planfly")) / "terrain"
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -31,15 +31,17 @@ def new_scenario(
     autopilot: str | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Write a commented scenario from one place to another, ready to be planned and flown.
+    """Write a commented scenario from one place to another, which can be planned and flown without changes.
 
     folder: the folder for FOLDER/NAME.toml, where NAME is the name of the folder; it is made if it is missing.
-    start, destination: latitude and longitude, degrees.  height: height of both above ground, m.
+    start, destination: latitude and longitude, degrees.
+    height: height of start and destination above ground, m.
     terrain: an elevation file, a folder of tiles, or an embedded name; None for flat ground.
-    aircraft: a name, or a folder.  autopilot: as of `planfly.fly`.
-    overwrite: True replaces a scenario of that name.
-    The area holds the straight line and a margin of a third of its length, within the coverage of the elevation file.
-    Returns the file.  Raises a `planfly.PlanflyError` for bad input; nothing is written then.
+    aircraft: a name, or a folder.  autopilot: see `planfly.fly`.
+    overwrite: True replaces an existing scenario.
+    The area contains the straight line and a margin of a third of its length, within the coverage of the elevation
+    file.
+    Returns the file.  Raises a `planfly.PlanflyError` for bad input; then nothing is written.
 
     >>> import planfly, tempfile
     >>> with tempfile.TemporaryDirectory() as place:
@@ -49,13 +51,13 @@ def new_scenario(
     ('ridge.toml', True)
     """
     check_arguments(height=height, autopilot=autopilot)
-    ends = _place("start", start), _place("destination", destination)
+    ends = _parse_place("start", start), _parse_place("destination", destination)
     target = Path(folder)
     name = Path(whole_path(target)).name if ".." in target.parts else target.absolute().name
-    file = _target(target, name, overwrite=overwrite)
+    file = _scenario_file(target, name, overwrite=overwrite)
     law, _, version = (autopilot or DEFAULT_AUTOPILOT).partition("-")
-    ground = None if terrain is None else _whole(terrain, is_name=terrain in EMBEDDED)
-    model = _whole(aircraft, is_name=isinstance(aircraft, str) and not names_folder(aircraft))
+    ground = None if terrain is None else _absolute_path(terrain, is_name=terrain in EMBEDDED)
+    model = _absolute_path(aircraft, is_name=isinstance(aircraft, str) and not names_folder(aircraft))
     airspeed = find_aircraft(model).airspeed
     with stage(f"laying out {name}", "laying out"):
         raster = None if ground is None else open_raster(ground)
@@ -71,16 +73,16 @@ def new_scenario(
             autopilot=law,
             px4_version=version or None,
         )
-        # Parsed as it will be read from the file, so that a fault is found before anything is written.
+        # Parse the text as it will be read from the file, so that a fault is found before anything is written.
         from_spec(parse_scenario(draft_text(draft), str(file)), str(file))
-    moved = replace(draft, terrain=ground and _from(target, ground), aircraft=_from(target, model))
+    moved = replace(draft, terrain=ground and _relative_path(target, ground), aircraft=_relative_path(target, model))
     target.mkdir(exist_ok=True)
     write_whole(file, draft_text(moved))
     return file
 
 
-def _target(folder: Path, name: str, *, overwrite: bool) -> Path:
-    """Return the file to write.  Raises PlanflyError if it exists, or if its folder cannot be made."""
+def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
+    """Return the file to write.  Raises PlanflyError for an invalid folder, and without `overwrite` for an old file."""
     if not name.isprintable() or not 1 <= len(name) <= 100:
         allowed = "a folder with a name of 1 to 100 printable characters is expected"
         raise PlanflyError.of_argument("folder", folder, allowed, shown=ascii(str(folder)))
@@ -94,8 +96,8 @@ def _target(folder: Path, name: str, *, overwrite: bool) -> Path:
     return file
 
 
-def _place(keyword: str, given: Sequence[float]) -> Place:
-    """Return latitude and longitude.  Raises ArgumentError."""
+def _parse_place(keyword: str, given: Sequence[float]) -> Place:
+    """Return a place by its latitude and longitude.  Raises ArgumentError for an invalid place."""
     try:
         lat, lon = (float(value) for value in given)
     except (TypeError, ValueError):
@@ -105,15 +107,15 @@ def _place(keyword: str, given: Sequence[float]) -> Place:
     return Place(lat, lon)
 
 
-def _whole(given: str | Path, *, is_name: bool) -> str:
-    """Return the absolute path of a file; an embedded name stays as it is."""
+def _absolute_path(given: str | Path, *, is_name: bool) -> str:
+    """Return the absolute path of a file, or an embedded name unchanged."""
     return str(given) if is_name else whole_path(Path(given))
 
 
-def _from(folder: Path, given: str) -> str:
-    """Return an absolute path as it is written in a file of a folder; a name stays as it is."""
+def _relative_path(folder: Path, given: str) -> str:
+    """Return an absolute path relative to a folder, as a file in that folder names it, or a name unchanged."""
     if not Path(given).is_absolute():
         return given
     relative = os.path.relpath(given, whole_path(folder))
-    # The slash marks it as a folder of an aircraft instead of a name.
+    # The slash marks the text as the folder of an aircraft, not a name.
     return relative if "/" in relative else f"./{relative}"

@@ -1,4 +1,4 @@
-"""Export of a plan, a mission or a flight log in the formats that the suffixes of files name."""
+"""Export a plan, a mission or a flight log in the formats that the suffixes of the files name."""
 
 import contextlib
 from dataclasses import dataclass, field, replace
@@ -41,15 +41,15 @@ from world.files import temporary_folder, write_whole
 from world.scenario import Scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT
 
-# Writer of the text of a map, by suffix.
+# Function that returns the text of a map, by suffix.
 MAPS = {".kml": kml_text, ".gpx": gpx_text}
-# Suffixes of the autopilot parameters a mission was judged with: for returns, rally points, take-off and landing.
+# Suffixes of files with the autopilot parameters that returns, rally points, take-off and landing are judged with.
 PARAMETERS = (".parm",)
-# Beginnings of the names of these parameters.
+# Prefixes of the names of these parameters.
 _JUDGED = ("RTL_", "RALLY_", "LAND_", "TECS_LAND_", "TKOFF_", "FW_LND_", "FW_TKO_", "NAV_DLL_ACT")
-# Suffixes of formats that only a flight log can be written in.
+# Suffixes of formats that only a flight log can be exported to.
 LOGS = (".csv", ".parquet", ".tlog", ".ulg")
-# Names of the contents in messages, by suffix.
+# Names of contents in messages, by suffix.
 _CONTENTS = {"fence": "fence items", "rally": "rally points"}
 
 
@@ -57,9 +57,11 @@ _CONTENTS = {"fence": "fence items", "rally": "rally points"}
 class ExportedFiles:
     """Files that `planfly.export` wrote.
 
-    files: in the order of the request.  contents: the content of each file, in words.
-    notes: one line for each part of the source that the files do not hold or that PX4 would refuse of a plan for it.
-    loss: description of the part of a flight log that could not be read, also in the notes; "" if nothing is missing.
+    files: paths in the order of the request.
+    contents: description of the content of each file.
+    notes: one line for each part of the source that the files do not contain, or that PX4 would reject in a plan for
+    PX4.
+    loss: description of the part of a flight log that could not be read, also in `notes`; "" if nothing is missing.
     """
 
     files: tuple[Path, ...]
@@ -74,9 +76,10 @@ class _Source:
 
     mission: items of the mission, and the threats of a plan as fences.
     name: title of a map.
-    lines, zones: lines and zones on a map, lines by their meaning; empty if no target is a map.
-    returns, footprint: lines and shapes with colours on a KML map.
-    notes: parts of the plan that the mission does not hold.
+    lines: lines on a map, by their meaning; empty if no target is a map.
+    zones: zones on a map; empty if no target is a map.
+    returns, footprint: coloured lines and shapes on a KML map.
+    notes: parts of the plan that the mission does not contain.
     log: the input, if it is a flight log.
     autopilot: the autopilot that flies the mission; None if no target needs it.
     """
@@ -103,12 +106,12 @@ def export(
     """Write a plan, a mission or a flight in the formats that the suffixes of the files name.
 
     source: a plan, a flight with a log, or the path of a plan.json, mission file or log.
-    files: .waypoints, .plan, .fence, .rally, .kml, .gpx, and .parm with the parameters of take-off, landing and returns
-    that it is judged with; for a flight also .csv, .parquet, .tlog (MAVLink), .ulg (PX4).
+    files: .waypoints, .plan, .fence, .rally, .kml, .gpx, and .parm with the parameters that take-off, landing and
+    returns are judged with; for a flight also .csv, .parquet, .tlog (MAVLink), .ulg (PX4).
     fence: files of fences or zones in addition to the source's own.
-    at: time of the flight, as of `planfly.plan`; the files omit zones that are not active then.
+    at: time of the flight, see `planfly.plan`; the files omit zones that are inactive at that time.
     overwrite: True replaces existing files.
-    Raises a `planfly.PlanflyError` for bad input; nothing is written then.
+    Raises a `planfly.PlanflyError` for bad input; then nothing is written.
 
     >>> import planfly, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -120,13 +123,13 @@ def export(
         raise PlanflyError("export: no file: one at least is expected", field="files")
     targets = tuple(Path(file) for file in files)
     with contextlib.ExitStack() as place:
-        path = _as_file(source, place)
+        path = _source_path(source, place)
         for target in targets:
             if target.suffix.lower() not in (*MAPS, *PARAMETERS, *LOGS):
                 _refuse_unknown(target)
             refuse_existing(target, overwrite, path)
-        found = _read(path, targets, {"fence": fence, "at": at})
-        texts = [_text(found, target) for target in targets]
+        found = _read_source(path, targets, {"fence": fence, "at": at})
+        texts = [_target_content(found, target) for target in targets]
     for target, (text, _) in zip(targets, texts, strict=True):
         write_whole(target, text)
     loss = "" if found.log is None else loss_text(found.log)
@@ -134,7 +137,7 @@ def export(
     return ExportedFiles(targets, notes, tuple(content for _, content in texts), loss)
 
 
-def _as_file(source: FlightLog | FlownMission | Plan | str | Path, place: contextlib.ExitStack) -> Path:
+def _source_path(source: FlightLog | FlownMission | Plan | str | Path, place: contextlib.ExitStack) -> Path:
     """Return the path of a source, or write the source to a file that exists while `place` is open."""
     if isinstance(source, Plan):
         file = place.enter_context(temporary_folder("planfly-export-")) / "plan.json"
@@ -158,8 +161,8 @@ def _refuse_unknown(target: Path) -> None:
         raise MissionError(message, file=target, field="suffix", value=target.suffix, allowed=allowed) from None
 
 
-def _read(path: Path, targets: tuple[Path, ...], options: MissionOptions) -> _Source:
-    """Read the parts of a source that the targets need."""
+def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions) -> _Source:
+    """Return the parts of a source that the targets need."""
     if path.is_file() and is_log(path):
         if (at := options["at"]) is not None:
             allowed = "a log is exported with the zones of its own time"
@@ -167,22 +170,22 @@ def _read(path: Path, targets: tuple[Path, ...], options: MissionOptions) -> _So
         if options["fence"]:
             allowed = "a log is exported with the fence that it was flown with"
             raise MissionError.of_argument("fence", options["fence"], allowed, shown="", file=path)
-        return _read_log(path, coloured=_asks_kml(targets))
+        return _read_log(path, coloured=_needs_kml(targets))
     for target in targets:
         suffix = target.suffix
         if suffix.lower() in LOGS:
             message = f"{target}: {suffix} is written of a flight log (.mcap), and {path} is none"
             raise MissionError(message, file=target, field="suffix", value=suffix)
     placed = any(target.suffix.lower() in (*MAPS, *PARAMETERS) for target in targets)
-    return _read_mission(path, options, placed=placed, coloured=_asks_kml(targets))
+    return _read_mission(path, options, placed=placed, coloured=_needs_kml(targets))
 
 
-def _asks_kml(targets: tuple[Path, ...]) -> bool:
+def _needs_kml(targets: tuple[Path, ...]) -> bool:
     return any(target.suffix.lower() == ".kml" for target in targets)
 
 
 def _with_returns(source: _Source, setup: FlightSetup, track: Track | None) -> _Source:
-    """Add returns and glides from a few places of a flight or a planned path, if they can be judged."""
+    """Return the source with returns and glides from a few places of the flight or path, if they can be judged."""
     with stage("flying returns for the map"):
         drawn = return_summary(setup, track).drawn()
     if drawn is None:
@@ -201,14 +204,14 @@ def _read_log(path: Path, *, coloured: bool) -> _Source:
 
 
 def _read_mission(path: Path, options: MissionOptions, *, placed: bool, coloured: bool) -> _Source:
-    """Read a plan or a mission file, and place it in its world if the targets or a plan's fence need it."""
+    """Read a plan or a mission file; place the mission in its scenario if a target, a plan or a fence needs this."""
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
     if not (placed or is_plan or fences.zones or options["at"] is not None):
         mission = fences.on_mission(read_mission(path))
         return _Source(replace(mission, autopilot=mission.autopilot or DEFAULT_AUTOPILOT), path.stem)
-    # Items that a ground station uploads have no times, so the active zones are selected here.
+    # Mission items have no times, so select the zones that are active during the flight.
     setup = open_flight(path, options)
     line, zones = {"plan": plan_line(setup)}, map_zones(setup)
     source = _Source(setup.mission, setup.scenario.name, line, zones, autopilot=setup.autopilot)
@@ -221,19 +224,19 @@ def _read_mission(path: Path, options: MissionOptions, *, placed: bool, coloured
 
 
 def _with_zones(source: _Source, scenario: Scenario) -> _Source:
-    """Return the source with the named zones as fence items, in addition to the mission's own."""
+    """Return the source with the zones of the scenario as fence items, in addition to the mission's own fences."""
     items, notes = zone_fences(scenario.zones, scenario.origin)
     fenced = replace(source.mission, fences=numbered([*source.mission.fences, *items]))
     return replace(source, mission=fenced, notes=tuple(notes))
 
 
-def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
-    """Return the text of a target, and a description of its content."""
+def _target_content(source: _Source, target: Path) -> tuple[str | bytes, str]:
+    """Return the content of a target file, and a description of this content."""
     suffix, mission = target.suffix.lower(), source.mission
     if source.autopilot is not None:
         mission = replace(mission, autopilot=source.autopilot.name)
     if suffix in LOGS and source.log is not None:
-        return _flown_text(source.log, suffix)
+        return _flight_content(source.log, suffix)
     if suffix in MAPS:
         parts = [*source.lines, *([f"{len(source.zones)} zones"] if source.zones else [])]
         lines, zones = list(source.lines.values()), source.zones
@@ -256,9 +259,9 @@ def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
 
 
 def judged_parameters(mission: str, autopilot: Autopilot) -> tuple[str, str]:
-    """Return the text of a file of take-off, landing and return parameters, and a description of it.
+    """Return the text of a file of take-off, landing and return parameters, and a description of this file.
 
-    mission: its name in messages.  Raises MissionError for an autopilot without such parameters.
+    mission: name of the mission in messages.  Raises MissionError for an autopilot without such parameters.
     """
     found = () if autopilot.parameters is None else autopilot.parameters.values
     values = {name: value for name, value, _ in found if name.startswith(_JUDGED)}
@@ -269,10 +272,10 @@ def judged_parameters(mission: str, autopilot: Autopilot) -> tuple[str, str]:
     return parameters_text(values, title), f"{len(values)} parameters of {autopilot.title}"
 
 
-def _flown_text(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
-    """Return the rows of a flight in the format of another program, and a description.
+def _flight_content(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
+    """Return the rows of a flight in the format of another program, and a description of the content.
 
-    Each format imports only the libraries that it needs.
+    Only the libraries that the format needs are imported.
     """
     content = f"{len(log.track):,} rows, {log.end_time:.0f} s"
     if suffix == ".tlog":

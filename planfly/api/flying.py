@@ -45,16 +45,16 @@ from world.extras import need_extra
 from world.scenario import Scenario, over_terrain
 
 # ----------------------------------------------------------------------
-# Results of the functions: frozen data, short to print, a table in a notebook.
+# Results of the functions.  They are frozen data with a short printed form and a table in a notebook.
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class FlownMission:
     """Result of `planfly.fly`.
 
-    setup: everything that decided the flight.
-    track: rows of the flight; empty if it could not begin.
-    verdict: whether the mission flies, with a finding for every rule and place.
+    setup: everything that determined the flight.
+    track: rows of the flight; empty if the flight could not start.
+    verdict: verdict on the mission, with a finding for every rule and place.
     ended: "completed", or the reason for an early end.
     events: entries of the log in addition to the rows.
     log: the file of the flight log; None if no log was requested or nothing was flown.
@@ -73,7 +73,7 @@ class FlownMission:
 
     @property
     def mission(self) -> Mission:
-        """Mission that was flown, as read or as made from a plan."""
+        """Mission that was flown, read from a file or made from a plan."""
         return self.setup.mission
 
     @property
@@ -88,14 +88,14 @@ class FlownMission:
 
     @property
     def returns_line(self) -> str:
-        """Returns from a few places of the flight, in one line; "" for a mission without a home."""
+        """One line on returns from a few places of the flight; "" for a mission without a home."""
         return returns_line(self.setup, self.track) if self.returns is None else self.returns.line
 
     def __repr__(self) -> str:
         return f"<FlownMission {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
 
     def _repr_html_(self) -> str:
-        """Return how a notebook shows it."""
+        """Return the HTML that a notebook shows."""
         return self.verdict._repr_html_() + self.track._repr_html_()
 
 
@@ -103,8 +103,8 @@ class FlownMission:
 class Judged:
     """Result of `planfly.judge`.
 
-    setup: everything that decides the flight.
-    verdict: whether the mission flies, with a finding for every rule and place.
+    setup: everything that determines the flight.
+    verdict: verdict on the mission, with a finding for every rule and place.
     loss: description of the part of a flight log that could not be read, in one line; "" if nothing is missing.
     lossy: True if part of a log could not be read.
     track: rows of the flight; None if nothing was flown.
@@ -120,12 +120,12 @@ class Judged:
 
     @property
     def returns_line(self) -> str:
-        """Returns from a few places of the flight or the planned path, in one line; "" without a home."""
+        """One line on returns from a few places of the flight or the planned path; "" without a home."""
         return returns_line(self.setup, self.track)
 
 
 # ----------------------------------------------------------------------
-# Fly.
+# Fly a mission.
 
 
 @with_warm_up(*BOTH)
@@ -140,10 +140,10 @@ def plan_then_fly(
     """Plan a path, fly it in JSBSim and judge the flight.
 
     scenario: an embedded name, a TOML file's path, or a `Scenario`.
-    seed: of planner and turbulence; None takes the seed of the scenario, or 1.
-    log: file for the flight as MCAP, replaced if it exists; None writes none.
-    options: as of `planfly.fly`.
-    Raises a `planfly.PlanflyError` for bad input.  A plan that cannot be flown is a verdict, not an error.
+    seed: seed of planner and turbulence; None takes the seed of the scenario, or 1.
+    log: MCAP file for the flight, replaced if it exists; None writes no log.
+    options: see `planfly.fly`.
+    Raises a `planfly.PlanflyError` for bad input.  A plan that cannot be flown gives a verdict, not an error.
 
     >>> import planfly
     >>> result = planfly.plan_then_fly("tight", seed=1, wind=(0, 0))
@@ -169,31 +169,34 @@ def fly(
     """Fly a plan or a mission file in JSBSim, and judge the flight.
 
     mission: a `Plan`, or the path of a plan.json, .waypoints or .plan file.
-    log: file for the flight as MCAP; {name} and {seed} in it stand for the mission's name and the seed; None writes
-    none.  overwrite: True replaces an existing file.
+    log: MCAP file for the flight, in which {name} and {seed} stand for the mission's name and the seed; None writes no
+    log.
+    overwrite: True replaces an existing file.
 
     The world of the flight (None keeps the value of the plan or the scenario):
     scenario: a name or a TOML file; None for the plan's own scenario, or one made around the mission.
     terrain: an elevation file that replaces the terrain of the scenario.
     fence: files of fences and zones in addition to the mission's own.
-    seed: of the turbulence; None takes the seed of the plan or of the scenario, or 1.
-    wind: speed, m/s, and the direction it comes from, degrees.  turbulence: "none", "light" or "moderate".
-    at: time of the flight, "START" or "START/END" by ISO 8601 with offsets from UTC; zones that are inactive then are
-    left out.
+    seed: seed of the turbulence; None takes the seed of the plan or of the scenario, or 1.
+    wind: speed, m/s, and the direction from which the wind blows, degrees.
+    turbulence: "none", "light" or "moderate".
+    at: time of the flight, "START" or "START/END", in ISO 8601 with offsets from UTC; zones that are inactive at this
+    time are left out.
 
     The aircraft and its control:
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
     autopilot: the simulated autopilot: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16",
     "px4-1.17" or "planfly".
-    guidance: planfly's own law ("path", "l1", "vector-field") instead of the law of ArduPlane.
+    guidance: planfly's own guidance ("path", "l1", "vector-field") instead of the simulated ArduPlane.
     nav: "perfect", "rtk" or "gnss".
-    sitl: the program of ArduPlane or PX4 built for software in the loop, which then flies the mission.
+    sitl: the program of ArduPlane or PX4 built for software in the loop (SITL), which then flies the mission.
 
-    log_hz: rows per second in the log.  max_hours, max_log: limits at which a flight is stopped, h and MB.
-    levels: True also flies a mission that passes with planfly's guidance, as is done for one that fails, and compares
-    the two flights.
+    log_hz: rows per second in the log.
+    max_hours, max_log: limits of flight time, h, and log size, MB, at which a flight is stopped.
+    levels: True also flies a mission that passes with planfly's guidance and compares the two flights; without this
+    option only a mission that fails is flown again.
 
-    A plan that cannot be flown is a verdict, not an error; bad input raises a `planfly.PlanflyError`.
+    A plan that cannot be flown gives a verdict, not an error; bad input raises a `planfly.PlanflyError`.
 
     >>> flown = planfly.fly(planfly.plan("paper-07", seed=1), wind=(4, 270))
     >>> flown.ended, flown.verdict.flyable, flown.setup.scenario.wind.speed
@@ -203,7 +206,7 @@ def fly(
     check_arguments(seed=options["seed"], log_hz=options["log_hz"], max_hours=limits.hours, max_log=limits.megabytes)
     program = named_program(options["sitl"])
     setup = open_flight(mission, options, program)
-    target = None if log is None else _log_target(log, setup, mission, program, overwrite)
+    target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
         flown = fly_and_judge(
             setup,
@@ -228,9 +231,9 @@ def fly_by_each(
 ) -> dict[str, FlownMission]:
     """Fly a mission by several simulated autopilots with default parameters, and judge each flight.
 
-    autopilots: names, as `autopilot` of `planfly.fly` takes them.
-    options: as of `planfly.fly`, except `autopilot`, `params` and `guidance`.
-    Returns the flights by these names.  Raises a `planfly.PlanflyError` for bad input.
+    autopilots: names that `autopilot` of `planfly.fly` accepts.
+    options: see `planfly.fly`; `autopilot`, `params` and `guidance` are not allowed.
+    Returns the flights by the names of the autopilots.  Raises a `planfly.PlanflyError` for bad input.
 
     >>> import planfly
     >>> flown = planfly.fly_by_each(planfly.plan("paper-07", seed=1), ["planfly", "px4"])
@@ -242,7 +245,7 @@ def fly_by_each(
         raise ArgumentError.of_argument("autopilots", "", "at least one autopilot is expected")
     check_arguments(autopilot=named)
     own = {name: value for name, value in options.items() if name in ("params", "guidance", "autopilot")}
-    refuse(_source_of(mission), own, "belongs to one autopilot, and several are named")
+    refuse(_source_name(mission), own, "belongs to one autopilot, and several are named")
     flown = {}
     for name in named:
         options["autopilot"] = name
@@ -250,10 +253,13 @@ def fly_by_each(
     return flown
 
 
-def _log_target(
+def _prepare_log_file(
     log: str | Path, setup: FlightSetup, mission: Plan | str | Path, program: Path | None, overwrite: bool
 ) -> Path:
-    """Prepare the file of the log; an existing one and a program's log are replaced.  Raises PlanflyError."""
+    """Return the log file to write, after removing an existing log and the autopilot program's log.
+
+    Raises PlanflyError for a file that cannot be written, and without `overwrite` for one that exists.
+    """
     source = None if isinstance(mission, Plan) else Path(mission)
     target = file_target(log, setup.name, setup.seed, overwrite=overwrite, source=source)
     if program is not None:
@@ -279,10 +285,10 @@ def judge(
 
     what: a flight log or its path, an autopilot's log, a result of `planfly.fly`, a `Plan`, or the path of a plan.json,
     .waypoints or .plan.
-    geometry: True judges a plan or a mission by its geometry alone, without the flight by an autopilot.
-    options: of a plan or mission, as of `planfly.fly`; a flight is judged as it was flown, and only `terrain` replaces
-    its ground and `fence` adds to its fences.
-    plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
+    geometry: True judges a plan or a mission by its geometry alone, without a flight.
+    options: for a plan or mission, see `planfly.fly`.  A flight is judged as it was flown; of these options, only
+    `terrain`, which replaces its terrain, and `fence`, which adds fences, are allowed.
+    plan, flight, datum: for an autopilot's log, see `planfly.import_log`.
     Raises a `planfly.PlanflyError` for bad input.
 
     >>> plan = planfly.plan("paper-07", seed=1)
@@ -295,7 +301,7 @@ def judge(
 
         found = read_imported(what, **options)
         return Judged(found.setup, found.verdict, lossy=found.lossy, track=found.track, is_log=True)
-    source = _source_of(what)
+    source = _source_name(what)
     refuse(source, options_of_log(options), "goes with an imported log, not with this file")
     if isinstance(what, FlightLog | FlownMission) or (isinstance(what, str | Path) and is_log(Path(what))):
         refuse_other_flight(source, options)
@@ -328,8 +334,8 @@ def check(
     return judge(what, geometry=geometry, **options).verdict
 
 
-def _source_of(what: FlightLog | FlownMission | Plan | str | Path) -> str:
-    """Return the name of the judged file for messages."""
+def _source_name(what: FlightLog | FlownMission | Plan | str | Path) -> str:
+    """Return the name of the judged source for messages."""
     if isinstance(what, FlightLog):
         return what.source
     if isinstance(what, FlownMission):
@@ -338,7 +344,11 @@ def _source_of(what: FlightLog | FlownMission | Plan | str | Path) -> str:
 
 
 def refuse(source: str, given: Mapping[str, Any], allowed: str) -> None:
-    """Refuse keywords that do not apply to the judged source.  Raises ScenarioError."""
+    """Raise ScenarioError for the first given keyword, because it does not apply to the judged source.
+
+    given: keywords and their values; None is a keyword that was not given.
+    allowed: reason for the message.
+    """
     for name, value in given.items():
         if value is not None:
             raise ScenarioError.of_argument(name, value, allowed, shown="", file=source)
@@ -351,7 +361,7 @@ _WHERE_FLOWN = "a log is judged in the scenario it carries; only `terrain` repla
 
 
 def refuse_other_flight(source: str, options: MissionOptions) -> None:
-    """Refuse options that would change the flight recorded in a log.  Raises ScenarioError."""
+    """Raise ScenarioError for an option that would change the flight recorded in a log."""
     kept = (*LOG_OPTIONS, "terrain", "fence", "scenario")
     refuse(source, {name: value for name, value in options.items() if name not in kept}, _AS_FLOWN)
     refuse(source, {"scenario": options["scenario"]}, _WHERE_FLOWN)
@@ -371,9 +381,9 @@ def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, 
 
 
 def named_program(sitl: str | Path | None) -> Path | None:
-    """Return the autopilot's program that is to fly, or None if none is named.
+    """Return the path of the autopilot program, or None if no program is named.
 
-    Raises FlightError for a file that cannot be run, and MissingExtraError.
+    Raises FlightError for a file that cannot be run, and MissingExtraError if a package for programs is missing.
     """
     if sitl is None:
         return None

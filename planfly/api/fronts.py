@@ -1,4 +1,4 @@
-"""Plan a front of plans, and write it as plans, a table and pictures."""
+"""Plan a Pareto front, and write its plans, a table and pictures."""
 
 import csv
 import io
@@ -52,17 +52,17 @@ def plan_front(
     stop: Callable[[], bool] | None = None,
     **options: Unpack[FlightOptions],
 ) -> Front:
-    """Plan a Pareto front: plans of which none is better than another plan in every criterion.
+    """Plan a Pareto front, which is a set of plans in which no plan is better than another in every criterion.
 
-    The criteria are length, exposure to radars, least height above ground, and energy; time replaces energy if the
+    The criteria are length, exposure to radars, minimum height above ground, and energy.  Time replaces energy if the
     scenario's ``[planner] objective`` is "time" or the power of the aircraft is not known.  Each plan has its own
     certificate and is safe.  Each plan gains more than 0.1 % in length or energy, 1 % in exposure or 1 m in height over
     the plans selected before it.  There may be fewer plans than requested; the front is empty if no safe plan is found.
 
-    count: largest number of plans, 2 to 100.
+    count: maximum number of plans, 2 to 100.
     out: a folder for plan-1.json, plan-2.json, ..., the shortest first, their table as front.csv and front.json, and
-    two pictures; {name} and {seed} in it stand for the scenario's name and the seed.
-    The other keywords are as of `planfly.plan`.
+    two pictures.  In its name, {name} and {seed} stand for the scenario's name and the seed.
+    The other keywords are those of `planfly.plan`.
 
     >>> import planfly
     >>> front = planfly.plan_front("tight", 3, seed=1)
@@ -79,12 +79,12 @@ def plan_front(
     with stage(f"planning a front of {world.name}", "planning a front") as advance:
         found = make_pareto_plans(world, airframe, number, count, advance, stop=stop_condition(seconds, stop))
     if folder is not None:
-        _write(found, world, folder)
+        _write_front(found, world, folder)
     return found
 
 
-def _write(front: Front, world: Scenario, folder: Path) -> None:
-    """Write plans, tables and pictures; for a front without plans only the empty tables."""
+def _write_front(front: Front, world: Scenario, folder: Path) -> None:
+    """Write plans, tables and pictures; a front without plans gets only the empty tables."""
     for number, one in enumerate(front.plans, 1):
         write_whole(folder / f"plan-{number}.json", plan_json(one.plan))
     rows = table_rows(front)
@@ -103,7 +103,7 @@ def _write(front: Front, world: Scenario, folder: Path) -> None:
             f"{front.fourth}_{'s' if front.fourth == 'time' else 'wh'}",
         ],
         "asked": front.asked,
-        "default": {key: value for key, value in _row(0, front.default).items() if key != "plan"},
+        "default": {key: value for key, value in _table_row(0, front.default).items() if key != "plan"},
         "plans": [row | {"file": f"plan-{row['plan']}.json"} for row in rows],
     }
     write_whole(folder / "front.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
@@ -118,11 +118,11 @@ def _write(front: Front, world: Scenario, folder: Path) -> None:
 
 
 def table_rows(front: Front) -> list[dict[str, Any]]:
-    """Return the rows of the table of a front, by `COLUMNS`; None for an unknown energy."""
-    return [_row(number, one) for number, one in enumerate(front.plans, 1)]
+    """Return the rows of the table of a front, with the keys `COLUMNS`; an unknown energy is None."""
+    return [_table_row(number, one) for number, one in enumerate(front.plans, 1)]
 
 
-def _row(number: int, one: FrontPlan) -> dict[str, Any]:
+def _table_row(number: int, one: FrontPlan) -> dict[str, Any]:
     values = (one.length, one.exposure, one.clearance, one.energy / WATT_HOUR, one.time)
     digits = (1, 3, 2, 3, 2)
     rounded = [

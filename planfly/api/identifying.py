@@ -37,7 +37,8 @@ from world.extras import needs_extra
 from world.files import whole_path
 from world.scenario_tables import names_folder
 
-# Largest ratio of stated and base mass or span, either way, for which the base is still a usable prior.
+# Maximum ratio between the stated and the base's mass or span, in either direction, for which the base is a usable
+# prior.
 _MAX_SIZE_RATIO = 1.6
 # Allowed range and unit of each stated number, for small aircraft.
 _RANGES = {"mass": (0.3, 50.0, "kg"), "span": (0.4, 10.0, "m"), "area": (0.03, 10.0, "m2")}
@@ -45,9 +46,11 @@ _RANGES = {"mass": (0.3, 50.0, "kg"), "span": (0.4, 10.0, "m"), "area": (0.03, 1
 
 @dataclass(frozen=True, slots=True)
 class SlowLog:
-    """A log with few rows of inertial sensors or outputs.
+    """A log with few rows of inertial sensors or servo outputs.
 
-    source: the file.  hertz: rows per second.  setting: the autopilot parameter with the value that records more rows.
+    source: the file.
+    hertz: rows per second.
+    setting: the autopilot parameter with the value that records more rows.
     """
 
     source: str
@@ -61,12 +64,13 @@ class IdentifiedAircraft:
 
     aircraft: the aircraft as written to its folder.
     estimate: estimate of each parameter, with covariance.
-    climb, sink: steepest at cruise, full throttle and idle, degrees: lower end, estimate and upper end (95 %).
-    power: power of level flight at cruise, W: lower end, estimate and upper end (95 %).
+    climb: lower end, estimate and upper end (95 %) of the climb angle at cruise and full throttle, degrees.
+    sink: lower end, estimate and upper end (95 %) of the sink angle at cruise and idle, degrees.
+    power: lower end, estimate and upper end (95 %) of the power of level flight at cruise, W.
     replays: replays of the check log by the base and by the identified model; empty without a check log.
-    without_current: logs without battery current, if others have it; the current of no log is used then.
+    without_current: logs without battery current, if other logs have it; then the current of no log is used.
     slow: logs with few rows per second.
-    wide: numbers with a wide interval, each with the flight that would narrow it.
+    wide: numbers with a wide interval, each with the flight that would narrow the interval.
     """
 
     aircraft: Aircraft
@@ -94,7 +98,7 @@ def identify_aircraft(
     check: str | Path | None = None,
     overwrite: bool = False,
 ) -> IdentifiedAircraft:
-    """Make the folder of an aircraft from flight logs of ArduPlane or PX4, with a list of what is unknown.
+    """Make the folder of an aircraft from flight logs of ArduPlane or PX4, with a list of uncertain properties.
 
     logs: `.BIN` or `.ulg` of one aircraft with one mass, with inertial sensors and servo outputs.
     folder: the folder to make.  overwrite: True replaces the folder of an aircraft.
@@ -102,8 +106,8 @@ def identify_aircraft(
     from the base.
     battery: volts and capacity, "44.4V,888Wh"; None takes the battery of the base.
     base: the most similar aircraft, by name or folder; it supplies every property that the logs do not show.
-    check: a log that is not among `logs`, to replay with both models.
-    Raises a `planfly.PlanflyError` for logs that cannot be used; nothing is written then.
+    check: a log that is not among `logs`, to replay with the base and the identified model.
+    Raises a `planfly.PlanflyError` for logs that cannot be used; then nothing is written.
     """
     target = check_new_folder(Path(folder), overwrite=overwrite)
     paths = [Path(one) for one in ([logs] if isinstance(logs, str | Path) else logs)]
@@ -123,27 +127,33 @@ def identify_aircraft(
         motions = [read_motion(path) for path in paths]
         motion = None if check is None else read_motion(Path(check))
         _refuse_equal([*motions, *([] if motion is None else [motion])])
-        read = [(log, *_stretches(log, prior)) for log in motions]
-        checked = None if motion is None else _stretches(motion, prior)[0]
+        read = [(log, *_records_and_outputs(log, prior)) for log in motions]
+        checked = None if motion is None else _records_and_outputs(motion, prior)[0]
     records = [record for _, stretches, _ in read for record in stretches]
     log, _, outputs = read[-1]
     with stage("estimating"):
         fast = all(slowest_rows(one) >= MIN_HZ for one, _, _ in read)
         estimate = estimate_model(records, numbers, dynamics=fast)
-        check_estimate(estimate, numbers, _own_outputs(log, prior), log.source)
+        check_estimate(estimate, numbers, _unmixed_outputs(log, prior), log.source)
         found = make_identified(prior, numbers, estimate, [one for one, _, _ in read], outputs)
         files = folder_files(found, target.name, (volts, energy))
-    replays = () if checked is None else _replay(found, files, target.name, checked)
+    replays = () if checked is None else _replay_check_log(found, files, target.name, checked)
     with stage("drawing", "drawing an identification"):
         files["identify.html"] = _page(found, replays, None if check is None else Path(check).name, target.name)
     write_own_folder(target, {name: text.encode() for name, text in files.items()})
     slow = slow_logs([one for one, _, _ in read])
     return IdentifiedAircraft(
-        read_aircraft(target), estimate, *_intervals(found), replays, without_current(records), slow, _wide(found)
+        read_aircraft(target),
+        estimate,
+        *_intervals(found),
+        replays,
+        without_current(records),
+        slow,
+        _find_wide_numbers(found),
     )
 
 
-def _base(base: str | Path) -> Aircraft:
+def _load_base(base: str | Path) -> Aircraft:
     text = str(base.absolute()) if isinstance(base, Path) else base
     found = find_aircraft(whole_path(Path(text)) if names_folder(text) else text)
     if (found.folder / "posterior.toml").is_file():
@@ -153,7 +163,7 @@ def _base(base: str | Path) -> Aircraft:
 
 
 def _check_stated(stated: dict[str, float], prior: Aircraft) -> None:
-    """Raise FlightError for numbers outside the range of small aircraft, and for a base of another class."""
+    """Raise FlightError for numbers outside the range of small aircraft, and for a base of a very different size."""
     for name, value in stated.items():
         low, high, unit = _RANGES[name]
         if isinstance(value, bool) or not low <= value <= high:
@@ -166,7 +176,7 @@ def _check_stated(stated: dict[str, float], prior: Aircraft) -> None:
 
 
 def _refuse_equal(logs: Sequence[MotionLog]) -> None:
-    """Refuse the same log twice, and a check log that is also used for identification.  Raises LogError."""
+    """Raise LogError if a log is given twice, or if the check log is also used for identification."""
     first: dict[str, str] = {}
     for log in logs:
         if log.sha256 in first:
@@ -177,11 +187,11 @@ def _refuse_equal(logs: Sequence[MotionLog]) -> None:
         first[log.sha256] = log.source
 
 
-def _stretches(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
+def _records_and_outputs(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
     """Return the flight records of a log, and the servo outputs of the aircraft.
 
-    The outputs are the base's own if they all match the outputs of the log, otherwise the outputs of the log.  With
-    PX4, and with elevons, which are mixed within the model, they are the base's own.
+    The servo outputs are those of the base if all of them match the log, otherwise those of the log.  With PX4, and
+    with elevons, whose mixer is part of the model, they are always those of the base.
     """
     file = prior.folder / "ardupilot.toml"
     own = read_servos(file) if file.is_file() else {}
@@ -190,31 +200,33 @@ def _stretches(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRecord], dic
     outputs = log_outputs(log, prior)
     if LEFT in outputs:
         return flight_records(log, prior, outputs), dict(own)
-    same = own.keys() == outputs.keys() and all(_same(own[name], output) for name, output in outputs.items())
+    same = own.keys() == outputs.keys() and all(_is_same_output(own[name], output) for name, output in outputs.items())
     chosen = dict(own) if same else outputs
     return flight_records(log, prior, chosen if same else None), chosen
 
 
-def _own_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
-    """Return the output number of each control that has an output of its own."""
+def _unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
+    """Return the output number of each control that has its own servo output in the log."""
     if log.program_kind == "px4":
         return {}
     return {name: output.output for name, output in log_outputs(log, prior).items()}
 
 
-def _same(one: ServoOutput, other: ServoOutput) -> bool:
-    """Return True if two outputs have the same number, travel and direction."""
+def _is_same_output(one: ServoOutput, other: ServoOutput) -> bool:
+    """Return True if two servo outputs have the same number, pulse range and direction."""
     (a, *_, b), (c, *_, d) = one.value, other.value
     ends = (one.pulse[0], one.pulse[-1]) == (other.pulse[0], other.pulse[-1])
     return one.output == other.output and ends and (b - a) * (d - c) > 0.0
 
 
-def _replay(found: Identified, files: dict[str, str], name: str, records: list[FlightRecord]) -> tuple[Replay, ...]:
+def _replay_check_log(
+    found: Identified, files: dict[str, str], name: str, records: list[FlightRecord]
+) -> tuple[Replay, ...]:
     with stage("replaying the check log"):
         return replay_log(found, files, name, records)
 
 
-def _page(found: Identified, replays: tuple[Replay, ...], checked: str | None, name: str) -> str:
+def _report_page(found: Identified, replays: tuple[Replay, ...], checked: str | None, name: str) -> str:
     from logs.views.report.identification import IdentificationFacts, ReplayedLog, identification_page
 
     numbers = tuple(
@@ -235,16 +247,16 @@ def _page(found: Identified, replays: tuple[Replay, ...], checked: str | None, n
         )
         replay = ReplayedLog(checked, after.windows, rows, logged, flown, GRID_HZ)
     logs = tuple((Path(log.source).name, log.sha256) for log in found.logs)
-    wide = tuple(one.text for one in _wide(found))
+    wide = tuple(one.text for one in _find_wide_numbers(found))
     return identification_page(IdentificationFacts(name, found.estimate, logs, numbers, replay, wide))
 
 
-def _wide(found: Identified) -> tuple[WideNumber, ...]:
+def _find_wide_numbers(found: Identified) -> tuple[WideNumber, ...]:
     _, sink, power = _intervals(found)
     return wide_numbers(sink, power, with_current=found.estimate.with_current)
 
 
-# Lower end, estimate and upper end (95 %).
+# Lower end, estimate and upper end (95 %) of a number.
 Interval = tuple[float, float, float]
 
 
@@ -265,12 +277,12 @@ def _intervals(found: Identified) -> tuple[Interval, Interval, Interval]:
 
 
 def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
-    """Return the names of logs without battery current, if another log has it."""
+    """Return the names of the logs without battery current; empty if no log has it."""
     lacking = {record.source: None for record in records if not record.has_current}
     return tuple(lacking) if any(record.has_current for record in records) else ()
 
 
 def slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
-    """Return the logs with few rows per second."""
+    """Return the logs with less than `PLENTY_HZ` rows per second."""
     rates = [(log, slowest_rows(log)) for log in logs]
     return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < PLENTY_HZ)

@@ -21,7 +21,7 @@ from planfly.workflow.output_paths import REFLOWN, REFLY_FILES, clean_folder, re
 from world.errors import LogError, ScenarioError
 from world.files import write_whole
 
-# Rows recorded per call: a recorder needs many times the bytes of a row.
+# Number of rows recorded per call; it is limited because a recorder needs many times the memory of a row.
 _ROWS_AT_ONCE = 4096
 
 
@@ -30,7 +30,7 @@ class Reflown:
     """Result of `planfly.refly`.
 
     flights: each stretch of the mission with its simulation, the longest first.
-    lines: description of the differences between model and flight.
+    lines: lines that describe the differences between model and flight.
     files: pictures and logs of the simulated flights.
     """
 
@@ -41,9 +41,9 @@ class Reflown:
 
 @takes_options
 def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFlight:
-    """Read and judge a flight from the log of another program; options as of `import_log`.
+    """Read and judge a flight from the log of another program, with the options of `import_log`.
 
-    Raises ScenarioError for an option that a flown log cannot take.
+    Raises ScenarioError for an option that does not apply to a flight that was already flown.
     """
     for name in ("params", "guidance", "autopilot", "airspeed", "nav", "seed"):
         if (value := dict(options)[name]) is not None:
@@ -60,29 +60,29 @@ def import_log(
 ) -> ImportedFlight:
     """Read a flight from another program's log, judge it against its plan, and write it as a flight log.
 
-    log: of ArduPilot (.BIN, .log), a ground station (.tlog), PX4 (.ulg), or a track (.gpx, .igc, .kml, .kmz).
-    target: the flight log to write, as MCAP; None writes none.  overwrite: True replaces an existing log.
-    plan: the mission or plan.json that was to be flown, in place of the log's own mission.
-    flight: number of the flight in the log, from 1; None for the longest in AUTO.
+    log: log of ArduPilot (.BIN, .log), a ground station (.tlog) or PX4 (.ulg), or a track (.gpx, .igc, .kml, .kmz).
+    target: the MCAP flight log to write; None writes no log.  overwrite: True replaces an existing log.
+    plan: the planned mission or plan.json, which replaces the mission in the log.
+    flight: number of the flight in the log, from 1; None for the flight with the longest time in AUTO.
     datum: datum of the log's altitudes if the log does not state it, "amsl" or "ellipsoid".
-    scenario, terrain, fence, wind, turbulence, at, aircraft: as of `planfly.fly`; without an aircraft, aircraft limits
-    are not judged.  The other options are refused: the flight is judged by the speeds of its log.
-    Raises a `planfly.PlanflyError` for bad input; nothing is written then.
+    scenario, terrain, fence, wind, turbulence, at, aircraft: see `planfly.fly`; without an aircraft, aircraft limits
+    are not judged.  The other options are refused, because the flight is judged by the speeds of its log.
+    Raises a `planfly.PlanflyError` for bad input; then nothing is written.
     """
     if target is not None:
         refuse_existing(Path(target), overwrite, Path(log))
     found = read_imported(log, **options)
     if target is not None:
-        _write(Path(target), found)
+        _write_log(Path(target), found)
     return found
 
 
-def _write(target: Path, flight: ImportedFlight) -> None:
+def _write_log(target: Path, flight: ImportedFlight) -> None:
     """Write the log completely or not at all."""
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
         path = Path(folder) / target.name
         with Recorder(path, flight.setup) as recorder:
-            # Events are written first, so that each one is at its time in the log.
+            # Write the events first, so that each event is at its time in the log.
             for event in flight.events:
                 recorder.event(event.time, event.text, event.level)
             for start in range(0, len(flight.track), _ROWS_AT_ONCE):
@@ -107,11 +107,11 @@ def refly(
     """Fly the mission of an imported flight again in JSBSim, in the wind of its log, and compare.
 
     log: a flight log that `planfly.import_log` wrote.
-    out: a folder for pictures and for logs of the simulated flights; None writes none.
-    aircraft: the aircraft to fly it, a name or a folder; None for the aircraft of the log.
-    turbulence: replaces the turbulence of the log.
+    out: a folder for pictures and for logs of the simulated flights; None writes no files.
+    aircraft: name or folder of the aircraft to fly; None for the aircraft of the log.
+    turbulence: turbulence to fly in instead of the log's; None keeps that.
     overwrite: True replaces results in the folder.
-    Raises a `planfly.PlanflyError` for bad input; nothing is written then.
+    Raises a `planfly.PlanflyError` for bad input; then nothing is written.
     """
     check_arguments(turbulence=turbulence)
     found = log if isinstance(log, FlightLog) else read_log(log)
@@ -133,11 +133,11 @@ def refly(
         with stage("drawing", "drawing a flight again"):
             for number, again in enumerate(agains, 1):
                 ending = "" if number == 1 else f"-{number}"
-                files += [*_draw(folder, again, ending), _record(folder, again, found, ending)]
+                files += [*_draw_charts(folder, again, ending), _record_simulation(folder, again, found, ending)]
     return Reflown(agains, tuple(lines), tuple(files))
 
 
-def _draw(folder: Path, again: Reflight, ending: str) -> list[Path]:
+def _draw_charts(folder: Path, again: Reflight, ending: str) -> list[Path]:
     # Imported here: only pictures need matplotlib.
     from logs.views.compare import refly_charts
     from logs.views.drawing import draw_chart, png_bytes
@@ -150,7 +150,7 @@ def _draw(folder: Path, again: Reflight, ending: str) -> list[Path]:
     return files
 
 
-def _record(folder: Path, again: Reflight, log: FlightLog, ending: str) -> Path:
+def _record_simulation(folder: Path, again: Reflight, log: FlightLog, ending: str) -> Path:
     """Write the simulated flight as a separate log, for `compare` and `replay`, and return its file."""
     path = folder / f"simulated{ending}.mcap"
     verdict = judge_flight(again.setup, again.simulated, again.ended)
@@ -161,13 +161,13 @@ def _record(folder: Path, again: Reflight, log: FlightLog, ending: str) -> Path:
 
 
 # ----------------------------------------------------------------------
-# Damaged logs.
+# Recover damaged logs.
 
 
 def recover(log: str | Path, out: str | Path | None = None, *, overwrite: bool = False) -> FlightLog | None:
     """Write the readable part of an unfinished or damaged flight log as a new log.
 
-    out: the new log; None for ``<log>-recovered.mcap`` next to the damaged one.
+    out: the new log; None for ``<log>-recovered.mcap`` next to the damaged log.
     overwrite: True replaces an existing log.
     Returns the readable part of the flight, or None if the log is complete; then nothing is written.
     Raises a `planfly.PlanflyError` for bad input.

@@ -1,4 +1,4 @@
-"""Ask/tell interface to the planner's estimation of distribution algorithms, for any black box."""
+"""Minimise any black-box function with the planner's optimisers, by an ask/tell interface."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from world.arrays import Floats
 
-# "umda": independent Gaussians, as in the paper; "emna": one Gaussian of full covariance; "multistart": Gaussians of
-# full covariance from many starts; "differential": differential evolution, which is not an EDA and is included for
-# comparison.
+# "umda" uses independent Gaussians, as in the paper; "emna" one Gaussian with full covariance; "multistart" Gaussians
+# with full covariance from many starts; "differential" is differential evolution, which is not an EDA and is included
+# for comparison.
 Model = Literal["umda", "emna", "multistart", "differential"]
 # Optimiser class of each model.
 _MODELS = {"umda": Umda, "emna": Emna, "multistart": Multistart, "differential": DifferentialEvolution}
@@ -26,7 +26,9 @@ _MODELS = {"umda": Umda, "emna": Emna, "multistart": Multistart, "differential":
 class BestFound:
     """A point with its objective values and constraint violations.
 
-    x: (d,).  values: (m,) of the objectives.  violations: (v,) of the constraints, 0 if met; empty if there are none.
+    x: the point, (d,).
+    values: values of the objectives, (m,).
+    violations: violations of the constraints, (v,), 0 if met; empty without constraints.
     """
 
     x: Floats
@@ -45,7 +47,7 @@ class BestFound:
 
 
 class Optimiser:
-    """A search within a box, made by `planfly.optimise`: `ask` gives points, `tell` takes their values."""
+    """A search within a box, made by `planfly.optimise`.  `ask` returns points, and `tell` takes their values."""
 
     def __init__(
         self,
@@ -67,23 +69,28 @@ class Optimiser:
         self.evaluations = 0
 
     def ask(self) -> Floats:
-        """Return points (n, d) in the box to evaluate: first the whole population, then half of it at a time.
+        """Return points in the box to evaluate, (n, d).
 
-        "multistart" returns as many points as the current generation of its search has.
+        The first call returns the whole population, later calls return half of it.  "multistart" returns as many points
+        as the current generation of its search has.
         """
         return np.array(self._search.ask())
 
     def tell(self, values: ArrayLike, violations: ArrayLike | None = None) -> None:
         """Take the values of the points from `ask`, and draw the next points from the better half.
 
-        values: (n,), less is better, or (n, m) for m objectives, between which Pareto dominance decides.
-        violations: (n,) or (n, v), amount by which each constraint is violated, 0 or less if it is met; a smaller
-        violation takes precedence over values.  NaN is treated as the worst value.
-        Raises ValueError if the number of rows differs from the points asked for, or the number of columns from before.
+        values: values to minimise, (n,), or (n, m) for m objectives, which are compared by Pareto dominance.
+        violations: amount by which each constraint is violated, (n,) or (n, v), 0 or less if the constraint is met; a
+        smaller violation takes precedence over values.
+        NaN is treated as the worst value.
+        Raises ValueError if the number of rows differs from the number of points that `ask` returned, or the number of
+        columns from that of the previous call.
         """
         asked = self._search.ask()
-        given = _columns("values", values, len(asked))
-        broken = np.empty((len(asked), 0)) if violations is None else _columns("violations", violations, len(asked))
+        given = _checked_columns("values", values, len(asked))
+        broken = (
+            np.empty((len(asked), 0)) if violations is None else _checked_columns("violations", violations, len(asked))
+        )
         if not given.shape[1]:
             raise ValueError("values: no columns: one an objective is expected")
         scores = np.concatenate([np.maximum(broken, 0.0), given], axis=1)
@@ -94,11 +101,11 @@ class Optimiser:
             self._levels = _levels(broken.shape[1], given.shape[1])
             self._scores = np.empty((0, scores.shape[1]))
         self.evaluations += len(asked)
-        self._keep(asked, scores)
+        self._add_points(asked, scores)
         self._search.tell(scores)
 
-    def _keep(self, points: Floats, scores: Floats) -> None:
-        """Keep the points to which no other point is preferred, sorted by the first objective."""
+    def _add_points(self, points: Floats, scores: Floats) -> None:
+        """Add points, and keep those to which no other point is preferred, sorted by the first objective."""
         every, known = np.concatenate([self._points, points]), np.concatenate([self._scores, scores])
         first = np.flatnonzero(ranks(known, self._levels) == 0)
         order = first[np.argsort(known[first, self._violations], kind="stable")][: self._most]
@@ -106,7 +113,7 @@ class Optimiser:
 
     @property
     def best(self) -> BestFound:
-        """Best point evaluated; with several objectives, the point of `front` that is best in the first.
+        """Best point evaluated; with several objectives, the point of `front` with the best first objective.
 
         Raises ValueError before the first `tell`.
         """
@@ -114,7 +121,7 @@ class Optimiser:
 
     @property
     def front(self) -> tuple[BestFound, ...]:
-        """Points to which no evaluated point is preferred, at most as many as the population."""
+        """Points to which no evaluated point is preferred; there are at most as many as in the population."""
         if not self._levels:
             raise ValueError("nothing has been evaluated yet: call ask() and tell() first")
         v = self._violations
@@ -126,9 +133,11 @@ class Optimiser:
     def minimise(
         self, objective: Callable[[Floats], ArrayLike], generations: int = 100, *, evaluations: int | None = None
     ) -> BestFound:
-        """Minimise an objective that takes points (n, d) and gives values (n,); return the best point found.
+        """Minimise an objective, and return the best point found.
 
-        generations: number of generations.  evaluations: stop at this total number of evaluations instead.
+        objective: maps points, (n, d), to values, (n,).
+        generations: number of generations.
+        evaluations: total number of evaluations at which to stop, instead of `generations`.
         """
         if evaluations is None:
             for _ in range(generations):
@@ -152,16 +161,16 @@ def optimise(
     seed: int | np.random.Generator = 1,
     initial: ArrayLike | None = None,
 ) -> Optimiser:
-    """Return an ask/tell optimiser with the planner's algorithms, for any black box within bounds.
+    """Return an ask/tell optimiser with one of the planner's algorithms, for any black-box function within bounds.
 
-    lower, upper: (d,) box.
-    model: "umda", the paper's univariate Gaussians; "emna", one Gaussian of full covariance; "multistart", Gaussians of
-    full covariance from starts of many widths, for a cost with walls, gaps or several valleys; "differential",
+    lower, upper: bounds of the box, (d,).
+    model: "umda", the paper's univariate Gaussians; "emna", one Gaussian with full covariance; "multistart", Gaussians
+    with full covariance from starts of many widths, for a cost with walls, gaps or several valleys; "differential",
     differential evolution, for comparison.
     population: even number of points, at least 4; half of them are drawn again in each generation.  For "multistart",
-    the size of the largest generation.
+    this is the size of the largest generation.
     seed: a whole number, or a generator of random numbers.
-    initial: (population, d) first points; None for uniform.
+    initial: first points, (population, d); None draws uniform points.
     Raises ValueError for invalid bounds or an invalid population.
 
     Minimum of a bowl at (1, 2); and, if a line separates it from the feasible side, a minimum of 0.5 at (0.5, 1.5):
@@ -206,12 +215,12 @@ def optimise(
 
 
 def _levels(violations: int, objectives: int) -> tuple[Level, ...]:
-    """Return the levels: constraints, each with the goal 0, before objectives without goals."""
+    """Return the levels of priority, in which constraints with the goal 0 precede objectives without goals."""
     values = Level(tuple(range(violations, violations + objectives)), (NO_GOAL,) * objectives)
     return (Level(tuple(range(violations)), (0.0,) * violations), values) if violations else (values,)
 
 
-def _columns(name: str, given: ArrayLike, rows: int) -> Floats:
+def _checked_columns(name: str, given: ArrayLike, rows: int) -> Floats:
     table = np.array(given, dtype=np.float64)
     table = table[:, np.newaxis] if table.ndim == 1 else table
     if table.ndim != 2 or len(table) != rows:

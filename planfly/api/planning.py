@@ -25,9 +25,9 @@ from world.files import write_whole
 from world.scenario import Scenario, embedded_scenarios, with_planner, with_threats
 
 # ----------------------------------------------------------------------
-# Plan a path.
+# Plan a path through a scenario.
 
-# A pop-up threat: east, north, kill radius and detection radius, m; a radius of 0 means no such zone.
+# East, north, kill radius and detection radius of a pop-up threat, m; a radius of 0 means no such zone.
 Threat = tuple[float, float, float, float]
 
 
@@ -40,17 +40,18 @@ def plan(
     overwrite: bool = True,
     **options: Unpack[PlanOptions],
 ) -> Plan:
-    """Plan a path across a scenario's terrain and threats, within what its aircraft can fly.
+    """Plan a path across a scenario's terrain and around its threats, within the limits of its aircraft.
 
     scenario: an embedded name (`planfly.scenarios()` lists them), a TOML file's path, or a `Scenario`.
-    out: file for the plan.json; {name} and {seed} in it stand for the scenario's name and the seed.
+    out: file for the plan.json, in which {name} and {seed} stand for the scenario's name and the seed.
     overwrite: True replaces an existing file.
 
-    seed: of the search; None takes the seed of the scenario, or 1.
+    seed: seed of the search; None takes the seed of the scenario, or 1.
     algorithm: a name of ``planfly plan --help``; None for the default.
-    budget: largest number of evaluations.  seconds: time limit, after which the best path found is returned.
+    budget: maximum number of evaluations.
+    seconds: time limit, after which the best path found is returned.
     stop: called between generations; once it returns True, the best path found is returned.
-    terrain to nav: the flight to plan for, as of `planfly.fly`.
+    terrain to nav: the flight to plan for, see `planfly.fly`.
 
     If no feasible path is found, the returned plan says so (`Plan.feasible`, `Plan.safe`); bad input raises a
     `planfly.PlanflyError`.
@@ -64,7 +65,7 @@ def plan(
     """
     check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"])
     world = _with_budget(named_scenario(scenario, options), options["budget"])
-    return _planned(world, scenario, None, options, out, overwrite)
+    return _search_and_write(world, scenario, None, options, out, overwrite)
 
 
 @with_warm_up(*PLANNING)
@@ -79,12 +80,13 @@ def replan(
     overwrite: bool = True,
     **options: Unpack[PlanOptions],
 ) -> Plan:
-    """Plan again in flight: keep the flown legs, and route the rest around new threats.
+    """Plan again in flight, keeping the flown legs and routing the rest around new threats.
 
-    scenario: as of `planfly.plan`; threats that only the old plan knew are kept.
-    old: the plan that is being flown, or its file.  at_leg: the leg that is about to be flown, from 0.
-    threats: new threats: east, north, kill radius and detection radius of each, m; a radius of 0 means no such zone.
-    The other keywords are as of `planfly.plan`.
+    scenario: see `planfly.plan`; threats that only the old plan knew are kept.
+    old: the plan that is being flown, or its file.
+    at_leg: the leg that is about to be flown, from 0.
+    threats: east, north, kill radius and detection radius of each new threat, m; a radius of 0 means no such zone.
+    The other keywords are those of `planfly.plan`.
     Raises a `planfly.PlanflyError` for bad input, and for a plan of another mission.
 
     >>> import planfly
@@ -97,7 +99,9 @@ def replan(
     world = _with_budget(named_scenario(scenario, options), options["budget"])
     flown = old if isinstance(old, Plan) else read_plan(Path(old))
     same_mission(world, flown)
-    return _planned(_with_new_threats(world, flown, threats), scenario, (flown, at_leg), options, out, overwrite)
+    return _search_and_write(
+        _with_new_threats(world, flown, threats), scenario, (flown, at_leg), options, out, overwrite
+    )
 
 
 def _with_budget(scenario: Scenario, budget: int | None) -> Scenario:
@@ -105,7 +109,10 @@ def _with_budget(scenario: Scenario, budget: int | None) -> Scenario:
 
 
 def _with_new_threats(scenario: Scenario, old: Plan, threats: Sequence[Threat]) -> Scenario:
-    """Return a scenario with the old plan's threats it lacks, and with new threats.  Raises ScenarioError."""
+    """Return a scenario with the old plan's other threats and with new threats.
+
+    Raises ScenarioError for a new threat outside the known terrain.
+    """
     for east, north, _, _ in threats:
         if scenario.terrain is not None and math.isnan(scenario.terrain.height(east, north)):
             place = f"east {east:g} m, north {north:g} m: outside the terrain that is known"
@@ -114,7 +121,7 @@ def _with_new_threats(scenario: Scenario, old: Plan, threats: Sequence[Threat]) 
     return with_threats(scenario, threats, "threats", kept)
 
 
-def _planned(
+def _search_and_write(
     world: Scenario,
     source: Scenario | str | Path,
     flown: tuple[Plan, int] | None,
@@ -122,8 +129,9 @@ def _planned(
     out: str | Path | None,
     overwrite: bool,
 ) -> Plan:
-    """Search, and write the plan.
+    """Search for a plan, write it if a file is named, and return it.
 
+    source: the scenario as the caller named it; its file must not be overwritten.
     flown: the plan being flown and the leg to plan from; None for a new plan.
     """
     number, target = choose_seed(world, options["seed"]), None
@@ -140,7 +148,7 @@ def _planned(
 
 
 def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
-    """Return the check between generations: "interrupted", "budget" after `seconds`, or "" to go on."""
+    """Return the check made between generations; it returns "interrupted", "budget" after `seconds`, or "" to go on."""
     deadline = None if seconds is None else time.monotonic() + seconds
 
     def ends() -> str:
@@ -152,14 +160,14 @@ def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> St
 
 
 def conditions_of_plan(plan: Plan) -> Conditions:
-    """Return the aircraft, speed, weather, autopilot and ground that a plan was made for."""
+    """Return the aircraft, speed, weather, autopilot and terrain that a plan was made for."""
     aircraft, _ = find_airframe(plan.scenario)
     autopilot = load_autopilot(plan.scenario, aircraft)
     return conditions_of(plan.scenario, aircraft.name, cruise_airspeed(plan.scenario, aircraft, autopilot), autopilot)
 
 
 def what_blocks(plan: Plan) -> tuple[str, ...]:
-    """Return the reasons why a plan is not feasible, a line each; empty for a feasible plan.
+    """Return the reasons why a plan is not feasible, one line each; empty for a feasible plan.
 
     >>> import planfly
     >>> planfly.what_blocks(planfly.plan("tight", seed=1))

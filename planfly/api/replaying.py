@@ -17,9 +17,9 @@ from world.errors import LogError
 from world.extras import needs_extra
 from world.running_clock import RunningClock
 
-# Numbers that may be meant as the port of a ground station.
+# Numbers that the user may mean as the port of a ground station.
 _PORTS = range(1024, 65536)
-# Origin of web pages: a scheme, a lower-case host name, as browsers write it, and a port.
+# Origin of web pages with a scheme, a lower-case host name, as browsers write it, and a port.
 _ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[a-z0-9._\[\]:-]+")
 # Frame rate of the instruments, Hz.
 _FRAMES = 10.0
@@ -27,12 +27,12 @@ _FRAMES = 10.0
 _STATION_TIMEOUT_S = 10.0
 
 
-def _opened(log: FlightLog | str | Path) -> FlightLog:
+def _open_log(log: FlightLog | str | Path) -> FlightLog:
     return log if isinstance(log, FlightLog) else read_log(log)
 
 
 def replayed_part(log: FlightLog, start: float | None, end: float | None) -> tuple[float, float]:
-    """Return start and end of the replayed part, s of the flight.  Raises LogError if the part is empty."""
+    """Return start and end of the replayed part in flight time, s.  Raises LogError if the part is empty."""
     check_arguments(start=start, end=end)
     first = start if start is not None else float(log.track.time[0])
     last = log.end_time if end is None else min(end, log.end_time)
@@ -52,9 +52,10 @@ def replayed_part(log: FlightLog, start: float | None, end: float | None) -> tup
 def timeline(
     log: FlightLog | str | Path, *, start: float | None = None, end: float | None = None
 ) -> tuple[TimelineEntry, ...]:
-    """Return the timeline of a flight: legs, turns, clearances, threats and events in order of time.
+    """Return the timeline of a flight, with its legs, turns, clearances, threats and events in order of time.
 
-    log: a flight log, or its path.  start, end: of the part that is listed, s of the flight; None for all of it.
+    log: a flight log, or its path.
+    start, end: start and end of the listed part in flight time, s; None for the start or end of the flight.
     Raises a `planfly.PlanflyError` for bad input.
 
     >>> import planfly
@@ -62,21 +63,21 @@ def timeline(
     >>> planfly.timeline(example_log(), start=20.0)[0].text
     'turn left 14.0° at waypoint 1 (item 2), peak bank 0.0°'
     """
-    found = _opened(log)
+    found = _open_log(log)
     first, last = (-math.inf, math.inf) if start is None and end is None else replayed_part(found, start, end)
     return tuple(entry for entry in list_timeline(found) if first <= entry.time <= last)
 
 
 @with_warm_up()
 def instruments(log: FlightLog | str | Path) -> Instruments:
-    """Return the instruments of a recorded flight; `Instruments.frame` gives their text lines at a time.
+    """Return the instruments of a recorded flight; `Instruments.frame` returns their text lines at a given time.
 
     >>> import planfly
     >>> from logs.recording.example_log import example_log
     >>> len(planfly.instruments(example_log()).frame(12.0)) > 10
     True
     """
-    return make_instruments(_opened(log))
+    return make_instruments(_open_log(log))
 
 
 def replay(
@@ -87,13 +88,13 @@ def replay(
     speed: float | None = None,
     width: int | Callable[[], int] = 80,
 ) -> Iterator[tuple[float, list[str]]]:
-    """Play a flight in real time, as the command does: ten times a second, and once at its end.
+    """Play a flight in real time, ten times a second and once at its end, as the command does.
 
-    start, end: of the part that is played, s of the flight; None for all of it.  speed: times real time, 1 if None.
-    width: of the lines, in characters, at least 60, or a function that returns it for each frame.
-    Yields the time, s of the flight, and the instruments as lines of text.  The replay also pauses while the machine
-    sleeps.
-    Raises a `planfly.PlanflyError` for bad input, at once.
+    start, end: start and end of the played part in flight time, s; None for the start or end of the flight.
+    speed: multiple of real time, 1 if None.
+    width: width of the lines in characters, at least 60, or a function that returns the width for each frame.
+    Yields the flight time, s, and the instruments as lines of text.  The replay pauses while the machine sleeps.
+    Raises a `planfly.PlanflyError` for bad input when it is called, not at the first frame.
 
     >>> import planfly
     >>> from logs.recording.example_log import example_log
@@ -101,12 +102,12 @@ def replay(
     20.1
     """
     check_arguments(speed=speed)
-    found = _opened(log)
+    found = _open_log(log)
     first, last = replayed_part(found, start, end)
-    return _played(instruments(found), first, last, speed or 1.0, width)
+    return _play_frames(instruments(found), first, last, speed or 1.0, width)
 
 
-def _played(
+def _play_frames(
     shown: Instruments, first: float, last: float, speed: float, width: int | Callable[[], int]
 ) -> Iterator[tuple[float, list[str]]]:
     played, now = RunningClock(), first
@@ -131,20 +132,21 @@ def movie(
     """Draw a flight as a film.
 
     out: a .gif, an .mp4 (which needs ffmpeg), or a folder for PNG frames.
-    start, end: of the part that is drawn, s of the flight; None for all of it.
-    speed: times real time; None for a film of 20 s.  overwrite: True replaces an existing target.
+    start, end: start and end of the drawn part in flight time, s; None for the start or end of the flight.
+    speed: multiple of real time; None for a film of 20 s.
+    overwrite: True replaces an existing target.
     Returns the files written.  Raises a `planfly.PlanflyError` for bad input.
     """
     # Imported here: only films need matplotlib.
     from planfly.replays.movie import write_movie
 
     check_arguments(speed=speed)
-    found = _opened(log)
+    found = _open_log(log)
     first, last = replayed_part(found, start, end)
     return tuple(write_movie(found, Path(out), first, last, speed=speed, overwrite=overwrite))
 
 
-def _never() -> bool:
+def _never_stop() -> bool:
     return False
 
 
@@ -163,16 +165,19 @@ def play_to_foxglove(
     port: int = 8765,
     allow_origin: str | Sequence[str] = (),
     wait: float | None = None,
-    stop: Callable[[], bool] = _never,
+    stop: Callable[[], bool] = _never_stop,
     on_message: Callable[[str], None] = _ignore,
 ) -> None:
     """Play a flight to Foxglove on this machine over WebSocket; needs the extra ``planfly[foxglove]``.
 
-    start, end: of the part that is played, s of the flight; None for all of it.  speed: times real time, 1 if None.
-    port: 0 for any free port.  wait: time to wait for the first viewer, s; None waits without limit.
-    allow_origin: web pages that may connect in addition to Foxglove's own, each as "https://HOST"; several are a
-    sequence, or separated by commas.
-    stop: polled continuously; once it returns True the call returns.  on_message: called with the address.
+    start, end: start and end of the played part in flight time, s; None for the start or end of the flight.
+    speed: multiple of real time, 1 if None.
+    port: port of the server, or 0 for any free port.
+    wait: maximum time to wait for the first viewer, s; None waits without limit.
+    allow_origin: origins of web pages that may connect in addition to Foxglove's own, such as "https://HOST", as a
+    sequence or separated by commas.
+    stop: polled continuously; once it returns True the call returns.
+    on_message: called with the address.
     Raises a `planfly.PlanflyError` for bad input, and if no client subscribes in time.
     """
     # Imported here: only this function needs foxglove-sdk.
@@ -180,8 +185,8 @@ def play_to_foxglove(
 
     check_arguments(speed=speed, port=port, wait=wait)
     given = allow_origin.split(",") if isinstance(allow_origin, str) else allow_origin
-    allowed = [_origin(one.strip()) for one in given if one.strip()]
-    found = _opened(log)
+    allowed = [_checked_origin(one.strip()) for one in given if one.strip()]
+    found = _open_log(log)
     first, last = replayed_part(found, start, end)
     foxglove_server.play_to_foxglove(
         found,
@@ -196,8 +201,8 @@ def play_to_foxglove(
     )
 
 
-def _origin(text: str) -> str:
-    """Return the origin of web pages, as browsers state it.  Raises LogError for an invalid origin."""
+def _checked_origin(text: str) -> str:
+    """Return the origin if browsers would write it like this.  Raises LogError for an invalid origin."""
     if not _ORIGIN.fullmatch(text):
         allowed = "the origin of a web page is expected, such as https://example.com or http://localhost:8080"
         raise LogError.of_argument("allow_origin", text, allowed)
@@ -215,14 +220,17 @@ def play_to_stations(
     sign_key: str | Path | None = None,
     speed: float | None = None,
     wait: float | None = None,
-    stop: Callable[[], bool] = _never,
+    stop: Callable[[], bool] = _never_stop,
     on_message: Callable[[str], None] = _ignore,
 ) -> None:
-    """Play a flight into MAVLink ground stations as if it were flown now; needs ``planfly[live]``.
+    """Play a flight to MAVLink ground stations as if it were flown now; needs ``planfly[live]``.
 
-    to: addresses of the stations, IP:PORT, one or several.  bind, allow, sign_key: as of `planfly.serve`.
-    speed: times real time, 1 if None.  wait: time to wait for the first station, s; 10 if None.
-    stop: polled continuously; once it returns True the call returns.  on_message: called with one line for each event.
+    to: addresses of the stations, IP:PORT, one or several.
+    bind, allow, sign_key: see `planfly.serve`.
+    speed: multiple of real time, 1 if None.
+    wait: maximum time to wait for the first station, s; 10 if None.
+    stop: polled continuously; once it returns True the call returns.
+    on_message: called with one line for each event.
     Raises a `planfly.PlanflyError` for bad input, and if no station answers in time.
     """
     # Imported here: only this function needs MAVLink.
@@ -231,7 +239,7 @@ def play_to_stations(
     check_arguments(speed=speed, wait=wait)
     access = link_access(to, bind, allow, sign_key)
     stations.play_to_stations(
-        _opened(log),
+        _open_log(log),
         access,
         speed=speed or 1.0,
         wait=_STATION_TIMEOUT_S if wait is None else wait,

@@ -1,4 +1,4 @@
-"""Figures, reports and comparisons of flights."""
+"""Draw figures of flights, write reports, and compare flights."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +25,7 @@ from world.html_table import html_table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Flight or plan to report.
+# Flight or plan to report on.
 Source = FlightLog | FlownMission | Plan | str | Path
 
 
@@ -33,8 +33,9 @@ Source = FlightLog | FlownMission | Plan | str | Path
 class WrittenReport:
     """Files that `planfly.report` wrote.
 
-    page: the HTML page, which needs no other file.  files: the page and the separate pictures.
-    verdict: verdict on the flight or plan shown.
+    page: the HTML page, which needs no other file.
+    files: the page and the separate pictures.
+    verdict: verdict on the reported flight or plan.
     """
 
     page: Path
@@ -42,12 +43,12 @@ class WrittenReport:
     verdict: Verdict | None = None
 
     def _repr_html_(self) -> str:
-        """Return how a notebook shows it."""
+        """Return the HTML that a notebook shows."""
         return html_table(f"Report {self.page}", [(file.name,) for file in self.files])
 
 
-class _Shown(NamedTuple):
-    """Content of pictures and pages, and package versions of the flight, None for the installed ones."""
+class _ReportContent(NamedTuple):
+    """Content of pictures and pages, and the package versions of the flight, None for the installed versions."""
 
     setup: FlightSetup
     verdict: Verdict
@@ -74,7 +75,7 @@ def figures(source: Source) -> "dict[str, Figure]":
     # Imported here: only pictures need matplotlib.
     from logs.views.figures import draw_figures
 
-    shown = _shown(source)
+    shown = _report_content(source)
     return draw_figures(shown.setup, shown.track, shown.verdict)
 
 
@@ -87,11 +88,14 @@ def report(
     overwrite: bool = False,
     command: str = "planfly.report",
 ) -> WrittenReport:
-    """Write ``report.html`` and its figures into a folder, made if it is missing.
+    """Write ``report.html`` and its figures into a folder, which is made if it is missing.
 
-    source: as of `planfly.figures`.  out: the folder.  svg: True also writes the figures as SVG.
-    overwrite: True replaces results in the folder.  command: the command line that repeats the report, for the page.
-    Raises a `planfly.PlanflyError` for bad input, and for a folder that is not empty.
+    source: see `planfly.figures`.
+    out: the folder.
+    svg: True also writes the figures as SVG.
+    overwrite: True replaces results in the folder.
+    command: the command line that repeats the report, shown on the page.
+    Raises a `planfly.PlanflyError` for bad input, and without `overwrite` for a folder that is not empty.
 
     >>> import planfly, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -102,7 +106,7 @@ def report(
     from logs.recording.setup_attachments import package_versions
     from logs.views.report.page import write_report
 
-    shown = _shown(source)
+    shown = _report_content(source)
     folder = clean_folder(out, LOG_FIGURES, overwrite=overwrite)
     with stage("drawing", "drawing a report"):
         files = write_report(
@@ -148,7 +152,8 @@ def compare(
     """Judge and measure two flights in the same way, and compare them.
 
     first, second: flight logs, or their paths.
-    out: a folder for ``compare.html`` and its pictures; None draws none.  svg, overwrite: as of `planfly.report`.
+    out: a folder for ``compare.html`` and its pictures; None writes no files.
+    svg, overwrite: see `planfly.report`.
     Raises a `planfly.PlanflyError` for bad input.
 
     >>> import planfly, tempfile
@@ -167,11 +172,11 @@ def compare(
     return found
 
 
-def _shown(source: Source) -> _Shown:
+def _report_content(source: Source) -> _ReportContent:
     if isinstance(source, Plan):
         setup = open_flight(source, {})
         return _Shown(setup, judge_mission(setup))
     if isinstance(source, FlownMission):
-        return _Shown(source.setup, source.verdict, source.track, source.ended, source.events)
+        return _ReportContent(source.setup, source.verdict, source.track, source.ended, source.events)
     log = source if isinstance(source, FlightLog) else read_log(source)
-    return _Shown(log.setup, judge_log(log), log.track, log.ended, log.events, log.versions)
+    return _ReportContent(log.setup, judge_log(log), log.track, log.ended, log.events, log.versions)

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Suggested:
-    """A remedy and the returns with it, flown by the control law; the least certain ones also in JSBSim."""
+    """A remedy, and the returns flown with it by the simulated ArduPlane; the least certain returns also in JSBSim."""
 
     remedy: Remedy
     returns: Returns
@@ -64,11 +64,11 @@ class ReturnsFound:
     """Result of `planfly.returns`.
 
     setup: the flown mission, its aircraft and its autopilot.
-    returns: all returns, and the same in ranges of seconds, the worst first.
+    returns: all returns, also grouped in ranges of seconds, the worst first.
     glides: places that can be reached after an engine failure; empty if they were not requested.
-    suggested: remedies, the simplest first, each with the returns it leads to; empty if none were requested.
+    suggested: remedies, the simplest first, each with its returns; empty if none were requested.
     files: files written; empty if no folder was named.
-    by_program: the worst returns, flown by ArduPlane itself; None if no program was named.
+    by_program: the worst returns, flown by the ArduPlane program; None if no program was named.
     """
 
     setup: FlightSetup
@@ -95,7 +95,7 @@ class ReturnsFound:
 
     @property
     def lines_of_causes(self) -> tuple[str, ...]:
-        """Triggers of a return, settings that trigger none, and the end of a return."""
+        """Lines on the triggers of a return, the settings that trigger no return, and the end of a return."""
         return (*causes_text(self.returns.causes), *landing_text(self.returns))
 
     @property
@@ -105,7 +105,7 @@ class ReturnsFound:
 
     @property
     def lines_of_program(self) -> tuple[str, ...]:
-        """Outcomes of the worst returns by the ArduPlane program and by the law; empty if it flew none."""
+        """Lines on the worst returns by the ArduPlane program and the simulated ArduPlane; empty without a program."""
         if self.by_program is None:
             return ()
         return (self.by_program.headline(), *self.by_program.lines(self.returns, self.setup.scenario))
@@ -117,17 +117,17 @@ class ReturnsFound:
 
     @property
     def headline_of_glides(self) -> str:
-        """Reach of the aircraft without its engine, in one line."""
+        """One line on the reach of the aircraft without its engine."""
         return glides_headline(self.glides)
 
     @property
     def lines_of_glides(self) -> tuple[str, ...]:
-        """Description of each range of seconds with the same reachable place without the engine, by time."""
+        """One line for each range of seconds with the same best glide destination, by time."""
         return tuple(glide_range_text(one, self.glides) for one in self.glides.ranges)
 
     @property
     def lines_of_suggestions(self) -> tuple[str, ...]:
-        """Remedies in words, each with the outcome of its returns."""
+        """One line for each remedy, with the outcome of its returns."""
         return tuple(remedy_text(one.remedy, one.returns, self.setup.scenario) for one in self.suggested)
 
     @property
@@ -177,13 +177,16 @@ def returns(
 ) -> ReturnsFound:
     """Fly and judge returns to launch from every place on a flight, and find places in gliding range.
 
-    what: a `Plan`, the path of a plan.json, .waypoints or .plan, which is flown first; or a flight: a result of
-    `planfly.fly`, a flight log or its path, or an autopilot's log.
-    every: time between two returns, s.  suggest: True looks for remedies that make all returns safe.
-    sitl: ArduPlane's program, which then also flies the worst ``points`` returns, spaced far apart.
-    out: folder for pictures; None writes none.  overwrite: True replaces results in the folder.
-    options: for a plan or mission, as of `planfly.fly`; for a flight, only terrain.
-    plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
+    what: a `Plan`, or the path of a plan.json, .waypoints or .plan, which is flown first; or a flight, which is a
+    result of `planfly.fly`, a flight log or its path, or an autopilot's log.
+    every: time between two returns, s.
+    suggest: True looks for remedies that make all returns safe.
+    sitl: the ArduPlane program, which then also flies the worst returns, spaced far apart.
+    points: number of returns that the program flies.
+    out: folder for pictures; None writes no pictures.
+    overwrite: True replaces results in the folder.
+    options: for a plan or mission, see `planfly.fly`; for a flight, only terrain.
+    plan, flight, datum: for an autopilot's log, see `planfly.import_log`.
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a home.
 
     >>> import planfly
@@ -193,34 +196,36 @@ def returns(
     """
     check_arguments(every=every, points=points, seed=options["seed"], flight=options["flight"], datum=options["datum"])
     path = Path(what) if isinstance(what, str | Path) else None
-    asked = _asked(every, suggest, out, sitl, points, overwrite=overwrite)
+    asked = _check_request(every, suggest, out, sitl, points, overwrite=overwrite)
     if path is not None and is_imported_log(path):
         refuse(str(path), {"seed": options["seed"], "nav": options["nav"]}, _AS_FLOWN)
-        return _of_import(_imported(path, options), asked)
+        return _judge_imported_flight(_read_imported_flight(path, options), asked)
     refuse(str(path or "mission"), options_of_log(options), "goes with an imported log")
     what = read_log(path) if path is not None and is_log(path) else what
     mission = mission_options(options)
     if isinstance(what, FlightLog | FlownMission):
         given: dict[str, Any] = {**mission, "terrain": None, "fence": options["fence"] or None}
         refuse(str(path or "flight"), given, _AS_FLOWN)
-        return _judged(_over(what.setup, options["terrain"]), what.track, asked, what.ended or INTERRUPTED)
-    return _of_mission(open_flight(what, mission), asked)
+        return _judge_flight(
+            _with_terrain(what.setup, options["terrain"]), what.track, asked, what.ended or INTERRUPTED
+        )
+    return _judge_mission(open_flight(what, mission), asked)
 
 
-def _imported(path: Path, options: LogOptions) -> "ImportedFlight":
+def _read_imported_flight(path: Path, options: LogOptions) -> "ImportedFlight":
     # Imported here: only this call needs the libraries that read the logs of other programs.
     from planfly.api.imported import read_imported
 
     return read_imported(path, **options)
 
 
-def _over(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
-    """Return the setup over the named terrain, or as it is if none is named."""
+def _with_terrain(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
+    """Return the setup over the named terrain, or unchanged if no terrain is named."""
     return setup if terrain is None else setup.in_scenario(over_terrain(setup.scenario, str(terrain)))
 
 
-class _Asked(NamedTuple):
-    """Request for returns: their number, remedies, returns flown by a program, and a folder for pictures."""
+class _ReturnsRequest(NamedTuple):
+    """Request for returns, with their interval, remedies, a program that also flies them, and a folder for pictures."""
 
     every: float
     suggest: bool
@@ -230,34 +235,34 @@ class _Asked(NamedTuple):
     points: int
 
 
-def _asked(
+def _check_request(
     every: float, suggest: bool, out: str | Path | None, sitl: str | Path | None, points: int, *, overwrite: bool
-) -> _Asked:
-    """Check a request.
+) -> _ReturnsRequest:
+    """Check a request for returns, and return it.
 
-    Raises PlanflyError for a folder that is a file or is not empty, and for a wrong program.
+    Raises PlanflyError for a folder that is a file or is not empty, and for a program that is not ArduPlane.
     """
     program = named_program(sitl)
     if program is not None:
         refuse_program(program)
     if out is not None:
         refuse_folder(Path(out), overwrite)
-    return _Asked(every, suggest, None if out is None else Path(out), overwrite, program, points)
+    return _ReturnsRequest(every, suggest, None if out is None else Path(out), overwrite, program, points)
 
 
-def _of_import(found: "ImportedFlight", asked: _Asked) -> ReturnsFound:
-    return _judged(found.setup, found.track, asked, found.ended)
+def _judge_imported_flight(found: "ImportedFlight", asked: _ReturnsRequest) -> ReturnsFound:
+    return _judge_flight(found.setup, found.track, asked, found.ended)
 
 
-def _of_mission(setup: FlightSetup, asked: _Asked) -> ReturnsFound:
+def _judge_mission(setup: FlightSetup, asked: _ReturnsRequest) -> ReturnsFound:
     """Fly a mission, and judge the returns of its flight."""
     return_world(setup)  # Raises errors before the flight.
     with stage("flying the mission"):
         flown = fly_and_judge(setup, airframe_of(setup), None, reference="never")
-    return _judged(flown.setup, flown.track, asked, flown.ended)
+    return _judge_flight(flown.setup, flown.track, asked, flown.ended)
 
 
-def _judged(setup: FlightSetup, track: Track, asked: _Asked, ended: str) -> ReturnsFound:
+def _judge_flight(setup: FlightSetup, track: Track, asked: _ReturnsRequest, ended: str) -> ReturnsFound:
     world = return_world(setup)
     starts = return_starts(setup, track, asked.every)
     with stage(f"flying {len(starts)} returns", "flying returns"):
@@ -271,7 +276,7 @@ def _judged(setup: FlightSetup, track: Track, asked: _Asked, ended: str) -> Retu
         with stage("gliding from there without the engine"):
             found = ReturnsFound(setup, judged, judge_glides(world, starts), by_program=flown)
         if asked.suggest and not found.safe and found.returns.each:
-            found = replace(found, suggested=_suggested(world, starts, found, asked.every))
+            found = replace(found, suggested=_suggest_remedies(world, starts, found, asked.every))
         if asked.folder is None or not found.returns.each:
             return found
         with stage("drawing", "drawing returns"):
@@ -292,7 +297,9 @@ def _judged(setup: FlightSetup, track: Track, asked: _Asked, ended: str) -> Retu
     return replace(found, files=tuple(folder / name for name in names))
 
 
-def _suggested(world: ReturnWorld, starts: ReturnStarts, found: ReturnsFound, every: float) -> tuple[Suggested, ...]:
+def _suggest_remedies(
+    world: ReturnWorld, starts: ReturnStarts, found: ReturnsFound, every: float
+) -> tuple[Suggested, ...]:
     """Return the suggested remedies that improve the returns."""
     # Remedies do not help a return that sinks to the ground in a take-off or a landing.
     judged = [one.time for one in found.returns.each]

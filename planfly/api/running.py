@@ -61,9 +61,10 @@ class Round:
 class RunResult:
     """Result of `planfly.run`.
 
-    scenario: its name.  seed: of planner and turbulence.
+    scenario: name of the scenario.
+    seed: seed of planner and turbulence.
     folder: the folder of the files; the files of earlier rounds are in its subfolders round-0, round-1, ...
-    rounds: at least one; the verdict of the last round is the answer.
+    rounds: one or more rounds; the verdict on the last round is the answer.
     ended: reason why no further round followed.
     """
 
@@ -75,12 +76,12 @@ class RunResult:
 
     @property
     def verdict(self) -> Verdict:
-        """Verdict of the last round."""
+        """Verdict on the last round."""
         return self.rounds[-1].verdict
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Files in the folder, without its subfolders."""
+        """Files in the folder, without those in its subfolders."""
         found = (self.folder / name for name in (*RUN_FILES, "rounds.json"))
         return tuple(file for file in found if file.exists())
 
@@ -125,12 +126,13 @@ def run(
     """Plan, export, fly, record, judge and report into one folder.
 
     scenario: an embedded name, a TOML file's path, or a `Scenario`.
-    seed: of planner and turbulence; None takes the seed of the scenario, or 1.
-    refine: number of additional rounds, up to 20, each planned within limits tightened by the failures of the previous
-    flight.
-    out: the folder; {name} and {seed} in it stand for the scenario's name and the seed.
+    seed: seed of planner and turbulence; None takes the seed of the scenario, or 1.
+    refine: maximum number of additional rounds, up to 20, each planned within limits tightened by the failures of the
+    previous flight.
+    out: the folder, in whose name {name} and {seed} stand for the scenario's name and the seed.
     overwrite: True replaces results in the folder; in the default folder they are always replaced.
-    on_round: called with each round once it has ended.  The other keywords are as of `planfly.fly`.
+    on_round: called with each round when it has ended.
+    The other keywords are those of `planfly.fly`.
     Raises a `planfly.PlanflyError` for bad input, before anything is written.
 
     >>> import planfly, tempfile
@@ -155,11 +157,11 @@ def run(
     reference: FlyReference = "always" if options["levels"] else "failed"
     task = _Task(world, airframe, number, line, folder, program, limits, 60 // options["log_hz"], reference)
     with contextlib.ExitStack() as held:
-        return _rounds(task, refine, held, on_round)
+        return _fly_rounds(task, refine, held, on_round)
 
 
 def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
-    """Return the command line of ``planfly run`` for options by their keywords.
+    """Return the command line of ``planfly run`` with the given options, which are named by keyword.
 
     >>> command_line("tight", 3, {"wind": (8.0, 270.0), "autopilot": "px4", "params": "my file.parm"})
     "planfly run tight --seed 3 --wind 8,270 --autopilot px4 --params 'my file.parm'"
@@ -174,12 +176,12 @@ def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
     return " ".join(words)
 
 
-def _rounds(
+def _fly_rounds(
     task: _Task, refine: int, held: contextlib.ExitStack, on_round: Callable[[Round], None] | None
 ) -> RunResult:
-    """Plan and fly until a round flies or no round is left.
+    """Plan and fly until a round flies or no round remains.
 
-    held: keeps the folder from the first plan on.
+    held: stack that takes the lock of the folder, after the first plan.
     """
     scenario, airframe, folder = task.scenario, task.airframe, task.folder
     flown: list[Round] = []
@@ -199,7 +201,7 @@ def _rounds(
             on_round(flown[-1])
         return flown[-1].verdict, flown[-1].flown
 
-    _, entries = refine_rounds(scenario, refine, one_round, lambda number: _keep(folder, number))
+    _, entries = refine_rounds(scenario, refine, one_round, lambda number: _keep_round(folder, number))
     if refine:
         write_whole(folder / "rounds.json", json.dumps(entries, indent=1) + "\n")
     *earlier, last = (replace(one, changes=tuple(entry["changes"])) for one, entry in zip(flown, entries, strict=True))
@@ -208,7 +210,7 @@ def _rounds(
 
 
 def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
-    """Write a plan and its mission, and fly it if it is feasible."""
+    """Write a plan and its mission, fly the plan if it is feasible, and write the report."""
     # Imported here: only the report needs matplotlib.
     from logs.views.report.page import write_report
 
@@ -259,7 +261,7 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
     )
 
 
-def _keep(folder: Path, number: int) -> None:
+def _keep_round(folder: Path, number: int) -> None:
     """Move the results of a round to its own subfolder before the next round."""
     kept = folder / f"round-{number}"
     kept.mkdir(exist_ok=True)

@@ -1,4 +1,4 @@
-"""Serve a simulated MAVLink vehicle that ground stations find, upload to, arm, start and follow."""
+"""Serve a simulated MAVLink vehicle, to which ground stations connect to upload missions, arm and follow the flight."""
 
 import ipaddress
 from collections.abc import Callable, Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from flight.live.link import Access
 
 
-def _never() -> bool:
+def _never_stop() -> bool:
     return False
 
 
@@ -36,7 +36,7 @@ def serve(
     sign_key: str | Path | None = None,
     speed: float = 1.0,
     log: str | Path = "runs/serve",
-    stop: Callable[[], bool] = _never,
+    stop: Callable[[], bool] = _never_stop,
     on_message: Callable[[str], None] = _ignore,
     **options: Unpack[MissionOptions],
 ) -> None:
@@ -49,7 +49,7 @@ def serve(
     speed: times real time, 0.1 to 100.  log: the folder of the flight logs.
     stop: polled continuously.  on_message: called with one line for each event.
 
-    A script must call it under ``if __name__ == "__main__":``, because the flight processes import the script.
+    A script must call this function under ``if __name__ == "__main__":``, because flight processes import the script.
     Raises a `planfly.PlanflyError` for bad input.
     """
     # Imported here: only this function needs MAVLink.
@@ -66,43 +66,47 @@ def serve(
 
 
 # ----------------------------------------------------------------------
-# Access to a vehicle.
+# Check the addresses that may access a vehicle.
 
 
 def link_access(
     to: str | Sequence[str], bind: str, allow: str | Sequence[str] | None = (), sign_key: str | Path | None = None
 ) -> "Access":
-    """Return the addresses and the key of a link.
+    """Return the addresses and the signing key of a link.
 
-    to: IP:PORT of each station.  bind: IP:PORT of the vehicle.  allow: IP addresses of stations beyond this machine.
-    Several are a sequence, or separated by commas.  Raises FlightError or PlanflyError.
+    to: IP:PORT of each station.
+    bind: IP:PORT of the vehicle.
+    allow: IP addresses of stations on other machines.
+    Several addresses are a sequence, or separated by commas.  Raises FlightError or PlanflyError for invalid ones.
 
     >>> link_access("127.0.0.1:14550", "127.0.0.1:0").to
     (('127.0.0.1', 14550),)
     """
     from flight.live.link import Access, check_access, read_key
 
-    allowed = frozenset(_ip("allow", part.strip()) for part in _parts(allow or ()) if part.strip())
+    allowed = frozenset(_parse_ip("allow", part.strip()) for part in _split_addresses(allow or ()) if part.strip())
     key = read_key(Path(sign_key)) if sign_key else None
-    access = Access(_address("bind", bind), tuple(_address("to", text) for text in _parts(to)), allowed, key)
+    access = Access(
+        _parse_address("bind", bind), tuple(_parse_address("to", text) for text in _split_addresses(to)), allowed, key
+    )
     check_access(access)
     return access
 
 
-def _parts(given: str | Sequence[str]) -> Sequence[str]:
+def _split_addresses(given: str | Sequence[str]) -> Sequence[str]:
     return given.split(",") if isinstance(given, str) else given
 
 
-def _address(argument: str, text: str) -> tuple[str, int]:
+def _parse_address(argument: str, text: str) -> tuple[str, int]:
     host, colon, port = text.strip().rpartition(":")
     if not colon and port.isdigit():
         raise FlightError.of_argument(argument, text, f"IP:PORT is expected, such as 127.0.0.1:{port}")
     if not port.isdigit() or not 0 <= int(port) <= 65535:
         raise FlightError.of_argument(argument, text, "IP:PORT is expected, with a port 0..65535")
-    return _ip(argument, host.strip("[]")), int(port)
+    return _parse_ip(argument, host.strip("[]")), int(port)
 
 
-def _ip(argument: str, text: str) -> str:
+def _parse_ip(argument: str, text: str) -> str:
     try:
         return str(ipaddress.ip_address(text))
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""Judge how much of each photo line of a survey can be used, and suggest remedies for lost lines."""
+"""Judge which part of each photo line of a survey is usable, and suggest remedies for lost lines."""
 
 from dataclasses import dataclass, replace
 from itertools import count
@@ -50,13 +50,13 @@ from world.scenario import Scenario
 class SurveyFound:
     """Result of `planfly.survey`.
 
-    setup, track, verdict: of the flight.
-    surveys: surveys of the mission, in flying order.
-    lines: for each survey, the measures of its flown lines; None if it was not flown.
-    overlaps: for each survey, the overlap of its photos; None if its camera is not known.
-    remedies: remedies that help, each flown; empty if none were requested or nothing is lost.
-    nearest: the trial that came closest, if remedies were requested and none helps.
-    kept: reason why no other layout was tried, in words.
+    setup, track, verdict: setup, track and verdict of the flight.
+    surveys: surveys of the mission, in the order flown.
+    lines: measures of each line of each survey; None for a line that was not flown.
+    overlaps: overlap of the photos of each survey; None if it cannot be measured, for instance without a camera.
+    remedies: remedies that help, each tested by a flight; empty if none were requested or nothing is lost.
+    nearest: the trial that came closest to success, if remedies were requested and none helps.
+    kept: reason why no other layout was tried, for messages.
     files: files written; empty if no folder was named.
     """
 
@@ -73,7 +73,7 @@ class SurveyFound:
 
     @property
     def usable(self) -> bool:
-        """True if enough of every line can be used and the photos overlap as required."""
+        """True if enough of every line is usable and the photos overlap as required."""
         return all(usable(one) for lines in self.lines for one in lines) and all(map(kept_overlap, self.overlaps))
 
     @property
@@ -83,7 +83,7 @@ class SurveyFound:
 
     @property
     def lines_of_lines(self) -> tuple[str, ...]:
-        """Description of each survey and its lines."""
+        """Lines that describe each survey and its photo lines."""
         out = []
         for survey, lines, overlap in zip(self.surveys, self.lines, self.overlaps, strict=True):
             out += [survey_text(survey), *overlap_lines(overlap)]
@@ -92,12 +92,12 @@ class SurveyFound:
 
     @property
     def lines_of_remedies(self) -> tuple[str, ...]:
-        """Description of the remedies."""
+        """Lines that describe the remedies."""
         return tuple(remedy_text(one, self.setup.path.length) for one in self.remedies)
 
     @property
     def lines_without_remedy(self) -> tuple[str, ...]:
-        """Statement that no remedy was found, the closest trial, and the reason why no other layout was tried."""
+        """Lines that state that no remedy was found, the closest trial, and why no other layout was tried."""
         said = [
             "no turn-around, order, course, parameter or airspeed alone was found that would help, nor longer"
             " turn-arounds with another parameter or a slower flight"
@@ -133,15 +133,16 @@ def survey(
     what: the path of a .waypoints or .plan, which is flown; or a result of `planfly.fly`, or a flight log or its path.
     camera: sensor size across and along the track, and focal length, mm; optionally also the required overlaps along
     and across lines, percent; None takes the values of a .plan.
-    suggest: True looks for remedies that make all lines of a mission usable: longer turn-arounds, an interleave stride
-    (fly every n-th line), another course, an autopilot parameter, a slower flight; each is flown before it is named.
-    out: folder for a picture of the lines, and for the remedies as a .waypoints and a .param; None writes none.
+    suggest: True looks for remedies that make all lines of a mission usable.  Remedies are longer turn-arounds, an
+    interleave stride (fly every n-th line), another course, an autopilot parameter, and a slower flight; each is tested
+    by a flight before it is suggested.
+    out: folder for a picture of the lines, and for the remedies as a .waypoints and a .param; None writes no files.
     overwrite: True replaces results in the folder.
-    options: of a mission, as of `planfly.fly`.
+    options: options of a mission, see `planfly.fly`.
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a survey.
     """
     check_arguments(seed=options["seed"])
-    taken = _camera(camera)
+    taken = _parse_camera(camera)
     given: dict[str, Any] = {**options, "fence": options["fence"] or None, "suggest": suggest or None}
     if out is not None:
         refuse_folder(Path(out), overwrite)
@@ -153,16 +154,16 @@ def survey(
         source = what.setup.source
         if source is not None and "attitude" not in source.holds:
             raise LogError(f"{source.file}: no attitude: how far photos are banked is not known", file=source.file)
-        setup = _with_camera(what.setup.in_scenario(_with_lines(what.setup.scenario)), taken)
-        return _written(_of_flight(setup, what.track, what.ended or ""), out, overwrite)
+        setup = _with_camera(what.setup.in_scenario(_judging_parallel_lines(what.setup.scenario)), taken)
+        return _write_results(_judge_flown_survey(setup, what.track, what.ended or ""), out, overwrite)
 
     opened = open_flight(what, options)
-    setup = _with_camera(opened.in_scenario(_with_lines(opened.scenario)), taken)
-    return _written(_flown(setup, suggest), out, overwrite)
+    setup = _with_camera(opened.in_scenario(_judging_parallel_lines(opened.scenario)), taken)
+    return _write_results(_fly_survey(setup, suggest), out, overwrite)
 
 
-def _camera(numbers: tuple[float, ...] | None) -> Camera | None:
-    """Return the camera of a call.  Raises ArgumentError for invalid numbers."""
+def _parse_camera(numbers: tuple[float, ...] | None) -> Camera | None:
+    """Return the camera with the given numbers, or None for None.  Raises ArgumentError for invalid numbers."""
     if numbers is None:
         return None
     try:
@@ -193,13 +194,13 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
     return replace(setup, mission=replace(setup.mission, survey_plans=(*plans, SurveyPlan(None, 0.0, camera))))
 
 
-def _flown(setup: FlightSetup, suggest: bool) -> SurveyFound:
-    """Fly a mission, measure its lines, and look for remedies."""
+def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyFound:
+    """Fly a mission, measure its photo lines, and look for remedies if they are requested."""
     _require_survey(setup)
     airframe = airframe_of(setup)
     with stage(f"flying {flight_text(setup)}", "flying a survey") as advance:
         flown = fly_and_judge(setup, airframe, None, advance, reference="never")
-    found = _measured(flown.requirements, flown.track, flown.verdict)
+    found = _measure_survey(flown.requirements, flown.track, flown.verdict)
     if not suggest or found.usable:
         return found
     with stage("looking for what would help") as advance:
@@ -208,8 +209,8 @@ def _flown(setup: FlightSetup, suggest: bool) -> SurveyFound:
     return replace(found, remedies=tried.remedies, nearest=tried.nearest, kept=tried.kept)
 
 
-def _written(found: SurveyFound, out: str | Path | None, overwrite: bool) -> SurveyFound:
-    """Write the picture of the lines and the remedied missions, if a folder is named."""
+def _write_results(found: SurveyFound, out: str | Path | None, overwrite: bool) -> SurveyFound:
+    """Write the picture of the lines and the remedied missions if a folder is named; return the result with files."""
     if out is None:
         return found
     folder, chart = clean_folder(out, SURVEY_FILES, overwrite=overwrite), survey_chart(found.setup, found.track)
@@ -227,7 +228,7 @@ def _written(found: SurveyFound, out: str | Path | None, overwrite: bool) -> Sur
             write_whole(path, mission_text(remedy.mission, "waypoints"))
             files.append(path)
         if remedy.kind == "parameter":
-            # The parameters of the user's own file are included, because they were flown, too.
+            # Include the parameters of the user's own file, because they were flown, too.
             own = found.setup.autopilot.with_parameters(**{remedy.name: remedy.value}).parameters
             stated = {} if own is None else own.by_origin("file")
             path = folder / "parameter.param"
@@ -236,8 +237,8 @@ def _written(found: SurveyFound, out: str | Path | None, overwrite: bool) -> Sur
     return replace(found, files=tuple(files))
 
 
-def _with_lines(scenario: Scenario) -> Scenario:
-    """Return a scenario that judges all parallel lines as survey lines, as the call requests."""
+def _judging_parallel_lines(scenario: Scenario) -> Scenario:
+    """Return the scenario changed so that all parallel lines are judged as survey lines."""
     limits = scenario.limits.model_copy(update={"surveys": "lines"})
     return replace(scenario, limits=limits, spec=scenario.spec.model_copy(update={"limits": limits}))
 
@@ -252,14 +253,14 @@ def _require_survey(setup: FlightSetup) -> None:
         )
 
 
-def _of_flight(setup: FlightSetup, track: Track, ended: str) -> SurveyFound:
+def _judge_flown_survey(setup: FlightSetup, track: Track, ended: str) -> SurveyFound:
     """Judge and measure a flight that has already been flown."""
     _require_survey(setup)
     requirements = route_requirements(setup)
-    return _measured(requirements, track, judge_flight(setup, track, ended, requirements=requirements))
+    return _measure_survey(requirements, track, judge_flight(setup, track, ended, requirements=requirements))
 
 
-def _measured(requirements: RouteRequirements, track: Track, verdict: Verdict) -> SurveyFound:
+def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verdict) -> SurveyFound:
     setup, surveys = requirements.setup, requirements.surveys
     aligned = align_track(requirements, track) if len(track) else None
     lines = tuple(

@@ -1,4 +1,4 @@
-"""Mission, world, aircraft and dispersions shared by all flights of a campaign, and their variation by a draw."""
+"""Open the mission, world, aircraft and dispersions that a campaign's flights share, and vary them by a draw."""
 
 import hashlib
 import json
@@ -47,10 +47,10 @@ from world.wind import Wind
 class CampaignBase:
     """Mission of a campaign, and the dispersions around it.
 
-    scenario: the planned scenario; every flight flies `mission` in it, in its own wind.
-    airframe: the airframe in that scenario.
-    placed: the mission on the terrain that its planner knows, even if a flight has another terrain.
-    plan: the plan of the mission; None for a mission that was not planned here.
+    scenario: the planned scenario; every flight flies `mission` in this scenario, with its own wind.
+    airframe: the airframe in this scenario.
+    placed: the mission on the terrain that the planner knows, even if a flight has another terrain.
+    plan: the plan of the mission; None for a mission from a file.
     seed: seed of the draws.
     name: stem of file names.
     """
@@ -65,15 +65,15 @@ class CampaignBase:
     name: str
 
     def nominal_setup(self) -> FlightSetup:
-        """Return the setup without any draw.  Raises PlanflyError for a mission that cannot be laid out."""
+        """Return the setup without any variation.  Raises PlanflyError for a mission without a valid route."""
         return make_setup(self.scenario, self.airframe, self.mission, self.seed, plan=self.plan, placed=self.placed)
 
     def conditions(self) -> Conditions:
-        """Return the nominal conditions of the flights: aircraft, weather, world and autopilot."""
+        """Return the nominal conditions of the flights, which are aircraft, weather, world and autopilot."""
         return setup_conditions(self.nominal_setup())
 
     def world_hash(self) -> str:
-        """Return the hash of all inputs of flight k except the code: scenario, mission, model, dispersions and seed."""
+        """Return the hash of scenario, mission, model, dispersions and seed, all inputs of a flight except the code."""
         model = self.airframe.aircraft
         terrain = self.scenario.terrain
         parts = (
@@ -90,7 +90,7 @@ class CampaignBase:
 
 
 def is_mission_file(target: str) -> bool:
-    """Return True if the name of a target is the name of a plan or mission file, not of a scenario.
+    """Return True if a target is named like a plan or mission file, not like a scenario.
 
     >>> is_mission_file("a/plan.json"), is_mission_file("jacksboro"), is_mission_file("valley.toml")
     (True, False, False)
@@ -106,18 +106,18 @@ def open_campaign(
     planned: Path | None = None,
     advance: Advance | None = None,
 ) -> CampaignBase:
-    """Open the base of a campaign for a plan or mission file, or for a scenario, which is planned here.
+    """Open the base of a campaign for a plan or mission file, or for a scenario, in which a path is then planned.
 
     target: an embedded scenario's name, a scenario's TOML file, a plan, or a plan.json, .waypoints or .plan.
     options: options of the flights; the plan avoids their zones, and their seed is used for the plan and the draws.
-    planned: file of a scenario's plan: it is read if it exists, otherwise written.
+    planned: file of a scenario's plan, which is read if it exists, and written otherwise.
     Raises a PlanflyError for bad input, for a plan that is not feasible, and for dispersions whose medians give an
     aircraft that cannot fly.
     """
     if isinstance(target, Plan) or is_mission_file(target):
         setup = open_flight(target, options)
-        # The name alone, without the folder, which does not affect the flight.
-        base = _of_setup(setup, dispersions, Path(setup.mission.source).name)
+        # Use the name without the folder, because the folder does not affect the flight.
+        base = _base_of_setup(setup, dispersions, Path(setup.mission.source).name)
     else:
         fences, seed = read_named_fences(options.get("fence") or ()), options.get("seed")
         scenario = fences.on_scenario(named_scenario(target, options))
@@ -127,9 +127,9 @@ def open_campaign(
             raise MissionError(f"{planned}: is the plan of another scenario than {target}", file=str(planned))
         if planned is not None and not kept:
             write_whole(planned, plan_json(plan))
-        base = _of_plan(plan, fences, dispersions, choose_seed(scenario, seed))
+        base = _base_of_plan(plan, fences, dispersions, choose_seed(scenario, seed))
     check_middle(base)
-    # Refuse a mission that cannot be laid out here, before a worker does.
+    # Refuse a mission without a valid route now, not in a worker.
     base.nominal_setup()
     return base
 
@@ -143,7 +143,7 @@ def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) ->
     return plan
 
 
-def _of_plan(plan: Plan, fences: NamedFences, dispersions: Dispersions, seed: int) -> CampaignBase:
+def _base_of_plan(plan: Plan, fences: NamedFences, dispersions: Dispersions, seed: int) -> CampaignBase:
     scenario = plan.scenario
     airframe = load_airframe(scenario)
     mission = fences.on_mission(mission_of_plan(plan, airframe))
@@ -152,7 +152,7 @@ def _of_plan(plan: Plan, fences: NamedFences, dispersions: Dispersions, seed: in
     return CampaignBase(scenario, airframe, mission, placed, plan, dispersions, seed, scenario.name)
 
 
-def _of_setup(setup: FlightSetup, dispersions: Dispersions, source: str) -> CampaignBase:
+def _base_of_setup(setup: FlightSetup, dispersions: Dispersions, source: str) -> CampaignBase:
     mission = replace(setup.mission, source=source)
     scenario, airframe = setup.scenario, airframe_of(setup)
     placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
@@ -161,9 +161,9 @@ def _of_setup(setup: FlightSetup, dispersions: Dispersions, source: str) -> Camp
 
 
 def check_middle(base: CampaignBase) -> None:
-    """Raise SpreadError if the aircraft cannot hold level flight at the medians of the dispersions.
+    """Raise SpreadError if the aircraft cannot fly level at the medians of the dispersions.
 
-    Raise FlightError if it cannot hold level flight at all.
+    Raise FlightError if it cannot fly level at all.
     """
     medians = {one.quantity.name: one.value(0.5) for one in base.dispersions.varying}
     variation = Variation(
@@ -187,7 +187,7 @@ def check_middle(base: CampaignBase) -> None:
 
 
 def _check_draws(base: CampaignBase) -> None:
-    """Raise SpreadError for draws of properties that the aircraft's model does not have."""
+    """Raise SpreadError if the draws set properties that the aircraft's model does not have."""
     draws = base.dispersions.draws
     if draws is None:
         return
@@ -201,7 +201,7 @@ def _check_draws(base: CampaignBase) -> None:
 def _with_own_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
     """Return the dispersions with the draws stored next to the aircraft's model, if there are any.
 
-    A dispersions file that names other draws, or states how drag or control power vary, is used unchanged.
+    A dispersions file that names other draws, or has its own dispersions of drag or control power, is used unchanged.
     """
     file = aircraft.folder / DRAWS_FILE
     stated = dispersions.name != DEFAULT and any(one.quantity.name in DRAWN for one in dispersions.varying)
@@ -211,18 +211,18 @@ def _with_own_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions
 
 
 # ----------------------------------------------------------------------
-# A flight varied by its draw: the flown setup, and its differences from what the guidance knows.
+# Vary a flight by its draw, and note the differences that the guidance does not know.
 
-# Levels in order of increasing turbulence.
+# Levels of turbulence in increasing order.
 LEVELS: tuple[Literal["none", "light", "moderate"], ...] = ("none", "light", "moderate")
-# Largest wind speed of a varied flight, m/s.
+# Maximum wind speed of a varied flight, m/s.
 MAX_WIND = 40.0
-# Largest wind gradient of a varied flight, 1/s.
+# Maximum wind gradient of a varied flight, 1/s.
 MAX_GRADIENT = 0.05
 
 
 class GivenWind(NamedTuple):
-    """Mean wind that replaces the wind of a scenario: speed, m/s, and direction that it blows from, degrees."""
+    """Mean wind that replaces the scenario's wind, by its speed, m/s, and the direction it blows from, degrees."""
 
     speed: float
     from_deg: float
@@ -230,7 +230,7 @@ class GivenWind(NamedTuple):
 
 @dataclass(frozen=True)
 class VariedFlight:
-    """Setup with its own wind and terrain, and the rest of its draw."""
+    """Setup with the wind and terrain of a draw, and the rest of the draw."""
 
     setup: FlightSetup
     airframe: Airframe
@@ -240,17 +240,18 @@ class VariedFlight:
 def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
     """Return the flight of a draw.
 
+    Scenario and limits are adapted to the flight's wind, as in `planfly fly --wind`.  The autopilot does not know the
+    mass, drag, control power, drawn aircraft and start position.
+
     wind: mean wind that the draw varies; None for the wind of the scenario.
-    Scenario and limits are adapted to the flight's wind, as in `planfly fly --wind`; mass, drag, control power, the
-    drawn aircraft and the start position are unknown to the autopilot.
     """
     values = draw.values
-    scenario = _in_wind(base.scenario, values, wind)
+    scenario = _with_drawn_wind(base.scenario, values, wind)
     if values["terrain_height"] and scenario.terrain is not None:
         scenario = replace(scenario, terrain=_raise_terrain(scenario.terrain, values["terrain_height"]))
     battery = base.airframe.battery * values["battery"]
     draws = base.dispersions.draws
-    limits = _limits(base.airframe, scenario, drawn=draws is not None)
+    limits = _limits_in_wind(base.airframe, scenario, drawn=draws is not None)
     airframe = replace(base.airframe, limits=limits, battery=battery)
     setup = make_setup(scenario, airframe, base.mission, draw.seed, plan=base.plan, placed=base.placed)
     properties = () if draws is None else draws.properties(draw.seed)
@@ -261,8 +262,8 @@ def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> Varie
     return VariedFlight(setup, airframe, OffNominal(variation, offset))
 
 
-def _in_wind(scenario: Scenario, values: dict[str, float], mean: GivenWind | None) -> Scenario:
-    """Return the scenario in the wind of a draw; gusts use the flight's seed instead of the scenario's seed."""
+def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean: GivenWind | None) -> Scenario:
+    """Return the scenario with the wind of a draw; gusts use the flight's seed, not the scenario's seed."""
     old = scenario.wind
     about = mean or GivenWind(old.speed, math.degrees(old.from_course))
     speed = min(MAX_WIND, max(0.0, about.speed + values["wind_speed"]))
@@ -279,10 +280,10 @@ def _raise_terrain(terrain: Terrain, by: float) -> Terrain:
     return replace(terrain, heights=(terrain.heights + np.float32(by)).astype(np.float32))
 
 
-def _limits(airframe: Airframe, scenario: Scenario, *, drawn: bool) -> Limits:
-    """Return the airframe's limits in another wind; drawn: True if the flight's aircraft is a draw."""
+def _limits_in_wind(airframe: Airframe, scenario: Scenario, *, drawn: bool) -> Limits:
+    """Return the airframe's limits in the wind of a scenario.  drawn: True if the flight's aircraft is drawn."""
     old = airframe.limits
-    # The performance of a drawn aircraft is known exactly: it has no standard deviations.
+    # The performance of a drawn aircraft is known exactly, so it has no standard deviations.
     known = replace(old.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
     envelope = known if drawn else old.envelope
     limits = make_limits(scenario, envelope, old.airspeed, bank_limit(scenario, airframe.autopilot))

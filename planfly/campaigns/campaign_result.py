@@ -1,4 +1,4 @@
-"""Result of a campaign, its goal, and the command line that repeats it."""
+"""Define the result and the goal of a campaign, and the command line that repeats the campaign."""
 
 import shlex
 from collections.abc import Mapping
@@ -18,54 +18,54 @@ from world.errors import ArgumentError
 from world.html_table import html_table
 
 # ----------------------------------------------------------------------
-# The command line that repeats a campaign or a search for winds, shown on its page.
+# Write the command line that repeats a campaign or a search for winds, for its page.
 
 # Default values of the command line, which are omitted.
 _DEFAULTS = {"confidence": 0.95, "directions": 16, "most": 20.0}
 
 
 def campaign_line(target: str, goal: Goal, options: Mapping[str, object]) -> str:
-    """Return the ``planfly campaign`` command with a goal and options by name; omit options that are None or empty.
+    """Return the ``planfly campaign`` command for a goal and options by name, without options that are None or empty.
 
     >>> campaign_line("my plan.json", Goal(0.99, True, 5000), {"seed": 3, "wind": (8.0, 270.0), "fence": ["a", "b"]})
     "planfly campaign 'my plan.json' --prove 0.99 --flights 5000 --seed 3 --wind 8,270 --fence a --fence b"
     """
     target_option = {"prove" if goal.stops else "at_least": goal.target}
-    return _line(
+    return _command_line(
         "campaign", target, {**target_option, "flights": goal.flights, "confidence": goal.confidence, **options}
     )
 
 
 def winds_line(target: str, goal: WindsGoal, options: Mapping[str, object]) -> str:
-    """Return the ``planfly winds`` command, as `campaign_line` does.
+    """Return the ``planfly winds`` command for a goal and options, in the same way as `campaign_line`.
 
     >>> winds_line("jacksboro-air", WindsGoal(0.9, 0.95, 8, 20.0, 5000), {"seed": 1})
     'planfly winds jacksboro-air --prove 0.9 --directions 8 --seed 1'
     """
     flights = None if goal.flights == USUAL_WIND_FLIGHTS else goal.flights
     asked = {"prove": goal.target, "directions": goal.directions, "most": goal.most, "flights": flights}
-    return _line("winds", target, {**asked, "confidence": goal.confidence, **options})
+    return _command_line("winds", target, {**asked, "confidence": goal.confidence, **options})
 
 
-def _line(command: str, target: str, options: Mapping[str, object]) -> str:
+def _command_line(command: str, target: str, options: Mapping[str, object]) -> str:
     words = ["planfly", command, shlex.quote(target)]
     for name, value in options.items():
         if value is None or value == _DEFAULTS.get(name):
             continue
         for one in value if isinstance(value, list) else [value]:
-            words += [f"--{name.replace('_', '-')}", shlex.quote(_text(one))]
+            words += [f"--{name.replace('_', '-')}", shlex.quote(_option_text(one))]
     return " ".join(words)
 
 
-def _text(value: object) -> str:
+def _option_text(value: object) -> str:
     if isinstance(value, tuple):
-        return ",".join(_text(one) for one in value)
+        return ",".join(_option_text(one) for one in value)
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
 # Default number of flights of a campaign with a fixed number.
 USUAL_FLIGHTS = 300
-# Default largest number of flights of a campaign that stops by itself.
+# Default maximum number of flights of a campaign that stops by itself.
 MAX_FLIGHTS = 5000
 
 
@@ -73,8 +73,8 @@ MAX_FLIGHTS = 5000
 class CampaignResult:
     """Result of `planfly.campaign`.
 
-    columns: the table of flights, (n,) each.
-    table: its file; None if it was not kept.
+    columns: columns of the table of flights, (n,) each.
+    table: file of this table; None if it was not kept.
     """
 
     summary: CampaignSummary
@@ -93,22 +93,22 @@ class CampaignResult:
 
     @property
     def bounds(self) -> Interval:
-        """Lower and upper bound, each with the requested confidence; `answer` is based on them."""
+        """Lower and upper bound, each with the requested confidence; `answer` is based on these bounds."""
         return Interval(self.summary.estimate.lower, self.summary.estimate.upper)
 
     @property
     def answer(self) -> Answer:
-        """Answer to the goal: target reached, missed, or undecided."""
+        """Answer to the goal, which is that the target is reached, missed, or undecided."""
         return self.summary.estimate.answer
 
     @property
     def by_rule(self) -> dict[str, int]:
-        """Number of flights that failed each rule, for rules that failed at all."""
+        """Number of flights that failed each rule, for rules that at least one flight failed."""
         return {one.rule: one.flights for one in self.summary.by_rule}
 
     @property
     def flights(self) -> Any:
-        """Table of flights: a pandas DataFrame if pandas is installed, otherwise its columns as arrays by name."""
+        """Table of flights as a pandas DataFrame if pandas is installed, otherwise as arrays by name."""
         try:
             import pandas as pd
         except ImportError:
@@ -118,8 +118,8 @@ class CampaignResult:
     def shapes(self) -> dict[str, NDArray[np.float32]]:
         """Return the path data of each flight, read from the campaign's folder; one row per flight, NaN if unknown.
 
-        "clearance": (n, 150) least height above ground on each of 150 equal pieces of the route, m.
-        "crossings": (n, s, 2) distance to the right of and above each stop of the route at closest approach, m.
+        "clearance": minimum height above ground on each of 150 equal pieces of the route, (n, 150), m.
+        "crossings": distance right of and above each stop of the route at closest approach, (n, s, 2), m.
         Raises ValueError for a campaign without a kept folder.
         """
         if self.table is None:

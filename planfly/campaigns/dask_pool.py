@@ -1,4 +1,4 @@
-"""Workers of a running dask cluster that fly a campaign; no other module of planfly imports dask.
+"""Fly a campaign on the workers of a running dask cluster; no other module of planfly imports dask.
 
 Each worker proves by its fingerprint that it would fly exactly like this process, receives the campaign once, and gets
 at most as many flights at a time as it has threads.
@@ -31,7 +31,7 @@ from world.interruption import Interrupted
 
 # Timeout for the connection to a scheduler, s.
 _CONNECT_SECONDS = 20
-# Number of task names used in turn: dask keeps the last 100,000 tasks, and an old name is free again in time.
+# Number of task names that are used in turn; dask keeps the last 100,000 tasks, so an old name is free again in time.
 _NAMES = 4096
 
 
@@ -76,7 +76,7 @@ class DaskPool:
         client.register_plugin(CampaignPlugin(self._name, copy))
 
     def close(self) -> None:
-        """Remove the campaign from the workers; errors of workers that die meanwhile are ignored."""
+        """Remove the campaign from the workers, ignoring the errors of workers that die in the meantime."""
         with contextlib.suppress(OSError):
             self._client.unregister_worker_plugin(self._name)
 
@@ -86,9 +86,9 @@ class DaskPool:
         return max(1, sum(threads.values()))
 
     def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
-        """Fly requests as `following` returns them, and yield each when it is done, in any order.
+        """Fly the requests that `following` returns, and yield each flight when it is done, in any order.
 
-        following: returns the next request, or None for the time being; called again after each flight.
+        following: returns the next request, or None if there is none at present; called again after each flight.
         Raises the `world.errors.PlanflyError` of a flight, and OSError if the scheduler is lost.
         """
         flying: dict[tuple[str, int], FlightRequest] = {}
@@ -96,7 +96,7 @@ class DaskPool:
         done: Any = cast("Any", distributed.as_completed)(loop=self._client.loop)
 
         def send(request: FlightRequest) -> None:
-            # A tuple: dask takes its first word as the kind of task, and keeps a record of each kind permanently.
+            # Dask takes the first word of a tuple as the kind of task, and keeps a permanent record of each kind.
             key = next(key for number in self._numbers if (key := (self._name, number)) not in flying)
             flying[key] = request
             done.add(self._client.submit(fly_task, self._name, request, key=key, pure=False))
@@ -110,7 +110,7 @@ class DaskPool:
             while flying:
                 future = next(done)
                 request = flying.pop(future.key)
-                row = self._row(future, request)
+                row = self._result_row(future, request)
                 if row is None:
                     given_up[request] += 1
                 if row is None and given_up[request] < MAX_FAILURES:
@@ -118,18 +118,18 @@ class DaskPool:
                 else:
                     yield Flown(request, row or lost_row(self._base, request.index, LOST))
                     send_following()
-                # Released after the next task was sent: dask makes a new record for a kind that had no task left.
+                # Release it after the next task was sent, because dask makes a new record for a kind without a task.
                 future.release()
         except Interrupted:
-            # Do not wait for an answer: these flights end with the client.
+            # Do not wait for these flights, which end with the client.
             flying.clear()
             raise
         finally:
             if flying:
                 self._client.cancel(list(done.futures), force=True)
 
-    def _row(self, future: Any, request: FlightRequest) -> FlightRow | None:
-        """Return the row of a flight, or None if dask gave it up because workers died on it.
+    def _result_row(self, future: Any, request: FlightRequest) -> FlightRow | None:
+        """Return the row of a flight, or None if dask abandoned the flight because its workers died.
 
         Raises OSError if the scheduler is lost.
         """

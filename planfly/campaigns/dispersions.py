@@ -1,4 +1,4 @@
-"""Dispersions of a campaign: the varying quantities, their distributions, and the draw of each flight.
+"""Read the quantities that vary in a campaign and their distributions, and draw them for each flight.
 
 Dispersions are read from a TOML file with one table per quantity, named as in `QUANTITIES`.  `distribution` is the name
 of a distribution of `scipy.stats`, the other keys are its parameters, and `source` states the source of the numbers:
@@ -28,18 +28,18 @@ from world.errors import PlanflyError
 from world.files import read_small_file, toml_table, utf8_text
 
 # ----------------------------------------------------------------------
-# Quantities that may vary between the flights of a campaign: unit, effect on the flight, and range of each.
+# Quantities that may vary between the flights of a campaign, with their unit, effect on the flight, and range.
 
 
 class Quantity(NamedTuple):
     """Number that is drawn once per flight.
 
-    name: its table in a dispersions file, and its column in the table of flights.
-    combine: "added" to the value of the scenario, or "factor" on it.
+    name: name of the quantity's table in a dispersions file, and of its column in the table of flights.
+    combine: "added" if it is added to the value of the scenario, or "factor" if it multiplies that value.
     unit: unit of an added value; "" for a factor.
-    low, high: smallest and largest value that may be drawn; values beyond them are not realistic.
+    low, high: minimum and maximum value that may be drawn; values beyond them are not realistic.
     integer: True for a number of steps, with a discrete distribution.
-    title: name for people.
+    title: name shown to the user.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Quantity(NamedTuple):
         return 1.0 if self.combine == "factor" else 0.0
 
 
-# The numbers of a flight are drawn in this order, varying or not, so that the quantities do not affect one another.
+# All numbers of a flight are drawn in this order, even if they do not vary, so that a quantity does not affect others.
 QUANTITIES = (
     Quantity("wind_speed", "added", "m/s", -40.0, 40.0, "wind speed"),
     Quantity("wind_from", "added", "deg", -180.0, 180.0, "wind direction"),
@@ -81,16 +81,16 @@ NAMES = tuple(BY_NAME)
 DRAWN = ("drag", "control_power")
 # Name of the table with the file of draws.
 _AIRCRAFT = "aircraft"
-# Smallest share of a distribution within the range of its quantity; the rest of it is never drawn.
+# Minimum share of a distribution within the range of its quantity; the rest of the distribution is never drawn.
 INSIDE = 0.99
-# Largest size of a dispersions file, bytes.
+# Maximum size of a dispersions file, bytes.
 MAX_BYTES = 100_000
 # Name of the default dispersions in messages and reports.
 DEFAULT = "planfly's default dispersions"
 
 
 class SpreadError(PlanflyError):
-    """A dispersions file cannot be used."""
+    """Raised for a dispersions file that cannot be used."""
 
 
 @dataclass(frozen=True)
@@ -114,19 +114,19 @@ class Varying:
         return getattr(stats, self.distribution)(**dict(self.parameters))
 
     @cached_property
-    def _inside(self) -> tuple[float, float]:
-        """Return the distribution function just below the range, and at its upper end."""
+    def _range_limits(self) -> tuple[float, float]:
+        """Return the values of the distribution function just below the quantity's range and at its upper end."""
         low = self.quantity.low - (0.5 if self.quantity.integer else 0.0)
         return float(self._frozen.cdf(low)), float(self._frozen.cdf(self.quantity.high))
 
     @property
     def share_inside(self) -> float:
         """Return the share of the distribution within the quantity's range, 0 to 1; NaN for invalid parameters."""
-        low, high = self._inside
+        low, high = self._range_limits
         return high - low
 
     def value(self, uniform: float) -> float:
-        """Return the quantity at a share (0 to 1) of its distribution within its range (inverse distribution function).
+        """Return the inverse distribution function at a share, 0 to 1, of the distribution within the range.
 
         >>> mass = Varying(BY_NAME["mass"], "uniform", (("loc", 0.9), ("scale", 0.2)), "by hand")
         >>> round(mass.value(0.25), 6)
@@ -135,16 +135,17 @@ class Varying:
         return float(self.values(np.array([uniform]))[0])
 
     def values(self, uniform: Floats) -> Floats:
-        """Return the quantities (n,) at many shares (n,), as `value`."""
-        low, high = self._inside
+        """Return the values at many shares, (n,), as `value` does.  uniform: shares, (n,)."""
+        low, high = self._range_limits
         drawn = self._frozen.ppf(low + uniform * (high - low))
         return np.clip(drawn, self.quantity.low, self.quantity.high)
 
 
 @dataclass(frozen=True)
 class Dispersions:
-    """All varying quantities, in the order of `QUANTITIES`.  name: their source.
+    """All varying quantities, in the order of `QUANTITIES`.
 
+    name: source of the dispersions, in messages.
     draws: draws of the whole aircraft, one for each flight; None if drag and control power vary separately.
     """
 
@@ -153,7 +154,7 @@ class Dispersions:
     draws: Draws | None = None
 
     def without(self, names: tuple[str, ...]) -> "Dispersions":
-        """Return the dispersions without these quantities."""
+        """Return the dispersions without the named quantities."""
         return replace(self, varying=tuple(one for one in self.varying if one.quantity.name not in names))
 
     def with_draws(self, draws: Draws) -> "Dispersions":
@@ -167,7 +168,7 @@ class Dispersions:
         return replace(self.without(DRAWN), draws=draws)
 
     def to_json(self) -> dict[str, dict[str, Any]]:
-        """Return plain data: a table for each quantity, and one for the aircraft's draws."""
+        """Return plain data with a table for each quantity, and a table for the aircraft's draws."""
         tables: dict[str, dict[str, Any]] = {
             one.quantity.name: {"distribution": one.distribution, **dict(one.parameters), "source": one.source}
             for one in self.varying
@@ -193,7 +194,7 @@ def default_dispersions() -> Dispersions:
 
 
 def read_dispersions(path: Path) -> Dispersions:
-    """Read a dispersions file.  Raises SpreadError for one that cannot be read or used."""
+    """Read a dispersions file.  Raises SpreadError for a file that cannot be read or used."""
     return parse_dispersions(
         utf8_text(read_small_file(path, MAX_BYTES, "dispersions", SpreadError), path, SpreadError), str(path)
     )
@@ -202,8 +203,8 @@ def read_dispersions(path: Path) -> Dispersions:
 def parse_dispersions(text: str, name: str) -> Dispersions:
     r"""Parse the text of a dispersions file.  name: name of the file in messages.
 
-    Raises SpreadError, in one line, for a text that is not TOML, an unknown quantity, an unknown distribution, an
-    unknown or invalid parameter of the distribution, and a distribution outside the quantity's range.
+    Raises SpreadError, with a one-line message, for a text that is not TOML, an unknown quantity, an unknown
+    distribution, an unknown or invalid parameter of the distribution, and a distribution outside the quantity's range.
 
     >>> parse_dispersions('[mass]\ndistribution = "norm"\nloc = 9.0\nscale = 0.1\nsource = "a guess"', "mine.toml")
     Traceback (most recent call last):
@@ -219,7 +220,7 @@ def parse_dispersions(text: str, name: str) -> Dispersions:
     if unknown:
         allowed = f"unknown; it is one of {', '.join((*NAMES, _AIRCRAFT))}"
         raise SpreadError.at(name, unknown[0], tables[unknown[0]], allowed, shown="")
-    varying = tuple(_varying(BY_NAME[key], tables[key], name) for key in NAMES if key in tables)
+    varying = tuple(_parse_quantity(BY_NAME[key], tables[key], name) for key in NAMES if key in tables)
     if not varying and aircraft is None:
         raise SpreadError(f"{name}: nothing varies; give at least one of {', '.join(NAMES)}", file=name)
     if aircraft is None:
@@ -227,11 +228,11 @@ def parse_dispersions(text: str, name: str) -> Dispersions:
     for one in varying:
         if one.quantity.name in DRAWN:
             raise SpreadError.at(name, one.quantity.name, None, f"goes without [{_AIRCRAFT}] draws", shown="")
-    return Dispersions(varying, name, _draws(aircraft, name))
+    return Dispersions(varying, name, _read_named_draws(aircraft, name))
 
 
-def _draws(table: Any, name: str) -> Draws:
-    """Return the draws that a dispersions file names, relative to that file."""
+def _read_named_draws(table: Any, name: str) -> Draws:
+    """Return the aircraft's draws from the file that a dispersions file names, relative to the dispersions file."""
     given = table.get("draws") if isinstance(table, dict) else None
     if not isinstance(given, str) or not given or (isinstance(table, dict) and len(table) > 1):
         allowed = 'a file of draws is expected, and nothing else, such as draws = "mine/draws.csv"'
@@ -239,7 +240,7 @@ def _draws(table: Any, name: str) -> Draws:
     return read_draws(Path(name).parent / Path(given).expanduser(), SpreadError)
 
 
-def _varying(quantity: Quantity, table: Any, name: str) -> Varying:
+def _parse_quantity(quantity: Quantity, table: Any, name: str) -> Varying:
     if not isinstance(table, dict):
         allowed = "a table is expected, with distribution, its parameters, and source"
         raise SpreadError.at(name, quantity.name, table, allowed, shown="")
@@ -313,7 +314,7 @@ _QUANTILES = 4096
 class Draw:
     """Draw of flight `index` of a campaign.
 
-    seed: seed of changes within the flight: turbulence, and the error of navigation.
+    seed: seed of the turbulence and the navigation error within the flight.
     values: values of all quantities by name; quantities that do not vary have their nominal value.
     """
 
@@ -325,8 +326,10 @@ class Draw:
 def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
     r"""Draw a flight's numbers.
 
-    seed: seed of the campaign.  The stream is ``SeedSequence(seed, spawn_key=(index,))``: no draw depends on another,
-    so that any order, any number of workers and any part of a campaign give the same flights.
+    The random numbers are from ``SeedSequence(seed, spawn_key=(index,))``.  No draw depends on another draw, so any
+    order, any number of workers and any part of a campaign give the same flights.
+
+    seed: seed of the campaign.
 
     >>> from planfly.campaigns.dispersions import parse_dispersions
     >>> one = parse_dispersions('[mass]\ndistribution = "uniform"\nloc = 0.9\nscale = 0.2\nsource = "by hand"', "x")
@@ -334,7 +337,7 @@ def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
     >>> first == again, first.values["drag"], 0.9 < first.values["mass"] < 1.1
     (True, 1.0, True)
     """
-    uniform, number = _drawn(seed, index)
+    uniform, number = _draw_shares(seed, index)
     varying = {one.quantity.name: one for one in dispersions.varying}
     values = {
         quantity.name: varying[quantity.name].value(share) if quantity.name in varying else quantity.nominal
@@ -344,25 +347,24 @@ def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
 
 
 def standard_draws(dispersions: Dispersions, seed: int, start: int, stop: int) -> Floats:
-    """Return the draws of flights, (stop - start, d), in standard deviations from the mean of each quantity.
+    """Return the draws of flights as standard deviations from the mean of each quantity, (stop - start, d).
 
-    The flights are drawn as in `draw_flight`.
-    d: number of varying quantities that have more than one value.
+    The flights are drawn as in `draw_flight`.  d is the number of varying quantities that have more than one value.
 
     >>> from planfly.campaigns.dispersions import default_dispersions
     >>> standard_draws(default_dispersions(), 1, 5, 7).shape
     (2, 11)
     """
-    uniform = np.array([_drawn(seed, index)[0] for index in range(start, stop)]).reshape(-1, len(QUANTITIES))
+    uniform = np.array([_draw_shares(seed, index)[0] for index in range(start, stop)]).reshape(-1, len(QUANTITIES))
     columns = [QUANTITIES.index(one.quantity) for one in dispersions.varying]
     return _standardise(dispersions, uniform[:, columns])
 
 
 def standard_population(dispersions: Dispersions, count: int) -> Floats:
-    """Return points (count, d) that cover the dispersions evenly, in the units of `standard_draws`.
+    """Return points that cover the dispersions evenly, in the units of `standard_draws`, (count, d).
 
-    count: a power of two.
     The points are a Sobol sequence, each at the center of its cell.
+    count: a power of two.
 
     >>> from planfly.campaigns.dispersions import default_dispersions
     >>> bool(abs(standard_population(default_dispersions(), 1024).mean(axis=0)).max() < 0.01)
@@ -375,14 +377,17 @@ def standard_population(dispersions: Dispersions, count: int) -> Floats:
     return _standardise(dispersions, shares + 0.5 / count)
 
 
-def _drawn(seed: int, index: int) -> tuple[Floats, int]:
-    """Draw the share of the distribution of each of `QUANTITIES`, and the seed of changes within the flight."""
+def _draw_shares(seed: int, index: int) -> tuple[Floats, int]:
+    """Draw a share of the distribution of each of `QUANTITIES`, 0 to 1, and the seed of changes within the flight."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
     return random.random(len(QUANTITIES)), int(random.integers(2**63))
 
 
 def _standardise(dispersions: Dispersions, shares: Floats) -> Floats:
-    """Convert shares (n, v) of the varying quantities' distributions to standard deviations from the mean, (n, d)."""
+    """Convert shares of the varying quantities' distributions, (n, v), to deviations from the mean, (n, d).
+
+    The deviations are in standard deviations.
+    """
     quantiles = (np.arange(_QUANTILES) + 0.5) / _QUANTILES
     columns = []
     for k, one in enumerate(dispersions.varying):

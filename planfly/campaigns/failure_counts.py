@@ -12,7 +12,7 @@ from logs.verdict.wording import place_text
 
 @dataclass(frozen=True)
 class RuleFailures:
-    """Number of flights that failed a rule, in total and at each place; a flight may fail at several places."""
+    """Numbers of flights that failed a rule, in total and at each place; a flight may fail at several places."""
 
     rule: str
     flights: int
@@ -20,7 +20,7 @@ class RuleFailures:
 
 
 def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[RuleFailures, ...]:
-    """Count flights by failed rule and place, from the failed rules and places of each flight.
+    """Count flights by failed rule and place.  flights: failed rules and places of each flight.
 
     >>> [one.flights for one in count_failures([[("slope", Place("leg", 1)), ("slope", Place("leg", 2))], []])]
     [1]
@@ -38,7 +38,7 @@ def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[Rule
 
 
 def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:
-    """Return failures by rule and place for a JSON document."""
+    """Return the failures by rule and place as data for a JSON document."""
     return [
         {
             "rule": one.rule,
@@ -50,7 +50,7 @@ def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:
 
 
 def failure_lines(by_rule: Iterable[RuleFailures]) -> list[str]:
-    """Return a line for each failed rule: the number of flights, and the places where most of them failed."""
+    """Return a line for each failed rule, with the number of flights and the places where most of them failed."""
     lines = []
     for one in by_rule:
         where = ", ".join(f"{place_text(place)} in {n}" for place, n in one.places[:3])

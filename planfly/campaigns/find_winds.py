@@ -1,4 +1,4 @@
-"""Find the largest wind from each direction in which a mission flies, with rounds of the most informative flights."""
+"""Find the strongest wind from each direction in which a mission flies, by rounds of the most informative flights."""
 
 import math
 from collections.abc import Callable, Hashable
@@ -18,20 +18,20 @@ from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, 
 from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, FlownFlight, StoreError, WindsStore, kept_settings
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
 
-# Target for half the width of the interval of a boundary, m/s.
+# Target for half the width of a boundary's interval, m/s.
 ACCURACY = 0.25
-# Smallest number of flights of a direction.  If all of them are flyable, at most one in fifty fails (95 %); with fewer
-# flights the fit states intervals that are too narrow.
+# Minimum number of flights of a direction.  If all of them are flyable, at most one in fifty fails (95 %).  With fewer
+# flights the fit gives intervals that are too narrow.
 FEWEST = 150
 # Number of points that represent the distribution of all drawn quantities.
 _POPULATION = 4096
 # Approximate number of flights of a round; workers wait for the end of each round.
 _FLIGHTS_PER_ROUND = 48
-# Smallest number of flights of one direction in a round.
+# Minimum number of flights of one direction in a round.
 _MIN_EACH = 3
-# Largest number of flights of one direction in a round.
+# Maximum number of flights of one direction in a round.
 _MAX_EACH = 6
-# Growth of the number of flights between two checks of an open direction; the posterior is slow to compute.
+# Growth of the number of flights between two checks of an open direction, because the posterior is slow to compute.
 _CHECK_GROWTH_RATIO = 1.04
 # Dispersed quantities that the wind of the search replaces.
 SEARCHED_QUANTITIES = ("wind_speed", "wind_from")
@@ -41,7 +41,7 @@ Advance = Callable[[float, float, str], None]
 
 @dataclass(frozen=True)
 class WindsGoal:
-    """Goal of a search: probability, number of directions, largest wind to try (m/s), and most flights in total."""
+    """Goal of a search: probability, number of directions, maximum wind, m/s, and maximum number of flights."""
 
     target: float
     confidence: float
@@ -55,24 +55,26 @@ USUAL_WIND_FLIGHTS = 5000
 
 
 def asked_flights(asked: int | None, folder: Path, *, resume: bool) -> int:
-    """Return the maximum number of flights: the requested one, or else the one stored in a folder's search.
+    """Return the requested maximum number of flights; without a request, that of the folder's search, or the default.
 
-    Raises StoreError for a file that planfly did not write, or that another process holds.
+    Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     kept = kept_settings(folder / WINDS_DATABASE) if resume else {}
     return int(kept.get("flights", USUAL_WIND_FLIGHTS)) if asked is None else asked
 
 
-# Boundary below which a mission does not fly with the target probability even in calm air, m/s: one printed as 0.0.
+# Boundary below which a mission does not fly with the target probability even in calm air, m/s; it is printed as 0.0.
 CALM_MPS = 0.05
 
 
 @dataclass(frozen=True)
 class CalmFailures:
-    """Failures in the weakest wind that was flown, of directions in which the mission fails even in calm air.
+    """Failures in the weakest wind flown, in directions in which the mission fails even in calm air.
 
-    speed: that wind, m/s.  flights: number of flights in it.  failed: number of these that failed.
-    by_rule: rules and places that they failed; empty if none of them failed or none could be flown.
+    speed: speed of this wind, m/s.
+    flights: number of flights in this wind.
+    failed: number of these flights that failed.
+    by_rule: rules and places that these flights failed; empty if none failed or none could be flown.
     """
 
     speed: float
@@ -83,10 +85,11 @@ class CalmFailures:
 
 @dataclass(frozen=True, repr=False)
 class WindsFound:
-    """Boundary of each direction, and the flights it is estimated from: direction, speed, and True if flyable.
+    """Boundary of each direction, and the flights from which it is estimated.
 
+    flights: direction, wind speed, m/s, and True if flyable, of each flight.
     lost: indices, from 0, of the flights that could not be flown; they are treated as not flyable.
-    conditions: conditions of the flights without the wind, which depends on the direction.
+    conditions: conditions of the flights, without the wind, which depends on the direction.
     calm: failures in calm air, if the mission does not fly in it with the target probability; None otherwise.
     """
 
@@ -98,7 +101,7 @@ class WindsFound:
     calm: CalmFailures | None = None
 
     def from_deg(self, direction: int) -> float:
-        """Directions from which the winds blow, degrees."""
+        """Return the direction from which the wind blows, degrees.  direction: index of the direction."""
         return 360.0 * direction / self.goal.directions
 
     def __repr__(self) -> str:
@@ -109,11 +112,12 @@ class WindsFound:
 
 
 def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool) -> WindsStore:
-    """Open the table of a search in a folder, new or to be resumed.
+    """Create the table of a search in a folder, or open it to resume the search.
 
-    base: has dispersions without the quantities of `SEARCHED_QUANTITIES`.
-    Raises StoreError, also for the table of a search with another goal.  The number of flights may be changed; a
-    smaller number leaves the other flights in the table.
+    The number of flights may be changed; if it is smaller, the other flights stay in the table.
+
+    base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
+    Raises StoreError, also for the table of a search with another goal.
     """
     settings = {"name": base.name, "seed": base.seed, "spread": base.dispersions.to_json(), **asdict(goal)}
     return WindsStore(folder / WINDS_DATABASE, f"{base.world_hash()}-{code_hash()}", settings, resume=resume)
@@ -129,10 +133,11 @@ def find_winds(
 ) -> WindsFound:
     """Fly rounds of flights until each boundary is known well enough or all flights are used.
 
-    Flights that the table holds are not flown again.  The winds of a round depend on the earlier rounds alone, so that
-    the result is the same for any number of workers and of interruptions.  Flights flown before an error or Ctrl-C stay
+    Flights in the table are not flown again.  The winds of a round depend on the earlier rounds alone, so that the
+    result is the same for any number of workers and of interruptions.  Flights completed before an error or Ctrl-C stay
     in the table.
-    base: has dispersions without the quantities of `SEARCHED_QUANTITIES`.
+
+    base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
     """
     search, known = _Search(goal, base), _Known(store)
     pace = _Pace(search, len(known.flown), advance)
@@ -141,7 +146,7 @@ def find_winds(
         while asked := search.next_round():
             if missing := known.missing(asked):
                 if pool is None:
-                    # Before the workers start, which takes seconds.
+                    # Report before the workers start, because the start takes seconds.
                     pace.begin(len(known.flown))
                 pool = pool or stack.enter_context(worker_pool(workers, base, fly))
                 _fly_round(pool, search, missing, known, pace)
@@ -169,7 +174,7 @@ class _Search:
         self._failed: list[tuple[tuple[str, Place], ...]] = []
 
     def next_round(self) -> list[AskedFlight]:
-        """Return the flights to fly next; an empty list if all boundaries are known or all flights are used."""
+        """Return the flights to fly next; empty if all boundaries are known or all flights are used."""
         self.open = [number for number in self.open if self._is_open(number)]
         each = max(_MIN_EACH, min(_MAX_EACH, _FLIGHTS_PER_ROUND // max(1, len(self.open))))
         asked: list[AskedFlight] = []
@@ -187,13 +192,13 @@ class _Search:
         return needs_more(direction.boundary(), count, ACCURACY, FEWEST)
 
     def take(self, asked: AskedFlight, flown: FlownFlight) -> None:
-        """Add a flight; flights are added in the order in which they were requested."""
+        """Add the result of a flight; flights must be added in the order in which they were requested."""
         flyable = flown.outcome == "flyable"
-        failures: set[Hashable] = {_way(rule, place) for rule, place in flown.failed} or {flown.outcome}
+        failures: set[Hashable] = {_failure_key(rule, place) for rule, place in flown.failed} or {flown.outcome}
         failed = frozenset() if flyable else frozenset(failures)
-        margin: dict[Hashable, float] | None = {_way(rule, place): share for rule, place, share in flown.narrow}
+        margin: dict[Hashable, float] | None = {_failure_key(rule, place): share for rule, place, share in flown.narrow}
         if flown.outcome == "lost" or any(rule == "completion" for rule, _ in flown.failed):
-            # It is not known which rules the flight would have passed if it had continued.
+            # The rules that the flight would have passed if it had continued are unknown.
             margin = None
         self.directions[asked.direction].add(asked.speed, asked.draw, failed, margin)
         self.flown.append((asked.direction, asked.speed, flyable))
@@ -206,7 +211,7 @@ class _Search:
         return FlightRequest(asked.draw, GivenWind(asked.speed, 360.0 * asked.direction / self.goal.directions))
 
     def at_least(self) -> int:
-        """Return the number of flights to come before all open directions have the smallest number of flights."""
+        """Return the number of flights until all open directions have the minimum number of flights."""
         to_come = sum(max(0, FEWEST - len(self.directions[number].speeds)) for number in self.open)
         return min(to_come, self.goal.flights - len(self.flown))
 
@@ -218,7 +223,7 @@ class _Search:
         return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions, calm)
 
     def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
-        """Return the failures in the weakest wind flown of directions whose boundary is calm air; None for no such."""
+        """Return the failures in the weakest wind flown, for directions whose boundary is calm air, or None."""
         calm = {number for number, one in enumerate(boundaries) if one.estimate < CALM_MPS}
         numbered = [(number, one) for number, one in enumerate(self.flown) if one[0] in calm]
         if not numbered:
@@ -229,8 +234,8 @@ class _Search:
         return CalmFailures(weakest, len(numbers), len(failed), count_failures(failed))
 
 
-def _way(rule: str, place: Place) -> Hashable:
-    """Return the key of a failure: the rule and its place."""
+def _failure_key(rule: str, place: Place) -> Hashable:
+    """Return the key of a failure, which is its rule and place."""
     return rule, place.kind, place.index
 
 
@@ -244,7 +249,7 @@ class _Known:
         self.flown = {number: flown for number, (_, flown) in known.items()}
 
     def missing(self, asked: list[AskedFlight]) -> list[AskedFlight]:
-        """Return the flights still to be flown.  Raises StoreError if the table holds another request for a number."""
+        """Return the requested flights that the table lacks.  Raises StoreError if a number has another request."""
         for one in asked:
             if self._asked.get(one.number, one) != one:
                 path = self._store.path
@@ -281,17 +286,17 @@ class _Pace:
         self._search, self._advance, self._rate = search, advance, FlightRate(known)
 
     def begin(self, flights: int) -> None:
-        """Describe the least amount of work before the first flight."""
+        """Report the minimum amount of work before the first flight."""
         if self._advance is not None:
             total = max(len(self._search.flown) + self._search.at_least(), flights + 1)
             remark = f"{flights} of {total} flights at least"
             self._advance(float(flights), float(total), remark)
 
     def tell(self, flights: int, last: bool = False) -> None:
-        """Describe the progress: directions settled, flights, flights a minute, and the time left if it is known.
+        """Report the settled directions, the flights, the flights per minute, and the remaining time if it is known.
 
+        The number of flights beyond `FEWEST` is not known in advance; then no remaining time is given.
         last: True reports even if no report is due.
-        The number of flights beyond `FEWEST` is not known in advance: no time left is given then.
         """
         if self._advance is None or not (self._rate.due() or last):
             return

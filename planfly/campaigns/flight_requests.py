@@ -1,4 +1,4 @@
-"""Flights that a campaign requests, the copy of it that each worker holds, and the check of workers."""
+"""Define the flights that a campaign requests and the copy of the campaign on each worker, and check the workers."""
 
 import hashlib
 import pickle
@@ -16,18 +16,18 @@ from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.flight_row import FlightRow, fly_one
 from world.errors import PlanflyError
 
-# Function that flies flight k of a base, in a given wind; `fly_one` in all campaigns.
+# Function that flies flight k of a base in a given wind; all campaigns use `fly_one`.
 FlyOne = Callable[[CampaignBase, int, GivenWind | None], FlightRow]
 
-# End of a flight that could not be flown.
+# Reason for the end of a flight that could not be flown.
 LOST = "lost: its workers died"
-# Number of deaths of workers on one flight before it is lost: the first ones may have had another cause.
+# Number of workers that may die on one flight before the flight is lost; the first deaths may have another cause.
 MAX_FAILURES = 3
 
 
 @dataclass(frozen=True, slots=True)
 class FlightRequest:
-    """Flight to fly: its index, and the mean wind that replaces the scenario's wind, or None to keep it."""
+    """Flight to fly, by its index and the mean wind that replaces the scenario's wind, or None to keep that wind."""
 
     index: int
     wind: GivenWind | None = None
@@ -41,7 +41,7 @@ class Flown(NamedTuple):
 
 
 # ----------------------------------------------------------------------
-# Workers with different software may not fly flights of the same campaign.
+# Refuse workers whose software differs from that of the campaign.
 
 # Packages whose version may change a flight in its last bits.
 _PACKAGES = ("jsbsim", "numba", "numpy", "scipy")
@@ -50,12 +50,12 @@ _OWN_PACKAGES = ("aircraft", "flight", "logs", "planfly", "planner", "world")
 
 
 class WorkerError(PlanflyError):
-    """A worker does not have the software or model of the campaign."""
+    """Raised if a worker does not have the software or model of the campaign."""
 
 
 @cache
 def code_hash() -> str:
-    """Return a hash of planfly's own sources, as installed here."""
+    """Return a hash of planfly's sources as installed on this machine."""
     digest = hashlib.sha256()
     for package in _OWN_PACKAGES:
         root = Path(str(resources.files(package)))
@@ -66,7 +66,7 @@ def code_hash() -> str:
 
 
 def fingerprint(aircraft: str) -> dict[str, str]:
-    """Return the versions and hashes that determine a flight of this aircraft on this machine, by name.
+    """Return the versions and hashes that determine a flight of an aircraft on this machine, by name.
 
     >>> sorted(fingerprint("aerosonde"))
     ['jsbsim', 'model', 'numba', 'numpy', 'planfly', 'python', 'scipy', 'sources']
@@ -85,7 +85,7 @@ def fingerprint(aircraft: str) -> dict[str, str]:
 
 
 def refuse_different(mine: dict[str, str], theirs: dict[str, str], worker: str) -> None:
-    """Raise WorkerError, with the worker and the first difference, unless the fingerprints are equal.
+    """Raise WorkerError, which names the worker and the first difference, unless the fingerprints are equal.
 
     >>> refuse_different({"planfly": "0.1.0"}, {"planfly": "0.0.9"}, "tls://10.0.0.7:4000")
     Traceback (most recent call last):
@@ -112,7 +112,7 @@ class CampaignCopy:
         self._unpacked: tuple[CampaignBase, FlyOne] | None = None
 
     def fly(self, request: FlightRequest, worker: str) -> FlightRow:
-        """Fly a flight on this worker.  Raises WorkerError for a worker that would fly it differently."""
+        """Fly a flight on this worker.  Raises WorkerError if this worker would fly it differently."""
         base, fly = self.unpacked(worker)
         return replace(fly(base, request.index, request.wind), worker=worker)
 

@@ -1,6 +1,7 @@
 """Fly and judge one flight of a campaign as `planfly fly` does, and make its row for the tables.
 
-Each column of the tables is a field of `FlightRow`; each rule has columns for its least margin and the margin's place.
+Each column of the tables is a field of `FlightRow`; each rule has columns for its minimum margin and that margin's
+place.
 """
 
 import json
@@ -27,12 +28,12 @@ from world.arrays import Singles
 from world.scenario import Scenario
 
 # ----------------------------------------------------------------------
-# Narrow passes of a flight and their margins: they say more about the risk than the fact that no rule failed.
+# Find the narrow passes of a flight, because they say more about the risk than the fact that no rule failed.
 #
 # A pass is narrow if the distance to the failure of the rule, tolerance included, is less than the scale of the
 # rule's margin.  For a missile, it is narrow if the flight stayed less than `SPHERE_SCALE` outside its sphere.
 
-# Scale of the margin of a missile's sphere: distance outside it, m.
+# Scale of the distance outside a missile's sphere, m.
 SPHERE_SCALE = 10.0
 
 # Rule, place, and margin as a share of the rule's scale, 0 to 1.
@@ -40,9 +41,9 @@ NarrowPass = tuple[str, Place, float]
 
 
 def narrow_passes(findings: Iterable[Finding], scenario: Scenario, track: Track) -> tuple[NarrowPass, ...]:
-    """Return the rule, place and margin of each narrow pass, in the verdict's order, then missiles.
+    """Return the rule, place and margin of each narrow pass, in the verdict's order, followed by those at missiles.
 
-    The margin is 0 where a rule accepts a value beyond its limit for its own reasons.
+    The margin is 0 if a rule accepts a value beyond its limit for another reason.
     """
     shares: dict[tuple[str, Place], float] = {}
     failed = {(item.rule, item.place) for item in findings if item.ok is False}
@@ -61,7 +62,7 @@ def narrow_passes(findings: Iterable[Finding], scenario: Scenario, track: Track)
 
 
 def _distances_outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, float]]:
-    """Return how far outside each missile's sphere the track stays, m."""
+    """Return the minimum distance of the track from each missile's sphere, m, negative inside."""
     threats = scenario.threats
     if scenario.external or len(track) < 2:
         return []
@@ -74,15 +75,15 @@ def _distances_outside_spheres(scenario: Scenario, track: Track) -> list[tuple[P
 
 
 # ----------------------------------------------------------------------
-# Data of a flight for the pictures: its clearance along the path, and its crossing of each waypoint.
+# Data of a flight for the pictures, which are its clearance along the path and its crossing of each waypoint.
 
 
-# Number of equal pieces of the route's length; the least clearance of each piece is stored.
+# Number of equal pieces of the route's length; the minimum clearance on each piece is stored.
 STATIONS = 150
 
 
 def clearance_profile(route: Route, track: Track) -> Singles:
-    """Return the least height above ground on each equal piece of the route, (STATIONS,) m; NaN if it was not flown.
+    """Return the minimum height above ground on each equal piece of the route, m, (STATIONS,); NaN if not flown.
 
     Each track point is assigned to the nearest place on the leg that was flown at that time.
     """
@@ -100,10 +101,10 @@ def clearance_profile(route: Route, track: Track) -> Singles:
 
 
 def waypoint_crossings(route: Route, track: Track) -> Singles:
-    """Return the distance right of and above each of s stops at closest approach, (s, 2) m; NaN if not reached.
+    """Return the distance right of and above each of s stops at closest approach, m, (s, 2); NaN if not reached.
 
-    A stop is a waypoint, or the corner at which a loiter or a return begins: the number of later corners differs
-    between flights.  Right is relative to the mean of the incoming and outgoing courses.
+    A stop is a waypoint, or the corner at which a loiter or a return starts; later corners are left out, because their
+    number differs between flights.  Right is relative to the mean of the incoming and outgoing courses.
     """
     points = route.waypoints
     out = np.full((len(points), 2), np.nan, dtype=np.float32)
@@ -124,7 +125,7 @@ def waypoint_crossings(route: Route, track: Track) -> Singles:
 
 
 # ----------------------------------------------------------------------
-# The row of a flight, which also defines the columns of every table of flights.
+# Define the row of a flight, which also defines the columns of every table of flights.
 
 # Outcomes of a flight; a lost flight could not be flown, because its workers died on it.
 Outcome = Literal["flyable", "not flyable", "lost"]
@@ -132,7 +133,7 @@ Outcome = Literal["flyable", "not flyable", "lost"]
 
 @dataclass(frozen=True, slots=True)
 class LeastMargin:
-    """Least margin of a rule in a flight: value, unit and place; value is None if no margin has a number."""
+    """Value, unit and place of a rule's minimum margin in a flight; the value is None if no margin has a number."""
 
     value: float | None
     unit: str
@@ -144,9 +145,9 @@ class Column:
     """Storage of a field of `FlightRow` in a table.
 
     kind: type and constraint in SQLite.
-    write, read: convert the value of the field to the value of the column, and back.
+    write, read: functions that convert the value of the field to the value of the column, and back.
     entry: shape of each entry of an array stored as bytes (a BLOB, float32); () for numbers.
-    same: True if the same flight has the same value on every machine, however fast it was flown.
+    same: True if the same flight has the same value on every machine, independent of its computing time.
     """
 
     kind: str
@@ -161,7 +162,7 @@ def _failed_text(failed: Iterable[tuple[str, Place]]) -> str:
 
 
 def failed_of(text: str) -> tuple[tuple[str, Place], ...]:
-    """Parse the rule and place of each failed finding from the text of the column.
+    """Parse the rule and place of each failed finding from the text in the column.
 
     >>> failed_of('[{"rule": "slope", "kind": "leg", "index": 3}]')[0][1].index
     3
@@ -184,18 +185,19 @@ _FAILED = Column("TEXT NOT NULL", _failed_text, failed_of)
 class FlightRow:
     """Row of a flight in the campaign's table; each field ``Annotated`` with a `Column` is a column.
 
-    The draw has one column per dispersion; the margins have two columns per rule, and one for the closeness.  The
-    tables of `planfly.campaigns.tables` are derived from this class.
+    The draw has one column for each dispersion.  The margins have two columns for each rule, and one for the closeness.
+    The tables of `planfly.campaigns.tables` are derived from this class.
 
     ended: "completed", or the reason why the flight ended early.
     failed: rule and place of each failed finding, in the verdict's order.
-    margins: least margin by rule, for judged rules whose margin has a scale.
-    energy_left: Wh; None if nothing was flown.
-    duration: s.
+    margins: minimum margin by rule, for judged rules whose margin has a scale.
+    energy_left: remaining energy, Wh; None if nothing was flown.
+    duration: duration of the flight, s.
     made_of: hash of all inputs of the flight; "" outside a table.
     clearance, crossings: bytes of the arrays of `clearance_profile` and `waypoint_crossings`; empty if nothing was
     flown.
-    seconds: computing time, s.  worker: name of the worker that flew it.
+    seconds: computing time, s.
+    worker: name of the worker that flew the flight.
     narrow: narrow passes with their margins; the table of a campaign does not store them.
     """
 
@@ -215,32 +217,33 @@ class FlightRow:
 
     @property
     def closeness(self) -> float:
-        """Least of all scaled margins, by which the closest calls are sorted; inf if no margin is known."""
+        """Minimum of all scaled margins, by which the closest calls are sorted; inf if no margin is known."""
         shares = (share for rule, margin in self.margins if (share := scaled(rule, margin)) is not None)
         return min((share for share in shares if math.isfinite(share)), default=math.inf)
 
 
 def scaled(rule: str, margin: LeastMargin) -> float | None:
-    """Return a margin divided by the scale of its rule, or None if either has no number."""
+    """Return a margin divided by the scale of its rule, or None if the margin or the scale has no number."""
     scale = RULE_WORDS[rule].scale
     return None if margin.value is None or scale is None else margin.value / scale
 
 
-def _fields() -> dict[str, Column]:
-    """Return the fields of `FlightRow` that are columns, by name, in order."""
+def _column_fields() -> dict[str, Column]:
+    """Return the columns of `FlightRow` by field name, in order."""
     hints = get_type_hints(FlightRow, include_extras=True)
     found = {name: get_args(hint) for name, hint in hints.items()}
     return {name: args[-1] for name, args in found.items() if args and isinstance(args[-1], Column)}
 
 
 # Fields of `FlightRow` that are columns, by name.
-FIELDS = _fields()
+FIELDS = _column_fields()
 
 
 def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: Path | None = None) -> FlightRow:
-    """Fly a flight of a campaign by its index alone.
+    """Fly a flight of a campaign, which its index determines, and return its row.
 
-    wind: mean wind that replaces the scenario's wind.  log: file for the recording, or None for no recording.
+    wind: mean wind that replaces the scenario's wind, or None.
+    log: file for the recording, or None for no recording.
     """
     started = time.perf_counter()
     draw = draw_flight(base.dispersions, base.seed, index)
@@ -264,7 +267,7 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
 
 
 def failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
-    """Return the rule and place of each failed finding, or of completion if none failed in an incomplete flight."""
+    """Return the rule and place of each failed finding; if none failed in an incomplete flight, those of completion."""
     failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
     if failed or verdict.flies:
         return failed
@@ -272,7 +275,7 @@ def failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
 
 
 def least_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, LeastMargin], ...]:
-    """Return the finding with the least margin of each judged rule, in the order of the verdict.
+    """Return the minimum margin of each judged rule, in the order of the verdict.
 
     >>> from logs.verdict.findings import make_finding
     >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
@@ -284,7 +287,7 @@ def least_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, LeastMargin
         if item.ok is not None and RULE_WORDS[item.rule].scale is not None:
             by_rule.setdefault(item.rule, []).append(item)
     closest = [closest_to_limit(mine) for mine in by_rule.values()]
-    # A rule that fails for reasons other than its number has no margin.
+    # A rule that fails for a reason other than its value has no margin.
     return tuple(
         (one.rule, LeastMargin(one.margin, one.unit, one.place)) for one in closest if one and one.margin is not None
     )

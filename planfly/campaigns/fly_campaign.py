@@ -1,4 +1,4 @@
-"""Fly a campaign in parallel, store its flights by index, and decide on its answer."""
+"""Fly a campaign in parallel, store its flights by index, and decide its answer."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -15,10 +15,10 @@ Advance = Callable[[float, float, str], None]
 
 
 @dataclass
-class _Book:
-    """Known flights, and the tally of the flights before the first gap.
+class _FlightTally:
+    """Known flights of a campaign, and the tally of the flights before the first missing index.
 
-    beyond: outcomes of the known flights after the first gap.
+    beyond: outcomes of the known flights after the first missing index.
     """
 
     estimator: Estimator
@@ -29,14 +29,14 @@ class _Book:
     decided: bool = False
 
     def add(self, index: int, outcome: str) -> None:
-        """Add a flight, and decide as soon as the flights before the first gap allow it."""
+        """Add a flight, and decide as soon as the flights before the first missing index allow a decision."""
         self.beyond[index] = outcome
         while not self.decided and (known := self.beyond.pop(self.tally.flown, None)) is not None:
             self.tally = _with_outcome(self.tally, known)
             self.decided = self.goal.stops and self.estimator.decides(self.tally)
 
     def following(self) -> FlightRequest | None:
-        """Return the next flight to send, or None if no flight is left."""
+        """Return the next flight to send, or None if no flight remains."""
         self.sent = max(self.sent, self.tally.flown)
         while self.sent in self.beyond:
             self.sent += 1
@@ -52,9 +52,9 @@ def _with_outcome(tally: Tally, outcome: str) -> Tally:
 
 
 def resumed_goal(asked: Goal | None, folder: Path, confidence: float | None = None) -> Goal:
-    """Return the goal of a resumed campaign: the goal requested now, or else the goal stored in its folder.
+    """Return the goal of a resumed campaign, which is the requested goal, or without a request the stored goal.
 
-    confidence: confidence of the goal; None keeps the stored one.
+    confidence: confidence of the goal; None keeps the stored confidence.
     Raises StoreError for a folder without a campaign.
     """
     path = folder / DATABASE
@@ -68,9 +68,9 @@ def resumed_goal(asked: Goal | None, folder: Path, confidence: float | None = No
 
 
 def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) -> Store:
-    """Open the table of a campaign in a folder, new or to be resumed.
+    """Create the table of a campaign in a folder, or open it to resume the campaign.
 
-    Raises StoreError, also if the table holds more flights than the goal.
+    Raises StoreError, also if the table has more flights than the goal.
     """
     settings = {"name": base.name, "seed": base.seed, "spread": base.dispersions.to_json(), **asdict(goal)}
     path = folder / DATABASE
@@ -85,13 +85,13 @@ def fly_campaign(
     advance: Advance | None = None,
     fly: FlyOne = fly_one,
 ) -> Estimate:
-    """Fly the flights missing in the table, until the goal's number of flights or its answer is reached.
+    """Fly the flights missing from the table until the goal has its number of flights or its answer.
 
-    The answer is decided in the order of the flights' indices, so that answer and table do not depend on the speed of
-    the workers; flights after the deciding one are deleted.  Flights flown before an error or Ctrl-C stay in the table.
+    Flights are counted in index order, so that answer and table do not depend on the speed of the workers; flights
+    after the deciding one are deleted.  Flights completed before an error or Ctrl-C stay in the table.
     """
     estimator = Estimator(goal)
-    book = _Book(estimator, goal)
+    book = _FlightTally(estimator, goal)
     for index, outcome in store.outcomes().items():
         if index < goal.flights:
             book.add(index, outcome)
@@ -103,17 +103,17 @@ def fly_campaign(
     return estimator.estimate(store.tally())
 
 
-def _fly_rest(pool: WorkerPool, book: _Book, store: Store, pace: "_Pace") -> None:
+def _fly_rest(pool: WorkerPool, book: _FlightTally, store: Store, pace: "_Pace") -> None:
     pace.start(book.tally)
     for _, row in pool.fly(book.following):
-        _take(row, book, store)
+        _store_flight(row, book, store)
         pace.tell(book.tally)
         if book.decided:
             break
     pace.tell(book.tally, last=True)
 
 
-def _take(row: FlightRow, book: _Book, store: Store) -> None:
+def _store_flight(row: FlightRow, book: _FlightTally, store: Store) -> None:
     store.add(row)
     book.add(row.draw.index, row.outcome)
 
@@ -125,21 +125,21 @@ class _Pace:
         self._goal, self._estimator, self._advance = goal, estimator, advance
         self.start(known)
         if advance is not None:
-            # Before the workers start, which takes seconds.
+            # Report before the workers start, because the start takes seconds.
             total = self._total(known)
             remark = f"{known.flown} of {total} flights" + (" at least" if goal.stops else "")
             advance(float(known.flown), float(total), remark)
 
     def start(self, known: Tally) -> None:
-        """Start timing: the workers are ready."""
+        """Start timing, because the workers are ready."""
         self._rate = FlightRate(known.flown)
 
     def _total(self, tally: Tally) -> int:
-        """Return the smallest possible number of flights in total."""
+        """Return the minimum possible total number of flights."""
         return max(self._estimator.fewest, tally.flown) if self._goal.stops else self._goal.flights
 
     def tell(self, tally: Tally, last: bool = False) -> None:
-        """Show the progress: flights, P with its bounds, flights a minute, time left.  last: True shows it at once."""
+        """Report the flights, P with its bounds, flights per minute and remaining time.  last: True reports at once."""
         if self._advance is None or not tally.flown or not (self._rate.due() or last):
             return
         found = self._estimator.estimate(tally)

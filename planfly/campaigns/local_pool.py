@@ -1,4 +1,4 @@
-"""Plain processes on this machine that fly a campaign, one flight at a time each, without sockets."""
+"""Fly a campaign in plain processes on this machine, without sockets; each process flies one flight at a time."""
 
 import errno
 import os
@@ -26,7 +26,7 @@ from world.interruption import children_ignore_sigint, end_children, end_with_pa
 if TYPE_CHECKING:
     from multiprocessing.process import BaseProcess
 
-# Number of processes in a row that may die while starting before the pool gives up.
+# Number of successive processes that may die during their start before the pool fails.
 MAX_FAILED_STARTS = 10
 
 # Campaign of this worker process.
@@ -38,7 +38,7 @@ def _begin(copy: CampaignCopy) -> None:
     _copies.append(copy)
 
 
-def _fly(request: FlightRequest) -> FlightRow:
+def _fly_request(request: FlightRequest) -> FlightRow:
     """Fly a flight in a worker process."""
     return _copies[0].fly(request, f"process {os.getpid()}")
 
@@ -49,30 +49,30 @@ class _Worker:
     def __init__(self, copy: CampaignCopy) -> None:
         self._copy = copy
         self._pool: ProcessPoolExecutor | None = None
-        # The process of this worker, if it has one.
+        # Process of this worker, if there is one.
         self.processes: list[BaseProcess] = []
         self._started: Future[None] = Future()
 
     def send(self, request: FlightRequest) -> Future[FlightRow]:
         """Send a flight to the process."""
-        # Ctrl-C reaches every process of a terminal: workers ignore it, and this process ends them.
+        # Ctrl-C reaches every process of a terminal, so workers ignore it, and this process ends them.
         with children_ignore_sigint(), uninterrupted():
             try:
                 return self._submit(request)
             except BrokenProcessPool:
                 # The process has died since its last flight.
-                _end([self])
+                _end_workers([self])
                 return self._submit(request)
 
     def _submit(self, request: FlightRequest) -> Future[FlightRow]:
         if self._pool is None:
             others = set(active_children())
-            # A pool of one process: if it dies, its flight is known.
+            # The pool has one process, so that its flight is known if the process dies.
             self._pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=end_with_parent)
-            # Not an argument of the process: the start would wait until the process has imported everything it needs.
+            # The campaign is not an argument of the process, because the start would wait for the imports it needs.
             self._started = self._pool.submit(_begin, self._copy)
             self.processes = [child for child in active_children() if child not in others]
-        return self._pool.submit(_fly, request)
+        return self._pool.submit(_fly_request, request)
 
     @property
     def has_started(self) -> bool:
@@ -82,13 +82,13 @@ class _Worker:
     def close(self) -> None:
         """Free the semaphores of a worker whose process has ended."""
         if self._pool is not None:
-            # The thread that manages the pool holds its semaphores until it ends.
+            # The thread that manages the pool keeps its semaphores until the thread ends.
             self._pool.shutdown(cancel_futures=True)
             self._pool = None
         self.processes = []
 
 
-def _end(workers: Iterable[_Worker]) -> None:
+def _end_workers(workers: Iterable[_Worker]) -> None:
     """Kill the processes of workers."""
     ended = list(workers)
     end_children([process for worker in ended for process in worker.processes])
@@ -107,12 +107,12 @@ class LocalPool:
 
     def close(self) -> None:
         """End all processes."""
-        _end(self._workers)
+        _end_workers(self._workers)
 
     def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
-        """Fly requests as `following` returns them, and yield each when it is done, in any order.
+        """Fly the requests that `following` returns, and yield each flight when it is done, in any order.
 
-        following: returns the next request, or None for the time being; called again after each flight.
+        following: returns the next request, or None if there is none at present; called again after each flight.
         Raises the `world.errors.PlanflyError` of a flight, and OSError if no process can be started.
         """
         idle = list(self._workers)
@@ -129,19 +129,19 @@ class LocalPool:
                 for future in wait(flying, return_when=FIRST_COMPLETED).done:
                     worker, request = flying.pop(future)
                     idle.append(worker)
-                    row = self._row(future, worker, request)
+                    row = self._result_row(future, worker, request)
                     if row is None:
                         deaths[request] += worker.has_started
-                        _end([worker])
+                        _end_workers([worker])
                         if deaths[request] < MAX_FAILURES:
                             again.append(request)
                             continue
                         row = lost_row(self._base, request.index, LOST)
                     yield Flown(request, row)
         finally:
-            _end(worker for worker, _ in flying.values())
+            _end_workers(worker for worker, _ in flying.values())
 
-    def _row(self, future: Future[FlightRow], worker: _Worker, request: FlightRequest) -> FlightRow | None:
+    def _result_row(self, future: Future[FlightRow], worker: _Worker, request: FlightRequest) -> FlightRow | None:
         """Return the row of a flight, or None if its process has died.  Raises the errors of `fly`."""
         try:
             row = future.result()

@@ -1,4 +1,4 @@
-"""Pictures of campaigns: failures by place, probability against wind, tracks, and the go/no-go chart."""
+"""Draw a campaign's failures by place, its probability against wind, its tracks, and the go/no-go chart."""
 
 import math
 import textwrap
@@ -40,7 +40,8 @@ MAX_BARS = 14
 def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figure:
     """Draw bars of the number of failed flights by rule and place, the most frequent first.
 
-    counts: title of the rule, place in words, number of flights.  flights: number of all flights.
+    counts: title of the rule, description of the place, and number of flights.
+    flights: total number of flights.
     """
     with clean_style():
         shown = sorted(counts, key=lambda one: -one[2])[:MAX_BARS]
@@ -78,7 +79,7 @@ def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figur
 # Probability against wind speed, and sensitivities of the deciding margin.
 
 
-# Width of a bin of wind speeds, m/s; wider if there would be more than `_MAX_BINS`.
+# Width of a bin of wind speeds, m/s; bins are wider if there would be more than `_MAX_BINS`.
 _BIN_WIDTH_MPS = 1.0
 # Maximum number of bins.
 _MAX_BINS = 20
@@ -86,7 +87,7 @@ _MAX_BINS = 20
 
 @dataclass(frozen=True)
 class SpeedBin:
-    """Number of flights and flyable flights in a range of wind speeds (m/s), and Wilson's interval of the share."""
+    """Numbers of flights and flyable flights in a range of wind speeds, m/s, and Wilson's interval of their ratio."""
 
     low: float
     high: float
@@ -105,7 +106,7 @@ class Bar:
 
 
 def speed_bins(speed: Floats, flyable: NDArray[np.bool_], confidence: float = 0.95) -> list[SpeedBin]:
-    """Group flights by wind speed (n,) m/s; ranges without a flight are left out.
+    """Group flights by wind speed; ranges without a flight are left out.  speed: wind speed, m/s, (n,).
 
     >>> [one.flights for one in speed_bins(np.array([0.2, 0.7, 2.5]), np.array([True, False, True]))]
     [2, 1]
@@ -123,7 +124,7 @@ def speed_bins(speed: Floats, flyable: NDArray[np.bool_], confidence: float = 0.
 
 
 def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
-    """Draw P against wind speed, with its band and the number of flights in each range."""
+    """Draw the probability P against wind speed, with its interval and the number of flights in each range."""
     with clean_style():
         figure = new_figure(4.2)
         axes = figure.add_axes((0.08, 0.16, 0.89, 0.70))
@@ -164,7 +165,7 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
 
 
 def draw_tornado(bars: Sequence[Bar], of_what: str) -> Figure:
-    """Draw the quantities that explain the deciding margin's variance: more helps to the right, harms to the left."""
+    """Draw the quantities that explain the variance of the deciding margin, to the right if an increase helps."""
     with clean_style():
         tall = 1.2 + 0.3 * max(1, len(bars))
         figure = new_figure(tall)
@@ -205,11 +206,11 @@ def _style_axes(axes: object) -> None:
 
 
 # ----------------------------------------------------------------------
-# Tracks of the flights: height above ground along the path, and crossings of each waypoint.
+# Draw the tracks of the flights, as height above ground along the path and as crossings of each waypoint.
 
-# Bands of the flights: lower and upper quantile, and opacity; the widest first.
+# Lower quantile, upper quantile and opacity of each band of flights, the widest first.
 _BANDS = ((0.0, 1.0, 0.18), (0.05, 0.95, 0.30), (0.25, 0.75, 0.45))
-# Chi-square of two degrees of freedom at 95 %: squared half axes of the ellipse, in standard deviations.
+# Chi-square of two degrees of freedom at 95 %, which gives the squared half axes of the ellipse in standard deviations.
 _CHI2 = -2.0 * math.log(0.05)
 # Number of panels in a row.
 _COLUMNS = 5
@@ -220,8 +221,10 @@ def draw_clearance_fan(
 ) -> Figure:
     """Draw the height above ground along the path for all flights, above the profile of the ground.
 
-    clearance: (n, s) smallest clearance of each flight on each of s equal pieces of the path, m, NaN if not reached.
-    failed: (n,) flights that are not flyable; at most 30 are drawn.  ground: (s,) m AMSL.  length: of the path, m.
+    clearance: minimum clearance of each flight on each of s equal pieces of the path, m, (n, s); NaN if not reached.
+    failed: True for a flight that is not flyable, (n,); at most 30 of them are drawn.
+    ground: terrain altitude, m AMSL, (s,).
+    length: length of the path, m.
     least: required clearance, m.
     """
     with clean_style():
@@ -262,9 +265,10 @@ def draw_clearance_fan(
 
 
 def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
-    """Draw the crossings of each waypoint in a panel, seen along the path, with the ellipse of 95 %.
+    """Draw the crossings of each waypoint in a panel, seen along the path, with their 95 % ellipse.
 
-    crossings: (n, w, 2) to the right of and above each waypoint, m, NaN if not reached.  failed: (n,).
+    crossings: distance right of and above each waypoint, m, (n, w, 2); NaN if not reached.
+    failed: True for a flight that is not flyable, (n,).
     """
     count = crossings.shape[1]
     columns = min(_COLUMNS, count)
@@ -287,7 +291,7 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
             # Thousands of points, drawn as pixels, in a colour that is visible on light and on dark paper.
             axes.plot(*here[good & ~failed].T, ".", color=PLANNED, markersize=2.6, alpha=0.8, rasterized=True)
             axes.plot(*here[good & failed].T, "x", color=FAIL, markersize=3.5)
-            reach = _reach(here)
+            reach = _panel_half_size(here)
             if good.sum() > 2:
                 ellipse = covariance_ellipse(here[good])
                 # Its extents are in metres until it is added to axes.
@@ -304,7 +308,7 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
 
 
 def covariance_ellipse(points: Floats) -> Ellipse:
-    """Return the ellipse of 95 % of a normal distribution with the mean and covariance of points (n, 2).
+    """Return the 95 % ellipse of a normal distribution with the mean and covariance of points.  points: (n, 2).
 
     >>> points = np.array([[3.0, 0.0], [-3.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     >>> ellipse = covariance_ellipse(points)
@@ -319,23 +323,24 @@ def covariance_ellipse(points: Floats) -> Ellipse:
     return Ellipse((east, up), wide, narrow, angle=angle, fill=False, edgecolor=INK, linewidth=0.9)
 
 
-def _reach(crossings: Floats) -> float:
+def _panel_half_size(crossings: Floats) -> float:
     known = np.abs(crossings[np.isfinite(crossings)])
     return max(5.0, 1.1 * float(np.quantile(known, 0.995))) if known.size else 10.0
 
 
 # ----------------------------------------------------------------------
-# Go/no-go chart: the largest wind from each direction in which a mission flies.
+# Draw the go/no-go chart of the strongest wind from each direction in which a mission flies.
 
 
 @dataclass(frozen=True)
 class Spoke:
     """Direction of the chart.
 
-    from_deg: direction that the wind blows from.
-    boundary: estimated largest wind with the target probability, m/s; low, high: its interval.
-    reaches: True if the boundary is beyond the largest wind of the search.
-    flights: wind speed, number of flights and of flyable flights, for the marks.
+    from_deg: direction from which the wind blows, degrees.
+    boundary: estimate of the strongest wind with the target probability, m/s.
+    low, high: interval of the boundary, m/s.
+    reaches: True if the boundary is beyond the maximum wind of the search.
+    flights: wind speed, number of flights and number of flyable flights, for the marks.
     """
 
     from_deg: float
@@ -349,9 +354,9 @@ class Spoke:
 def draw_go_no_go(
     spokes: Sequence[Spoke], most: float, target: float, confidence: float, name: str, wind: tuple[float, float] | None
 ) -> Figure:
-    """Draw a polar chart: north up, wind from the direction of a spoke, speed outwards to ``most`` m/s.
+    """Draw a polar chart with north up, spokes in the directions of the wind, and speed outwards to ``most`` m/s.
 
-    wind: the scenario's wind, speed m/s and direction in degrees, drawn as a star.
+    wind: the scenario's wind, which is drawn as a star, by its speed, m/s, and direction, degrees.
     """
     with clean_style():
         figure = new_figure(7.6)
@@ -411,14 +416,14 @@ def draw_go_no_go(
             color=QUIET,
         )
         edge = most if any(one.reaches for one in spokes) else None
-        _legend(figure, target, confidence, wind, edge)
+        _draw_legend(figure, target, confidence, wind, edge)
     return figure
 
 
-def _legend(
+def _draw_legend(
     figure: Figure, target: float, confidence: float, wind: tuple[float, float] | None, edge: float | None
 ) -> None:
-    """Draw the legend.  edge: largest wind of the search, m/s, if some direction has no limit below it."""
+    """Draw the legend.  edge: maximum wind of the search, m/s, if a direction has no lower limit, otherwise None."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -447,7 +452,7 @@ def _legend(
 
 
 # ----------------------------------------------------------------------
-# The same pictures for a phone, narrow enough for their letters to stay readable there.
+# Lay out the pictures for phones, so narrow that their letters stay readable.
 
 # Width of a picture, in.
 NARROW = 5.0
@@ -468,7 +473,7 @@ _LINE_SPACING_RATIO = 1.3
 
 
 def narrowed(figure: Figure) -> Figure:
-    """Lay out a picture of this module again, in place, `NARROW` inches wide: text wrapped, legends below.
+    """Change a picture of this module to a layout `NARROW` inches wide, with wrapped text and the legends below.
 
     >>> float(narrowed(draw_failures([("slopes", "leg 2", 3)], 9)).get_figwidth())
     5.0
@@ -500,7 +505,7 @@ def narrowed(figure: Figure) -> Figure:
             box = axes.get_position()
             left = box.x0 * wide
             width = NARROW - left - 2.0 * _EDGE_IN
-            more = max(more, sum(_wrap_text(one, width) for one in _title(axes)))
+            more = max(more, sum(_wrap_text(one, width) for one in _left_title(axes)))
             below = max(below, _wrap_text(axes.xaxis.label, width))
             if axes.patches and axes.get_xlim()[0] == 0.0:
                 # Leave room for the number after the longest bar.
@@ -522,14 +527,14 @@ def narrowed(figure: Figure) -> Figure:
     return figure
 
 
-def _title(axes: Axes) -> list[Text]:
+def _left_title(axes: Axes) -> list[Text]:
     """Return the left title of a panel in a list, empty without a title."""
     said = axes.get_title("left")
     return [one for one in axes.get_children() if isinstance(one, Text) and said and one.get_text() == said]
 
 
 def _wrap_text(text: Text, width: float) -> float:
-    """Break a text into lines of a width, in, and return the height of all lines, in; 0 for no line."""
+    """Break a text into lines of at most `width`, in, and return the height of all lines, in, or 0 without a line."""
     size = float(text.get_fontsize()) / 72.0
     lines = textwrap.wrap(text.get_text(), max(10, int(width / (_LETTER_WIDTH_RATIO * size))))
     text.set_text("\n".join(lines))

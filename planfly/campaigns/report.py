@@ -1,4 +1,4 @@
-"""Files of a campaign's folder: summary, report page, logs of the worst flights, and go/no-go chart of winds."""
+"""Write the files of a campaign's folder: summary, report page, logs of the worst flights, and go/no-go chart."""
 
 import json
 import math
@@ -55,15 +55,15 @@ from planner.plan import plan_json
 from world.errors import ArgumentError, PlanflyError
 from world.files import write_whole
 
-# Largest number of flights drawn in the pictures of tracks: more flights do not change them visibly.
+# Maximum number of flights drawn in the pictures of tracks; more flights do not change the pictures visibly.
 _DRAWN = 3000
 
 
 def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, command: str) -> bytes:
     """Return the report page as bytes.  command: the command line that repeats the campaign."""
-    pictures = [_both_widths(figure, words) for figure, words in _pictures(base, summary, store)]
+    pictures = [_draw_both_widths(figure, words) for figure, words in _draw_pictures(base, summary, store)]
     lines = campaign_lines(summary)
-    text = _render(
+    text = _render_page(
         "campaign.html",
         name=summary.name,
         answer=summary.estimate.answer,
@@ -105,26 +105,28 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
     return text.encode("utf-8")
 
 
-def _render(template: str, **values: object) -> str:
+def _render_page(template: str, **values: object) -> str:
     return page_template(template, "planfly.campaigns").render(colours=Markup(css_variables()), **values)
 
 
 def winds_page(name: str, figure: Figure, found: WindsFound, rows: Sequence[tuple[str, ...]], command: str) -> bytes:
-    """Return the page of a go/no-go chart; the figure is changed to its narrow layout."""
-    picture = _both_widths(figure, "Go/no-go chart: wind from each direction")
+    """Return the page of a go/no-go chart, and change the figure to its narrow layout."""
+    picture = _draw_both_widths(figure, "Go/no-go chart: wind from each direction")
     answer, lines = "" if found.calm is None else "missed", wind_lines(found)
-    page = _render("winds.html", name=name, picture=picture, answer=answer, lines=lines, rows=rows, command=command)
+    page = _render_page(
+        "winds.html", name=name, picture=picture, answer=answer, lines=lines, rows=rows, command=command
+    )
     return page.encode("utf-8")
 
 
-def _both_widths(figure: Figure, words: str) -> Markup:
-    """Return a picture for a page in two widths, wide and for phones; the figure is changed to the narrow one."""
+def _draw_both_widths(figure: Figure, words: str) -> Markup:
+    """Return a picture for a page in two widths, for desktops and phones; change the figure to the narrow layout."""
     wide = page_svg(figure, words)
     narrow = page_svg(narrowed(figure), f"{words} (narrow)")
     return Markup(f'<div class="wide">{wide}</div><div class="narrow">{narrow}</div>')
 
 
-def _pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:
+def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:
     """Draw the figures of the report, and return them with their captions."""
     flyable = np.array([outcome == "flyable" for outcome in store.outcomes().values()])
     speed = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed"))
@@ -139,10 +141,10 @@ def _pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> lis
     if counts:
         failures = draw_failures(counts, summary.estimate.tally.flown)
         out.append((failures, "In how many flights each rule failed, and where"))
-    return out + _ways(base, store)
+    return out + _draw_tracks(base, store)
 
 
-def _ways(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
+def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
     """Draw the clearance fan and the crossings of the flights that have a track."""
     setup = make_setup(base.scenario, base.airframe, base.mission, base.seed, plan=base.plan, placed=base.placed)
     points = setup.route.waypoints
@@ -162,7 +164,7 @@ def _ways(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
         figure = draw_clearance_fan(np.array(shapes, dtype=np.float64), failed, ground, float(before[-1]), least)
         out.append((figure, "Height above ground along the way, over all flights, and the ground itself"))
     crossings = [np.frombuffer(data, np.float32).reshape(-1, 2) for data in store.blobs("crossings", _DRAWN)]
-    # The number of stops on a return depends on the wind: NaN for flights without the further stops.
+    # The number of stops on a return depends on the wind, so flights without the further stops have NaN.
     crossed = np.full((len(crossings), max(map(len, crossings)), 2), np.nan)
     for row, known in zip(crossed, crossings, strict=True):
         row[: len(known)] = known
@@ -189,8 +191,9 @@ CAMPAIGN_FILES = (
 class OutputDirectory:
     """Folder of a campaign, and the permission to resume or replace its contents.
 
-    table: name of the file of flights.
-    resume: resume the campaign in the folder.  overwrite: replace it.
+    table: name of the file with the table of flights.
+    resume: True resumes the campaign in the folder.
+    overwrite: True replaces the campaign.
     """
 
     folder: Path
@@ -199,7 +202,7 @@ class OutputDirectory:
     overwrite: bool
 
     def refuse(self) -> None:
-        """Raise PlanflyError for a folder that is a file, or has contents that may not be resumed or replaced."""
+        """Raise PlanflyError if the folder is a file, or has contents that may not be resumed or replaced."""
         folder = self.folder
         if self.resume:
             if not (folder / self.table).is_file():
@@ -218,10 +221,11 @@ class OutputDirectory:
         raise PlanflyError(f"{folder}: exists and is not empty; overwrite=True replaces its results", file=folder)
 
     def open(self, opened: Callable[[Path | None], CampaignBase]) -> CampaignBase:
-        """Open the mission, and prepare its folder: clear it, or keep the campaign to be resumed.
+        """Return the opened campaign base, and clear its folder unless the campaign is resumed.
 
-        opened: returns the mission, from the plan file of a resumed campaign, if any.
-        The plan of a scenario is stored in the folder, to resume the campaign later.
+        The plan of a scenario is stored in the folder, from which the campaign can be resumed later.
+
+        opened: returns the base, from the plan file of a resumed campaign, if there is one.
         Raises PlanflyError, without changes to a folder that is refused.
         """
         self.refuse()
@@ -236,7 +240,7 @@ class OutputDirectory:
 
 @contextmanager
 def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwrite: bool) -> Iterator[OutputDirectory]:
-    """Yield the folder of a campaign; out: None for a folder that is removed at the end.
+    """Yield the folder of a campaign.  out: path of the folder, or None for a folder that is removed at the end.
 
     Raises ArgumentError if a campaign is to be resumed without a folder.
     """
@@ -251,18 +255,18 @@ def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwri
 
 
 def clear_campaign(folder: Path) -> None:
-    """Make a folder, and remove the files of an earlier campaign or search from it; other files stay.
+    """Make a folder, and remove the files of an earlier campaign or search from it, but no other files.
 
-    Raises StoreError, and removes nothing, if another process holds the table.
+    Raises StoreError, and removes nothing, if another process has locked the table.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for table in (DATABASE, WINDS_DATABASE):
         refuse_held(folder / table)
-    for path in (*(folder / name for name in CAMPAIGN_FILES), *_logs(folder)):
+    for path in (*(folder / name for name in CAMPAIGN_FILES), *_worst_flight_logs(folder)):
         path.unlink(missing_ok=True)
 
 
-def _logs(folder: Path) -> list[Path]:
+def _worst_flight_logs(folder: Path) -> list[Path]:
     return sorted((folder / "worst").glob("flight-[0-9]*.mcap"))
 
 
@@ -277,7 +281,7 @@ def write_files(
     """Write ``summary.json``, ``report.html`` and the worst flights' logs; remove logs of other flights."""
     (folder / "worst").mkdir(exist_ok=True)
     kept = {folder / log_name(row) for row in summary.worst}
-    for path in _logs(folder):
+    for path in _worst_flight_logs(folder):
         if path not in kept:
             path.unlink()
     for count, row in enumerate(summary.worst):
@@ -293,7 +297,8 @@ def write_files(
 def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
     """Repeat a flight of the table, and record it in a log.
 
-    Raises PlanflyError if the result differs from the table: the machine that flew it computes differently.
+    Raises PlanflyError if the result differs from the table, because another machine, which computed differently, flew
+    it.
     """
     again = fly_one(base, row.draw.index, log=log)
     if not same_flight(row, again):
@@ -303,14 +308,14 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
 
 
 # ----------------------------------------------------------------------
-# Write the files of a go/no-go chart: data, picture and page.
+# Write the data, picture and page of a go/no-go chart.
 
 # Schema of ``winds.json``.
 SCHEMA = "planfly.winds/1"
 
 
 def spokes(found: WindsFound) -> list[Spoke]:
-    """Return the data of the chart."""
+    """Return the spokes of the go/no-go chart, one for each direction."""
     out = []
     for number, boundary in enumerate(found.boundaries):
         counts: dict[float, list[bool]] = {}
@@ -385,7 +390,7 @@ def _speed_text(speed: float, most: float) -> str:
 
 
 def _interval_text(low: float, high: float, most: float) -> str:
-    """Describe an interval, m/s; bounds beyond the largest wind of the search are not known."""
+    """Describe an interval, m/s; bounds beyond the maximum wind of the search are unknown."""
     if low >= most - 1e-9:
         return f"over {most:g}"
     return f"{low:.1f} to {f'over {most:g}' if high >= most - 1e-9 else f'{high:.1f}'}"
@@ -415,7 +420,7 @@ def _lost_lines(found: WindsFound) -> list[str]:
 
 
 def _none_failed_lines(found: WindsFound) -> list[str]:
-    """Return a line about directions without any failure, and the probability that their flights alone prove."""
+    """Return a line about directions without a failure, with the probability that their flights alone prove."""
     most, confidence = found.goal.most, found.goal.confidence
     at_most = Counter(direction for direction, speed, _ in found.flights if speed == most)
     failed = {direction for direction, _, flyable in found.flights if not flyable}
@@ -430,7 +435,7 @@ def _none_failed_lines(found: WindsFound) -> list[str]:
 
 
 def _calm_lines(found: WindsFound) -> list[str]:
-    """Return lines about the rules that fail in calm air, if the mission does not fly in it; else no line."""
+    """Return lines about the rules that fail in calm air; empty if the mission flies in calm air."""
     calm = found.calm
     if calm is None:
         return []
@@ -439,7 +444,7 @@ def _calm_lines(found: WindsFound) -> list[str]:
 
 
 def _winds_answer(found: WindsFound) -> str:
-    """Return the answer of a search in a line: the lowest and the highest boundary."""
+    """Return the answer of a search in a line, with the lowest and the highest boundary."""
     chart, target = spokes(found), found.goal.target
     least, largest = (pick(chart, key=lambda one: one.boundary) for pick in (min, max))
     most, percent = found.goal.most, f"{100 * found.goal.confidence:g} %"
@@ -479,9 +484,9 @@ def wind_lines(found: WindsFound) -> list[str]:
 def finish_campaign(
     base: CampaignBase, goal: Goal, estimate: Estimate, folder: Path, command: str, advance: Advance | None = None
 ) -> CampaignSummary:
-    """Summarise a campaign from the table in its folder, which no process holds, and write its files.
+    """Summarise a campaign from the table in its folder, which no process may have locked, and write its files.
 
-    command: the command line that repeats it, for the report.
+    command: the command line that repeats the campaign, for the report.
     Raises a `world.errors.PlanflyError`, or OSError for a full disk.
     """
     with open_store(base, goal, folder, resume=True) as store:

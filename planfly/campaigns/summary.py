@@ -1,4 +1,4 @@
-"""Summary of a campaign as data: probability, failures by place, deciding quantities, and worst flights."""
+"""Summarise a campaign's probability, failures by place, deciding quantities, and worst flights as data."""
 
 import json
 import math
@@ -20,7 +20,7 @@ from planfly.campaigns.tables import Store
 
 # Schema of ``summary.json``.
 SCHEMA = "planfly.campaign-summary/1"
-# Smallest share of a margin's variance for a quantity to be named as explaining it.
+# Minimum share of a margin's variance that a quantity must explain to be named.
 _MIN_NAMED_FRACTION = 0.05
 # Number of worst flights with a log.
 WORST = 10
@@ -28,9 +28,10 @@ WORST = 10
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Share of the variance of a rule's least margin that a quantity explains, and the sign of its effect.
+    """Share of the variance of a rule's minimum margin that a quantity explains, and the sign of its effect.
 
-    index: first-order, 0 to 1.  slope: rank correlation, negative where more of the quantity leaves less margin.
+    index: first-order index, 0 to 1.
+    slope: rank correlation, negative if an increase of the quantity reduces the margin.
     """
 
     quantity: str
@@ -42,10 +43,10 @@ class Sensitivity:
 class CampaignSummary:
     """Contents of the summary and the report.
 
-    deciding: the rule that fails most often; if no rule fails, the rule with the smallest reliability index: the mean
-    of its margins divided by their standard deviation (Cornell, "A probability-based structural code", ACI Journal 66,
-    1969); "" if there is no such rule.
-    conditions: nominal conditions of the flights: aircraft, weather, world and autopilot.
+    deciding: the rule that fails most often; if no rule fails, the rule with the smallest reliability index, which is
+    the mean of its margins divided by their standard deviation (Cornell, "A probability-based structural code", ACI
+    Journal 66, 1969); "" if there is no such rule.
+    conditions: nominal conditions of the flights, which are aircraft, weather, world and autopilot.
     low_margin: margin of the deciding rule that one flight in twenty falls below, in `unit`; None if unknown.
     """
 
@@ -67,7 +68,7 @@ class CampaignSummary:
 
 def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) -> CampaignSummary:
     """Summarise a campaign in one pass through its table."""
-    by_rule = _failures(store)
+    by_rule = _count_failures(store)
     worst = tuple(store.closest(WORST))
     deciding, low = _deciding_rule(store, by_rule)
     return CampaignSummary(
@@ -88,7 +89,7 @@ def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) 
     )
 
 
-def _failures(store: Store) -> tuple[RuleFailures, ...]:
+def _count_failures(store: Store) -> tuple[RuleFailures, ...]:
     listed = map(json.loads, store.texts("failed"))
     return count_failures([(entry.pop("rule"), Place(**entry)) for entry in failed] for failed in listed)
 
@@ -112,7 +113,7 @@ def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str
 
 
 def _sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensitivity, ...]:
-    """Return the sensitivity of the rule's least margin to each quantity that varies, the strongest first."""
+    """Return the sensitivity of a rule's minimum margin to each varying quantity, the strongest first."""
     if not rule:
         return ()
     margin = store.column(RULE_WORDS[rule].margin_column)
@@ -126,7 +127,7 @@ def _sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensiti
 
 
 def summary_json(summary: CampaignSummary) -> str:
-    """Return the text of ``summary.json``; without times and workers, so that it is the same for any number of them."""
+    """Return the text of ``summary.json``, which has no times and workers and so is the same for any workers."""
     found = summary.estimate
     data = {
         "schema": SCHEMA,
@@ -138,21 +139,25 @@ def summary_json(summary: CampaignSummary) -> str:
         "flyable": found.tally.flyable,
         "not_flyable": found.tally.failed,
         "lost": list(summary.lost),
-        "probability": _plain(found.tally.share),
+        "probability": _to_plain_number(found.tally.share),
         "confidence": summary.goal.confidence,
-        "lower_bound": _plain(found.lower),
-        "upper_bound": _plain(found.upper),
-        "interval": [_plain(found.interval.low), _plain(found.interval.high)],
+        "lower_bound": _to_plain_number(found.lower),
+        "upper_bound": _to_plain_number(found.upper),
+        "interval": [_to_plain_number(found.interval.low), _to_plain_number(found.interval.high)],
         "method": summary.goal.method,
         "failed_by_rule": failures_document(summary.by_rule),
         "deciding_rule": summary.deciding,
-        "margin_of_one_in_twenty": _plain(summary.low_margin),
+        "margin_of_one_in_twenty": _to_plain_number(summary.low_margin),
         "margin_unit": summary.unit,
         "sensitivities": [
-            {"quantity": one.quantity, "first_order": _plain(one.index), "rank_slope": _plain(one.slope)}
+            {
+                "quantity": one.quantity,
+                "first_order": _to_plain_number(one.index),
+                "rank_slope": _to_plain_number(one.slope),
+            }
             for one in summary.sensitivities
         ],
-        "worst": [_flight(row) for row in summary.worst],
+        "worst": [_flight_data(row) for row in summary.worst],
         "spread": summary.dispersions,
         "conditions": asdict(summary.conditions),
         "made_of": summary.made_of,
@@ -160,21 +165,21 @@ def summary_json(summary: CampaignSummary) -> str:
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
-def _flight(row: FlightRow) -> dict[str, Any]:
+def _flight_data(row: FlightRow) -> dict[str, Any]:
     return {
         "flight": row.draw.index,
         "outcome": row.outcome,
         "ended": row.ended,
         "failed": [{"rule": rule, "where": place_text(place)} for rule, place in row.failed],
         "closest": closest_text(row),
-        "drawn": {name: _plain(value) for name, value in row.draw.values.items() if name in BY_NAME},
+        "drawn": {name: _to_plain_number(value) for name, value in row.draw.values.items() if name in BY_NAME},
         "seed": row.draw.seed,
         "log": log_name(row) if row.duration > 0.0 else None,
     }
 
 
 def closest_text(row: FlightRow) -> str:
-    """Return the least margin of a flight in words; "" if no margin is known."""
+    """Describe the minimum margin of a flight; return "" if no margin is known."""
     known = [(share, rule, margin) for rule, margin in row.margins if (share := scaled(rule, margin)) is not None]
     if not known:
         return ""
@@ -183,7 +188,7 @@ def closest_text(row: FlightRow) -> str:
 
 
 def log_name(row: FlightRow) -> str:
-    """Return the name of the log of one of the worst flights."""
+    """Return the file name of the log of one of the worst flights."""
     return f"worst/flight-{row.draw.index:06d}.mcap"
 
 
@@ -224,5 +229,5 @@ def _drivers_text(summary: CampaignSummary) -> str:
     )
 
 
-def _plain(value: float | None) -> float | None:
+def _to_plain_number(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else round(float(value), 9) + 0.0

@@ -9,14 +9,14 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
-# Error codes of SQLite for a file that another process holds.
+# Error codes of SQLite for a file that another process has locked.
 HELD = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
-# Largest number of flights listed in a line.
+# Maximum number of flights listed in a line.
 _LISTED = 8
 
 
 def stored(value: Any, kind: str) -> Any:
-    """Return a value as SQLite reads it from a column of a kind: numpy numbers become plain ones, NaN becomes NULL.
+    """Return a value as SQLite reads it from a column; numpy numbers become Python numbers, and NaN becomes None.
 
     >>> stored(3, "REAL NOT NULL"), stored(math.nan, "REAL"), stored(True, "INTEGER")
     (3.0, None, 1)
@@ -28,7 +28,7 @@ def stored(value: Any, kind: str) -> Any:
 
 
 def checksum(values: Iterable[Any]) -> str:
-    """Return a checksum of 16 hexadecimal digits of values read from SQLite; it depends on values and types.
+    """Return a checksum of 16 hexadecimal digits of the values and types of a row read from SQLite.
 
     >>> checksum([1, 0.5, "flyable", None]) == checksum([1, 0.5, "flyable", 0])
     False
@@ -42,8 +42,8 @@ class Examined(NamedTuple):
     """Numbers of undamaged and damaged flights, both in ascending order.
 
     sound: True if SQLite finds no error in the file, even if some rows are damaged.
-    after: last known flight of an unsound file if fewer flights are known than were requested: later flights may have
-        been lost, or all flights for -1; otherwise None.
+    after: last known flight of an unsound file if fewer flights are known than were requested, because later flights
+        may have been lost; -1 if no flight is known; otherwise None.
     """
 
     whole: list[int]
@@ -74,11 +74,12 @@ class Examined(NamedTuple):
 def examine(connection: sqlite3.Connection, columns: Sequence[str], asked: int, most: int) -> Examined:
     """Determine which rows of the table ``flights`` are undamaged, even in a broken file.
 
-    columns: columns of the checksum, in order, with the flight's number first.  asked: number of requested flights.
+    columns: columns of the checksum, in order, with the flight's number first.
+    asked: number of requested flights.
     most: number of flights to try one by one in a broken file.
-    Raises sqlite3.Error for a file that another process holds.
+    Raises sqlite3.Error for a file that another process has locked.
     """
-    # Invalid UTF-8 does not stop the reading: it changes the checksum.
+    # Invalid UTF-8 must not stop the reading, because it changes the checksum anyway.
     connection.text_factory = lambda data: data.decode("utf-8", "surrogateescape")
     query = f"SELECT {', '.join(columns)}, checksum FROM flights"
     try:
@@ -86,7 +87,7 @@ def examine(connection: sqlite3.Connection, columns: Sequence[str], asked: int, 
             return _check_rows(connection.execute(f"{query} ORDER BY flight"))
     except sqlite3.Error as error:
         _refuse_held(error)
-    rows = (row for number in range(most) if (row := _row_of(connection, query, number)) is not None)
+    rows = (row for number in range(most) if (row := _read_row(connection, query, number)) is not None)
     whole, damaged = _check_rows(rows)[:2]
     # In a broken file, a missing row may have been lost with its page.  A number without a valid checksum is accepted
     # if it is in the range of requested flights, which are numbered from 0.
@@ -99,7 +100,7 @@ def examine(connection: sqlite3.Connection, columns: Sequence[str], asked: int, 
 
 
 def _readable_numbers(connection: sqlite3.Connection) -> list[Any]:
-    """Return the flight numbers, some perhaps corrupt, that can be read up to the damaged part of the file."""
+    """Return the flight numbers that can be read up to the damaged part of the file; some may be corrupt."""
     seen: list[Any] = []
     with contextlib.suppress(sqlite3.Error):
         for (number,) in connection.execute("SELECT flight FROM flights"):
@@ -114,8 +115,8 @@ def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examined:
     return found
 
 
-def _row_of(connection: sqlite3.Connection, query: str, number: int) -> tuple[Any, ...] | None:
-    """Return a row by its number, with None as the checksum if it cannot be read."""
+def _read_row(connection: sqlite3.Connection, query: str, number: int) -> tuple[Any, ...] | None:
+    """Return a row by its number, with the checksum None if the row cannot be read."""
     try:
         found: tuple[Any, ...] | None = connection.execute(f"{query} WHERE flight = ?", (number,)).fetchone()
     except sqlite3.Error as error:
@@ -132,9 +133,10 @@ def _refuse_held(error: sqlite3.Error) -> None:
 def copy_whole(
     connection: sqlite3.Connection, target: Path, create: Sequence[str], numbers: Sequence[int], kept: Mapping[str, str]
 ) -> None:
-    """Write a new file with some rows of a table, and with these entries in its table ``campaign``.
+    """Write a new file with the given rows of a table, and with the entries `kept` in its table ``campaign``.
 
     create: SQL statements that create both tables.
+    numbers: numbers of the rows to copy.
     """
     target.unlink(missing_ok=True)
     with closing(sqlite3.connect(target, isolation_level=None)) as copy:

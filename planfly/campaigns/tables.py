@@ -1,8 +1,8 @@
 """Tables of flights: SQLite files that are written flight by flight, and read as rows or as columns.
 
 The table of a campaign has one row per flight, keyed by the index of its draw.  The table of a search for winds has one
-row per flight, in the order of requests.  One process at a time holds a table; opening it drops all rows with a wrong
-checksum.
+row per flight, in the order of requests.  One process at a time can lock a table; opening a table drops all rows with a
+wrong checksum.
 """
 
 import errno
@@ -70,7 +70,7 @@ def row_values(row: FlightRow) -> dict[str, Any]:
 
 
 def row_of(index: int, known: Mapping[str, Any]) -> FlightRow:
-    """Return the row with a draw's index and these values by column."""
+    """Return the row with a draw's index and the given values by column."""
     margins = []
     for rule in RULE_WORDS.values():
         if (place := known[rule.place_column]) is not None:
@@ -84,7 +84,7 @@ def row_of(index: int, known: Mapping[str, Any]) -> FlightRow:
 
 
 def same_flight(one: FlightRow, other: FlightRow) -> bool:
-    """Return True if two rows hold the same flight, whatever machine flew it and however fast."""
+    """Return True if two rows describe the same flight; the machine and its speed may differ."""
     mine, theirs = (row_values(replace(row, made_of="")) for row in (one, other))
     same = all(mine[name] == theirs[name] for name in ROW_COLUMNS if name not in RUN_DEPENDENT_COLUMNS)
     return same and one.draw.index == other.draw.index
@@ -93,12 +93,12 @@ def same_flight(one: FlightRow, other: FlightRow) -> bool:
 # ----------------------------------------------------------------------
 # Create the file or open it to resume, lock it for one process, and refuse other contents.
 
-# Largest number of flights of a table whose settings state none, and largest credible number in a damaged table.
+# Maximum number of flights of a table whose settings state none, and of a flight's number in a damaged table.
 _MAX_FLIGHTS = 100_000
 
 
 class StoreError(PlanflyError):
-    """The table of a campaign cannot be opened, or belongs to another campaign."""
+    """Raised if the table of a campaign cannot be opened, or belongs to another campaign."""
 
 
 @dataclass(frozen=True)
@@ -152,17 +152,17 @@ class LockedTable:
             raise
 
     def _prepare(self, settings: dict[str, Any]) -> None:
-        self._hold()
+        self._lock()
         run = self._connection.execute
         tables = {name for (name,) in run("SELECT name FROM sqlite_master WHERE type = 'table'")}
         if tables:
-            known = _kept(self._connection) if "campaign" in tables else {}
+            known = _read_settings(self._connection) if "campaign" in tables else {}
             self._refuse_other(known, settings)
-            self._mend(known)
+            self._repair(known)
         run = self._connection.execute
         for statement in self._create():
             run(statement)
-        # Before the new settings are written: the settings of a refused request would stay in the file.
+        # Refuse the request before its settings are written, because they would stay in the file.
         self._refuse_more(settings)
         values = {
             "schema": self._kind.schema,
@@ -175,8 +175,8 @@ class LockedTable:
         )
         run("COMMIT")
 
-    def _hold(self) -> None:
-        """Lock the file for this process, and begin a transaction."""
+    def _lock(self) -> None:
+        """Lock the file for this process, and start a transaction."""
         run = self._connection.execute
         run("PRAGMA locking_mode = EXCLUSIVE")
         run("PRAGMA journal_mode = WAL")
@@ -211,11 +211,11 @@ class LockedTable:
                     file=self.path,
                 )
 
-    def _mend(self, known: dict[str, str]) -> None:
+    def _repair(self, known: dict[str, str]) -> None:
         """Keep the undamaged flights, report the others, and rewrite the file."""
-        # A search may have been resumed with fewer flights than the table holds: all of them are kept.
+        # A search may have been resumed with fewer flights than the table contains; all of them are kept.
         asked = json.loads(known["settings"]).get("flights", _MAX_FLIGHTS)
-        examined = examine(self._connection, tuple(self._kind.columns), asked, max(asked, self._last() + 1))
+        examined = examine(self._connection, tuple(self._kind.columns), asked, max(asked, self._last_number() + 1))
         if examined.sound and not examined.damaged:
             return
         repaired = self.path.with_name(f".{self.path.name}.mended")
@@ -225,16 +225,16 @@ class LockedTable:
         for ending in ("-wal", "-shm"):
             Path(f"{self.path}{ending}").unlink(missing_ok=True)
         self._connection = sqlite3.connect(self.path, timeout=1.0, isolation_level=None)
-        self._hold()
+        self._lock()
         say(f"{self.path}: {examined.text()}")
 
-    def _last(self) -> int:
-        """Return the largest flight number that can be read, from either end of the table; -1 for none."""
+    def _last_number(self) -> int:
+        """Return the largest flight number that can be read from either end of the table, or -1 without any."""
         last = -1
         for order in ("", " DESC"):
             with suppress(sqlite3.Error, UnicodeDecodeError):
                 for (number,) in self._connection.execute(f"SELECT flight FROM flights ORDER BY flight{order}"):
-                    # A damaged page may hold any number.
+                    # A damaged page may contain any number.
                     if isinstance(number, int) and number < _MAX_FLIGHTS:
                         last = max(last, number)
                         if order:
@@ -242,7 +242,7 @@ class LockedTable:
         return last
 
     def _refuse_more(self, settings: Mapping[str, Any]) -> None:
-        """Raise StoreError if the table holds more flights than requested."""
+        """Raise StoreError if the table has more flights than requested."""
 
     def __enter__(self) -> Self:
         """Return the locked table."""
@@ -257,8 +257,8 @@ class LockedTable:
     def insert(self, values: Mapping[str, Any]) -> None:
         """Write a flight durably, one value per column.
 
-        Raises OSError for a full disk or a removed table; flights written before stay.  Raises StoreError for a number
-        that the table already holds.
+        Raises OSError for a full disk or a removed table; earlier flights stay in the file.  Raises StoreError for a
+        number that the table already has.
         """
         self._refuse_removed()
         with translated_errors(self.path):
@@ -267,7 +267,7 @@ class LockedTable:
             self._connection.execute(f"INSERT INTO flights VALUES ({marks})", [*row, checksum(row)])
 
     def drop_from(self, flight: int) -> None:
-        """Delete the flights from this number on, which were flown while an earlier flight decided.
+        """Delete the flights from a number on, which were still being flown when an earlier flight decided.
 
         Raises OSError for a table that was removed.
         """
@@ -276,7 +276,7 @@ class LockedTable:
             self._connection.execute("DELETE FROM flights WHERE flight >= ?", (flight,))
 
     def _refuse_removed(self) -> None:
-        """Refuse to write into a deleted file: on POSIX that succeeds, and everything is lost at the end."""
+        """Raise OSError if the file was deleted; on POSIX writing would succeed, but everything would be lost."""
         try:
             there = os.path.samestat(self.path.stat(), self._file)
         except OSError:
@@ -292,20 +292,20 @@ class LockedTable:
 
 
 def kept_settings(path: Path) -> dict[str, Any]:
-    """Return the settings stored in a table; empty if there is no such file.
+    """Return the settings stored in a table; empty if the file does not exist.
 
-    Raises StoreError for a file that planfly did not write, or that another process holds.
+    Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     if not path.is_file():
         return {}
     with translated_errors(path), closing(sqlite3.connect(path, timeout=1.0)) as connection:
-        known = _kept(connection)
+        known = _read_settings(connection)
     if known:
         _refuse_damaged(known, path)
     return json.loads(known["settings"]) if known else {}
 
 
-def _kept(connection: sqlite3.Connection) -> dict[str, str]:
+def _read_settings(connection: sqlite3.Connection) -> dict[str, str]:
     """Return the entries of the table ``campaign`` by key."""
     connection.text_factory = lambda data: data.decode("utf-8", "surrogateescape")
     return dict(connection.execute("SELECT key, value FROM campaign").fetchall())
@@ -319,7 +319,7 @@ def _refuse_damaged(known: Mapping[str, str], path: Path) -> None:
 
 
 def refuse_held(path: Path) -> None:
-    """Raise StoreError if another process holds a table; a missing file is not held."""
+    """Raise StoreError if another process has locked a table; a missing file is not locked."""
     if not path.is_file():
         return
     connection = sqlite3.connect(path, timeout=1.0, isolation_level=None)
@@ -333,7 +333,7 @@ def refuse_held(path: Path) -> None:
 
 
 class translated_errors:
-    """Context that converts SQLite errors about a file: a full disk to OSError, all others to StoreError."""
+    """Context that converts SQLite errors about a file, to OSError for a full disk, and to StoreError for others."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -344,7 +344,7 @@ class translated_errors:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Convert an SQLite error and raise it."""
+        """Raise the converted SQLite error, if there is one."""
         if isinstance(error, UnicodeDecodeError):
             # SQLite quotes the parts of a table definition that it does not understand.
             raise StoreError(f"{self._path}: is damaged where it says which tables it has", file=self._path) from error
@@ -359,7 +359,7 @@ class translated_errors:
 
 
 # ----------------------------------------------------------------------
-# The table of a campaign: one row per flight, read by its index.
+# Table of a campaign, with one row per flight, which is read by its index.
 
 # Name of the file with the table of a campaign.
 DATABASE = "campaign.sqlite"
@@ -375,7 +375,7 @@ class Store(LockedTable):
     """Table of a campaign, locked by one process at a time; the number of a flight is the index of its draw."""
 
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
-        """Create the table, or open it to resume, as `LockedTable`; never for fewer flights than it holds."""
+        """Create the table, or open it to resume, like `LockedTable`, but never for fewer flights than it has."""
         super().__init__(path, CAMPAIGN_KIND, made_of, settings, resume=resume)
 
     def _refuse_more(self, settings: Mapping[str, Any]) -> None:
@@ -388,59 +388,60 @@ class Store(LockedTable):
         self.insert({"flight": row.draw.index, **row_values(replace(row, made_of=self.made_of))})
 
     def outcomes(self) -> dict[int, str]:
-        """Return the outcome of all flights by index."""
+        """Return the outcome of each flight by its index."""
         return dict(self._connection.execute("SELECT flight, outcome FROM flights ORDER BY flight"))
 
     def column(self, name: str) -> NDArray[np.float64]:
-        """Return a column of numbers (n,), in the order of flights; NaN for a missing value."""
-        rows = self._connection.execute(f"SELECT {_known(name)} FROM flights ORDER BY flight")
+        """Return a column of numbers in the order of flights, (n,); a missing value is NaN."""
+        rows = self._connection.execute(f"SELECT {_checked_column(name)} FROM flights ORDER BY flight")
         return np.fromiter((math.nan if value is None else value for (value,) in rows), dtype=np.float64)
 
     def texts(self, name: str) -> list[str]:
         """Return a column of texts, in the order of flights."""
         return [
-            str(value) for (value,) in self._connection.execute(f"SELECT {_known(name)} FROM flights ORDER BY flight")
+            str(value)
+            for (value,) in self._connection.execute(f"SELECT {_checked_column(name)} FROM flights ORDER BY flight")
         ]
 
     def blobs(self, name: str, most: int) -> list[bytes]:
-        """Return a column of arrays as bytes, for the first flights that have one."""
-        query = f"SELECT {_known(name)} FROM flights WHERE LENGTH({name}) > 0 ORDER BY flight LIMIT ?"
+        """Return a column of arrays as bytes, for at most `most` flights that have an array, in order."""
+        query = f"SELECT {_checked_column(name)} FROM flights WHERE LENGTH({name}) > 0 ORDER BY flight LIMIT ?"
         return [value for (value,) in self._connection.execute(query, (most,))]
 
     def has_track(self) -> list[bool]:
-        """Return for each flight, in order, True if the shape of its track is stored."""
+        """Return True for each flight, in order, whose path data are stored."""
         return [bool(n) for (n,) in self._connection.execute("SELECT LENGTH(clearance) FROM flights ORDER BY flight")]
 
     def closest(self, most: int) -> list[FlightRow]:
-        """Return the worst flights: lost flights first, then failed ones, then the closest calls by margin."""
+        """Return the worst flights, first lost flights, then failed flights, then the closest calls by margin."""
         order = "CASE outcome WHEN 'lost' THEN 0 WHEN 'not flyable' THEN 1 ELSE 2 END, closeness IS NULL, closeness"
         rows = self._connection.execute(f"{_SELECT} ORDER BY {order}, flight LIMIT ?", (most,))
-        return [_row(values) for values in rows]
+        return [_make_row(values) for values in rows]
 
     def flight(self, index: int) -> FlightRow | None:
         """Return the flight with an index, or None if the table has no such flight."""
         found = self._connection.execute(f"{_SELECT} WHERE flight = ?", (index,)).fetchone()
-        return None if found is None else _row(found)
+        return None if found is None else _make_row(found)
 
     def rows(self) -> Iterator[FlightRow]:
         """Yield all flights in order."""
         for values in self._connection.execute(f"{_SELECT} ORDER BY flight"):
-            yield _row(values)
+            yield _make_row(values)
 
 
-def _known(name: str) -> str:
+def _checked_column(name: str) -> str:
     if name not in COLUMNS:
         raise KeyError(name)
     return name
 
 
-def _row(values: tuple[Any, ...]) -> FlightRow:
+def _make_row(values: tuple[Any, ...]) -> FlightRow:
     known = dict(zip(COLUMNS, values, strict=True))
     return row_of(known["flight"], known)
 
 
 # ----------------------------------------------------------------------
-# The table of a search for the largest winds: one row per flight, numbered in the order of requests.
+# Table of a search for the strongest winds, with one row per flight, numbered in the order of requests.
 
 # Name of the file with the table of a search.
 WINDS_DATABASE = "winds.sqlite"
@@ -466,8 +467,9 @@ class AskedFlight:
     """Flight that a search requests.
 
     number: position in the order of the search.
-    direction: index of the direction, from the north.  speed: mean wind speed, m/s.
-    draw: index of the draw around that wind; the same in all directions.
+    direction: index of the direction, from the north.
+    speed: mean wind speed, m/s.
+    draw: index of the draw of variations around this wind; the indices are the same in all directions.
     """
 
     number: int
@@ -478,7 +480,7 @@ class AskedFlight:
 
 @dataclass(frozen=True, slots=True)
 class FlownFlight:
-    """Outcome of a flight, rule and place of each failed finding, and its narrow passes."""
+    """Outcome of a flight, the rule and place of each failed finding, and the narrow passes."""
 
     outcome: Outcome
     failed: tuple[tuple[str, Place], ...]
@@ -489,7 +491,7 @@ class WindsStore(LockedTable):
     """Table of a search, locked by one process at a time."""
 
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
-        """Create the table, or open it to resume the same search.  settings: include `FIXED`."""
+        """Create the table, or open it to resume the same search.  settings: must include `FIXED`."""
         super().__init__(path, WINDS_KIND, made_of, settings, resume=resume)
 
     def add(self, asked: AskedFlight, row: FlightRow) -> None:
@@ -515,7 +517,7 @@ class WindsStore(LockedTable):
 
 
 def narrow_passes_of(text: str) -> tuple[NarrowPass, ...]:
-    """Parse the narrow passes from the text of the column.
+    """Parse the narrow passes from the text in the column.
 
     >>> narrow_passes_of('[{"rule": "slope", "margin": 0.25, "kind": "leg", "index": 3}]')[0][2]
     0.25
@@ -540,8 +542,8 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
     """Return the columns of a campaign's table by name, (n,) each, in the order of flights, without arrays.
 
     Numbers are float64, NaN if missing, or int64.  Texts are Python strings, None if missing; equal strings share
-    memory. About 60 MB for 100,000 flights.
-    Raises StoreError for a file that planfly did not write, or that another process holds.
+    memory.  The result takes about 60 MB for 100,000 flights.
+    Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     names = tuple(name for name in CAMPAIGN_KIND.columns if name not in SHAPES)
     with _opened(path) as connection:
@@ -558,7 +560,7 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def count_flights(path: Path) -> int:
-    """Return the number of flights in a table of either kind.  Raises StoreError for a foreign or a locked file."""
+    """Return the number of flights in a table of either kind.  Raises StoreError for another or a locked file."""
     with _opened(path) as connection:
         return int(connection.execute("SELECT COUNT(*) FROM flights").fetchone()[0])
 
@@ -566,9 +568,9 @@ def count_flights(path: Path) -> int:
 def read_shapes(path: Path) -> dict[str, NDArray[np.float32]]:
     """Return the stored path data of each flight, in the order of flights; NaN for flights without them.
 
-    "clearance": (n, 150) least height above ground on each of 150 equal pieces of the route, m.
-    "crossings": (n, s, 2) distance to the right of and above each stop of the route at closest approach, m.
-    Raises StoreError for a file that planfly did not write, or that another process holds.
+    "clearance": minimum height above ground on each of 150 equal pieces of the route, m, (n, 150).
+    "crossings": distance right of and above each stop of the route at closest approach, m, (n, s, 2).
+    Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     with _opened(path) as connection:
         return {name: _read_arrays(connection, name, FIELDS[name].entry) for name in SHAPES}

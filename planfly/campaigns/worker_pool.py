@@ -1,4 +1,4 @@
-"""Workers of a campaign, on this machine or on a running dask cluster, and the rate of their flights."""
+"""Provide the workers of a campaign, on this machine or on a dask cluster, and measure the rate of their flights."""
 
 import contextlib
 import ipaddress
@@ -16,12 +16,12 @@ from planfly.campaigns.local_pool import LocalPool
 from world.errors import PlanflyError
 from world.extras import need_extra
 
-# Time between two lines of progress, s.
+# Minimum time between two progress reports, s.
 REPORTED_EVERY = 0.5
 
 
 class SchedulerError(PlanflyError):
-    """A scheduler cannot be used."""
+    """Raised for a scheduler that cannot be used."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,12 @@ class WorkerPool(Protocol):
     """Workers that fly the flights of a campaign."""
 
     def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
-        """Fly requests as `following` returns them, and yield each when it is done, in any order."""
+        """Fly the requests that `following` returns, and yield each flight when it is done, in any order."""
 
 
 @contextlib.contextmanager
 def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> Iterator[WorkerPool]:
-    """Make the pool of a campaign; on exit, local processes end and workers of a cluster drop the campaign.
+    """Yield the pool of a campaign; on exit, end local processes or remove the campaign from a cluster's workers.
 
     Raises SchedulerError for an address that is not allowed, and for a scheduler that does not answer.
     """
@@ -67,9 +67,9 @@ def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> 
 
 
 def checked_address(address: str) -> str:
-    """Return a scheduler's address if it is allowed: TLS for any host, plain TCP on loopback only.
+    """Return a scheduler's address if it is allowed, which is TLS for any host, and plain TCP on loopback only.
 
-    The workers of a scheduler run any code sent to them.  Raises SchedulerError.
+    The reason is that the workers of a scheduler run any code sent to them.  Raises SchedulerError.
 
     >>> checked_address("127.0.0.1:8786"), checked_address("tls://10.0.0.7:8786")
     ('tcp://127.0.0.1:8786', 'tls://10.0.0.7:8786')
@@ -101,7 +101,7 @@ def _is_loopback(host: str) -> bool:
 
 
 class FlightRate:
-    """Flights per second since its creation.  known: number of flights in the table at the start."""
+    """Rate of flights since this object was made.  known: number of flights in the table at the start."""
 
     def __init__(self, known: int) -> None:
         self._known = known
@@ -116,5 +116,5 @@ class FlightRate:
         return True
 
     def a_second(self, flights: int) -> float:
-        """Return the rate, flights per second, at this number of flights; 0 before the first."""
+        """Return the rate at this number of flights, flights per second; 0 before the first flight."""
         return (flights - self._known) / max(time.monotonic() - self._started, 1e-3)

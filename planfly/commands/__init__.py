@@ -1,1 +1,1 @@
-"""Commands of planfly: one module for each, with a function of the same name, which `registry` finds."""
+"""Commands of planfly, one module each, with a function of the same name that `registry` finds."""

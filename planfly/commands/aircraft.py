@@ -1,4 +1,4 @@
-"""``planfly aircraft``: show an aircraft as tables and pictures, or make the folder of a new one."""
+"""``planfly aircraft``: show an aircraft as tables and pictures, or make the folder of a new aircraft."""
 
 import argparse
 import math
@@ -58,7 +58,7 @@ def aircraft_options(line: LineParser) -> None:
         ),
         aircraft_words,
     )
-    _sheet_options(parser)
+    _data_sheet_options(parser)
     logs = parser.group("flight logs: with --mass and --span, and --out for the folder to make")
     completed(
         logs.add_argument(
@@ -83,7 +83,7 @@ def aircraft_options(line: LineParser) -> None:
     result_options(parser, "where the pictures go (default: runs/aircraft-NAME, replaced); of --identify, the folder")
 
 
-def _sheet_options(parser: CommandParser) -> None:
+def _data_sheet_options(parser: CommandParser) -> None:
     sheet = parser.group("a data sheet: with --new; mass, span, cruise and stall are needed, the rest is guessed")
     numbers = {
         "mass": ("KG", "mass, 0.5 to 25 kg"),
@@ -108,7 +108,7 @@ def _sheet_options(parser: CommandParser) -> None:
 
 
 def aircraft(args: argparse.Namespace) -> int:
-    """List the embedded aircraft, print and draw the named one, or make a folder for a new one."""
+    """List the embedded aircraft, show the named aircraft, or make a folder for a new aircraft."""
     if args.logs is not None:
         return _identify(args)
     for name in ("base", "check"):
@@ -127,7 +127,7 @@ def aircraft(args: argparse.Namespace) -> int:
         for known in listed:
             size = f"{known.mass:.5g} kg, span {known.wing_span:.5g} m"
             print(f"{known.name:<14} {known.title}: {size}, cruises at {known.airspeed:g} m/s")
-        give_answer(args, lambda: _answer(listed))
+        give_answer(args, lambda: _json_answer(listed))
         return FLYABLE
     out = args.out or "runs/aircraft-{name}"
     numbers = call(planfly.describe_aircraft, args, out=out, overwrite=args.overwrite or args.out is None)
@@ -135,12 +135,12 @@ def aircraft(args: argparse.Namespace) -> int:
     print_warnings(numbers.lacking)
     for file in numbers.files:
         print(f"picture   {file}")
-    give_answer(args, lambda: _answer([numbers.aircraft], numbers))
+    give_answer(args, lambda: _json_answer([numbers.aircraft], numbers))
     return FLYABLE
 
 
-def _answer(chosen: "Sequence[Aircraft]", numbers: "AircraftNumbers | None" = None) -> object:
-    """Return the answer for --json: one aircraft with its numbers, or several without."""
+def _json_answer(chosen: "Sequence[Aircraft]", numbers: "AircraftNumbers | None" = None) -> object:
+    """Return the answer for --json, for one aircraft with its numbers or for several aircraft without numbers."""
     from planfly.terminal.answers import AircraftAnswer, aircraft_detail, aircraft_entry
 
     detail = None if numbers is None else aircraft_detail(numbers)
@@ -160,7 +160,7 @@ def _make_folder(args: argparse.Namespace) -> int:
     print(f"aircraft  {shown}/ ({', '.join(files)}), {whose}")
     if sheet:
         _print_sheet(made)
-    give_answer(args, lambda: _answer([made]))
+    give_answer(args, lambda: _json_answer([made]))
     print(f"next      planfly aircraft {shlex.quote(str(shown))}, and --aircraft {shlex.quote(str(shown))} flies it")
     return FLYABLE
 
@@ -202,13 +202,13 @@ def _identify(args: argparse.Namespace) -> int:
     for replay in found.replays:
         shown = ", ".join(f"{name} {value:.2g}" for name, value in replay.rms.items())
         print(f"  replay   {replay.model}: {shown} (rms of {replay.windows} windows of 5 s; deg/s, deg, m/s)")
-    give_answer(args, lambda: _answer([made]))
+    give_answer(args, lambda: _json_answer([made]))
     print(f"next      planfly aircraft {shlex.quote(args.out)}; {args.out}/identify.html says how sure each number is")
     return FLYABLE
 
 
 def _print_unknown(found: "planfly.IdentifiedAircraft") -> None:
-    """Print what the logs leave unknown, and the flight that would show it."""
+    """Print the properties that the logs do not show, and the flights that would show them."""
     if not found.estimate.dynamics:
         print("  performance only: under 10 rows of inertial sensors or outputs a second tell nothing of the moments")
     for log in found.slow:
@@ -307,7 +307,7 @@ def _print_envelope(chosen: "Aircraft", envelope: "Envelope") -> None:
     print("\nsteepest climb / descent to the air, deg, by airspeed and height AMSL ('-': no steady flight)")
     print(f"  m/s  {head}")
     for airspeed in envelope.airspeed.tolist():
-        cells = "".join(f"{_pair(*envelope.air_angles(airspeed, amsl)):>15}" for amsl in heights)
+        cells = "".join(f"{_angle_pair(*envelope.air_angles(airspeed, amsl)):>15}" for amsl in heights)
         print(f"  {airspeed:5.1f}{cells}")
     for title, pick in (("level, from", 0), ("level, to", 1)):
         cells = "".join(f"{envelope.level_speeds(amsl)[pick]:11.1f} m/s" for amsl in heights)
@@ -319,7 +319,7 @@ def _print_envelope(chosen: "Aircraft", envelope: "Envelope") -> None:
         (f"{_WIND_MPS:g} m/s headwind", -_WIND_MPS, 0.0),
         (f"{_WIND_MPS:g} m/s crosswind", 0.0, _WIND_MPS),
     ):
-        print(f"  {title:<18}{_pair(*envelope.slope_limits(chosen.airspeed, 500.0, tail, cross))}")
+        print(f"  {title:<18}{_angle_pair(*envelope.slope_limits(chosen.airspeed, 500.0, tail, cross))}")
 
 
 def _print_turns(chosen: "Aircraft") -> None:
@@ -345,7 +345,7 @@ def _deg(angle: float) -> float:
     return math.degrees(angle)
 
 
-def _pair(climb: float, descent: float) -> str:
+def _angle_pair(climb: float, descent: float) -> str:
     def one(angle: float) -> str:
         return "-" if math.isnan(angle) else f"{_deg(angle):.1f}"
 

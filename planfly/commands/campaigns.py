@@ -1,4 +1,4 @@
-"""``planfly campaign`` and ``planfly winds``: probability that a mission flies, and its largest wind."""
+"""``planfly campaign`` and ``planfly winds``: find the probability that a mission flies, and its strongest wind."""
 
 import argparse
 import signal
@@ -17,7 +17,7 @@ from planfly.workflow.output_paths import RESULTS
 from world.errors import PlanflyError
 from world.interruption import Interrupted
 
-# Exit code for each answer of a campaign.
+# Exit code by the answer of a campaign.
 _EXIT_CODES = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "none asked": FLYABLE}
 
 
@@ -127,10 +127,10 @@ def _shared_options(parser: CommandParser) -> None:
 
 def campaign(args: argparse.Namespace) -> int:
     """Fly a campaign, resume one, or fly one of its flights again."""
-    folder = _folder(args, "campaign")
+    folder = _result_folder(args, "campaign")
     if args.refly is not None:
         return _refly(args, folder)
-    with _kept_flights(folder, "campaign.sqlite") as interrupted:
+    with _report_kept_flights(folder, "campaign.sqlite") as interrupted:
         result = call(planfly.campaign, args, out=folder)
     if interrupted():
         return interrupted()
@@ -143,9 +143,9 @@ def campaign(args: argparse.Namespace) -> int:
 
 
 def winds(args: argparse.Namespace) -> int:
-    """Find the boundary of each direction, or resume the search, and draw the chart."""
-    folder = _folder(args, "winds")
-    with _kept_flights(folder, "winds.sqlite") as interrupted:
+    """Find the strongest wind from each direction, or resume the search, and draw the chart."""
+    folder = _result_folder(args, "winds")
+    with _report_kept_flights(folder, "winds.sqlite") as interrupted:
         found = call(planfly.winds, args, out=folder)
     if interrupted():
         return interrupted()
@@ -157,8 +157,8 @@ def winds(args: argparse.Namespace) -> int:
     return FLYABLE if found.calm is None else NOT_FLYABLE
 
 
-def _folder(args: argparse.Namespace, kind: str) -> Path:
-    """Return the folder of the files: the named one, or ``runs/<name>-<kind>``."""
+def _result_folder(args: argparse.Namespace, kind: str) -> Path:
+    """Return the folder of the files, which is the named folder or ``runs/<name>-<kind>``."""
     return Path(args.out) if args.out else RESULTS / f"{Path(args.target).stem}-{kind}"
 
 
@@ -176,10 +176,10 @@ def _refly(args: argparse.Namespace, folder: Path) -> int:
 
 
 @contextmanager
-def _kept_flights(folder: Path, table: str) -> Iterator[Callable[[], int]]:
-    """Report the flights kept after an interruption; yield a function that returns the exit code.
+def _report_kept_flights(folder: Path, table: str) -> Iterator[Callable[[], int]]:
+    """Report the flights that are kept after an interruption, and yield a function that returns the exit code.
 
-    An interruption before the table exists is raised again.
+    The exit code is 0 without an interruption.  An interruption before the table exists is raised again.
     """
     code = 0
     try:

@@ -1,4 +1,4 @@
-"""``planfly check``: judge a log by its content, or a mission by flying it."""
+"""``planfly check``: judge a flight by its log, or a mission by flying it."""
 
 import argparse
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from planfly import Judged, Verdict
     from planfly.terminal.verdict_answers import VerdictsDocument
 
-# Logs of other programs, as shown in the help.
+# Suffixes of logs of other programs, as the help shows them.
 LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
 
 
@@ -66,13 +66,13 @@ def check_options(line: LineParser) -> None:
 
 
 def check(args: argparse.Namespace) -> int:
-    """Judge a flight or a mission; the exit code follows the verdict, or is 3 for an incomplete log."""
+    """Judge a flight or a mission; return the exit code of the verdict, or 3 for an incomplete log."""
     if args.autopilots is not None:
-        return _check_for(args)
+        return _check_by_autopilots(args)
     judged = call(planfly.judge, args)
     if not judged.is_log:
         print_warnings([*judged.setup.mission.warnings, *judged.setup.scenario.notes])
-    give_answer(args, lambda: _document(judged))
+    give_answer(args, lambda: _verdict_answer(judged))
     give_junit(args, {args.what: judged.verdict})
     print_warnings([judged.loss] if judged.loss else [])
     print_verdict(judged.verdict, judged.setup.notes)
@@ -86,8 +86,8 @@ def check(args: argparse.Namespace) -> int:
 _SINGLE_AUTOPILOT_OPTIONS = ("params", "guidance", "autopilot", "plan", "flight", "datum", "geometry")
 
 
-def _check_for(args: argparse.Namespace) -> int:
-    """Fly a mission by each autopilot; the worst verdict decides the exit code."""
+def _check_by_autopilots(args: argparse.Namespace) -> int:
+    """Fly a mission by each named autopilot, and return the exit code of the worst verdict."""
     from planfly.terminal.autopilot_table import autopilot_lines
 
     for name in _SINGLE_AUTOPILOT_OPTIONS:
@@ -96,20 +96,20 @@ def _check_for(args: argparse.Namespace) -> int:
     flown = call(planfly.fly_by_each, args, mission=args.what)
     verdicts = {name: one.verdict for name, one in flown.items()}
     code = max(verdict_code(verdict) for verdict in verdicts.values())
-    give_answer(args, lambda: _documents(verdicts, args.what, code))
+    give_answer(args, lambda: _verdicts_answer(verdicts, args.what, code))
     give_junit(args, {f"{args.what} by {name}": verdict for name, verdict in verdicts.items()})
     print("\n".join(autopilot_lines(verdicts)))
     return code
 
 
-def _documents(verdicts: Mapping[str, "Verdict"], mission: str, code: int) -> "VerdictsDocument":
+def _verdicts_answer(verdicts: Mapping[str, "Verdict"], mission: str, code: int) -> "VerdictsDocument":
     from planfly.terminal.verdict_answers import VerdictsDocument
 
     documents = {name: verdict.document() for name, verdict in verdicts.items()}
     return VerdictsDocument(exit_code=code, mission=mission, verdicts=documents)
 
 
-def _document(judged: "Judged") -> str:
+def _verdict_answer(judged: "Judged") -> str:
     from logs.verdict.verdict import verdict_json
 
     return verdict_json(judged.verdict)

@@ -31,7 +31,7 @@ def compare_options(line: LineParser) -> None:
 
 
 def compare(args: argparse.Namespace) -> int:
-    """Print the differences, and draw them if a folder is named; return 3 if either log is incomplete."""
+    """Print the differences, and draw them if a folder is named; return 3 if one of the logs is incomplete."""
     from logs.views.report.compare import difference_lines
 
     logs = [planfly.read_log(Path(file)) for file in (args.first, args.second)]
@@ -45,11 +45,11 @@ def compare(args: argparse.Namespace) -> int:
     for log in cut_short:
         warn_of_loss(log)
     code = LOSS if cut_short else FLYABLE
-    give_answer(args, lambda: _answer(comparison, files, code))
+    give_answer(args, lambda: _json_answer(comparison, files, code))
     return code
 
 
-def _answer(comparison: "Comparison", files: list[Path], code: int) -> object:
+def _json_answer(comparison: "Comparison", files: list[Path], code: int) -> object:
     from planfly.terminal.answers import CompareAnswer, QuantityPair
 
     def number(value: float) -> float | None:

@@ -43,7 +43,7 @@ def export(args: argparse.Namespace) -> int:
     written = planfly.export(args.source, *args.files, fence=args.fence, at=args.at, overwrite=args.overwrite)
     print_warnings(written.notes)
     for file, content in zip(written.files, written.contents, strict=True):
-        print(f"{_kind(file.suffix.lower()):<9} {file} ({content})")
+        print(f"{_content_kind(file.suffix.lower()):<9} {file} ({content})")
     code = LOSS if written.loss else FLYABLE
 
     def answer() -> object:
@@ -58,8 +58,8 @@ def export(args: argparse.Namespace) -> int:
     return code
 
 
-def _kind(suffix: str) -> str:
-    """Return the kind of content of a file with a suffix."""
+def _content_kind(suffix: str) -> str:
+    """Return the kind of content of a file with the given suffix."""
     if suffix in (".kml", ".gpx"):
         return "map"
     if suffix == ".parm":

@@ -43,7 +43,7 @@ def fly_options(line: LineParser) -> None:
 
 
 def fly(args: argparse.Namespace) -> int:
-    """Fly a mission into a log; the exit code follows the verdict."""
+    """Fly a mission, write its log, and return the exit code of the verdict."""
     named = args.log is not None
     log = args.log if named else FLY_LOG
     flown = call(planfly.fly, args, log=log, overwrite=args.overwrite or not named)
@@ -58,12 +58,12 @@ def fly(args: argparse.Namespace) -> int:
             print(f"          {flown.autopilot_log} (the autopilot's own)")
         print(coloured(f"next      planfly report {shlex.quote(str(flown.log))}", "hint"))
     code = verdict_code(flown.verdict)
-    give_answer(args, lambda: _answer(args.mission, flown, code))
+    give_answer(args, lambda: _json_answer(args.mission, flown, code))
     give_junit(args, {args.mission: flown.verdict})
     return code
 
 
-def _answer(mission: str, flown: "FlownMission", code: int) -> object:
+def _json_answer(mission: str, flown: "FlownMission", code: int) -> object:
     from planfly.terminal.answers import FlyAnswer
 
     return FlyAnswer(

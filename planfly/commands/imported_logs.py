@@ -48,7 +48,7 @@ def import_log_options(line: LineParser) -> None:
 
 
 def import_log(args: argparse.Namespace) -> int:
-    """Import a log; the exit code follows the verdict, or is 3 if part of the log could not be read."""
+    """Import a log; return the exit code of the verdict, or 3 if part of the log could not be read."""
     flight = call(planfly.import_log, args)
     print_verdict(flight.verdict, flight.setup.route.notes)
     print(f"log       {Path(args.target)} ({len(flight.track)} rows)")
@@ -84,7 +84,7 @@ def refly_options(line: LineParser) -> None:
 
 
 def refly(args: argparse.Namespace) -> int:
-    """Fly the mission again, compare and draw the flights; return 3 for an incomplete log."""
+    """Fly the mission again, and compare and draw both flights; return 3 for an incomplete log."""
     source = Path(args.log)
     log = planfly.read_log(source)
     folder = args.out or source.with_name(f"{source.stem}-refly")

@@ -1,4 +1,4 @@
-"""``planfly new``: write a first version of a new scenario, and try to plan it."""
+"""``planfly new``: write a first version of a new scenario, and try to plan a path in it."""
 
 import argparse
 import shlex
@@ -49,7 +49,7 @@ def new_options(line: LineParser) -> None:
 
 
 def new(args: argparse.Namespace) -> int:
-    """Write the scenario, and plan it; return 4 if the plan is not safe, and keep the file."""
+    """Write the scenario, and plan a path in it; return 4 if the plan is not safe, but keep the file."""
     from planner.plan import Objective
 
     file = call(planfly.new_scenario, args)

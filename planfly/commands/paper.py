@@ -46,7 +46,7 @@ def paper_options(line: LineParser) -> None:
 
 
 def paper(args: argparse.Namespace) -> int:
-    """Plan, write and print the table; return 0 for every result, because no path is also an answer."""
+    """Plan, and write and print the table; return 0 for every result, because "no path" is also an answer."""
     folder = Path(args.out) if args.out else RESULTS / "paper"
     made = call(planfly.paper_tables, args, out=folder, overwrite=args.overwrite or args.out is None)
     from planfly.planning.paper import table_text

@@ -33,7 +33,7 @@ def plan_options(line: LineParser) -> None:
         "planfly plan jacksboro --from plan.json --at-leg 4 --add-threat -2000,1500,800,1500",
         "planfly plan hard-30 --front 20 --out front",
     )
-    parser.more = _algorithms
+    parser.more = _algorithms_help
     parser.alias("seconds", "--budget")
     scenario_argument(parser, help="TOML file or embedded name")
     planning = parser.group("planning")
@@ -79,7 +79,7 @@ def plan_options(line: LineParser) -> None:
     result_options(parser, "the plan file (default: runs/<name>-seed<N>/plan.json, replaced)", "FILE")
 
 
-def _algorithms() -> str:
+def _algorithms_help() -> str:
     from planner.search.algorithms import algorithm_lines
 
     return f"algorithms:\n{algorithm_lines()}"
@@ -89,11 +89,11 @@ def plan(args: argparse.Namespace) -> int:
     """Plan a path, and write the plan file; return 4 if the plan is not safe."""
     _check_replanning(args)
     if args.front is not None:
-        return _front(args)
+        return _plan_front(args)
     name = "plan.json" if args.old is None else "replan.json"
     out = f"{RUN_FOLDER}/{name}" if args.out is None else args.out
     evaluations, seconds = args.budget or (None, None)
-    with _best_so_far() as stop:
+    with _stop_on_interrupt() as stop:
         made = call(
             planfly.plan if args.old is None else planfly.replan,
             args,
@@ -108,12 +108,12 @@ def plan(args: argparse.Namespace) -> int:
     _print_plan(made)
     print(f"plan      {target}")
     code = FLYABLE if made.safe else NOT_FLYABLE
-    give_answer(args, lambda: _answer(made, target, code))
+    give_answer(args, lambda: _json_answer(made, target, code))
     return code
 
 
-def _front(args: argparse.Namespace) -> int:
-    """Plan a front and write its folder; return 4 if there is no safe plan."""
+def _plan_front(args: argparse.Namespace) -> int:
+    """Plan a Pareto front and write its folder; return 4 if there is no safe plan."""
     from planfly.api.fronts import FRONT_FOLDER
     from planfly.terminal.plan_answers import front_answer, front_lines
 
@@ -125,7 +125,7 @@ def _front(args: argparse.Namespace) -> int:
         allowed = "with `front` N a number of seconds is expected, as in 10s"
         raise ScenarioError.of_argument("budget", evaluations, allowed)
     out = FRONT_FOLDER if args.out is None else args.out
-    with _best_so_far() as stop:
+    with _stop_on_interrupt() as stop:
         made = call(
             planfly.plan_front,
             args,
@@ -144,7 +144,7 @@ def _front(args: argparse.Namespace) -> int:
     return code
 
 
-def _answer(made: "Plan", target: "Path", code: int) -> object:
+def _json_answer(made: "Plan", target: "Path", code: int) -> object:
     from planfly.api.planning import conditions_of_plan
     from planfly.terminal.plan_answers import PlanAnswer
     from planner.plan import Objective
@@ -167,8 +167,8 @@ def _answer(made: "Plan", target: "Path", code: int) -> object:
 
 
 @contextmanager
-def _best_so_far() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns True after Ctrl-C, to stop a search; a second Ctrl-C ends the command."""
+def _stop_on_interrupt() -> Iterator[Callable[[], bool]]:
+    """Yield a function that returns True after Ctrl-C, which stops a search; a second Ctrl-C ends the command."""
     pressed = False
 
     def press(_signal: int, _frame: FrameType | None) -> None:
@@ -185,7 +185,7 @@ def _best_so_far() -> Iterator[Callable[[], bool]]:
 
 
 def _check_replanning(args: argparse.Namespace) -> None:
-    """Refuse an option of planning in flight without the others.  Raises ScenarioError."""
+    """Raise ScenarioError if only some of the options for planning in flight are given."""
     if args.old is None:
         for name in ("at_leg", "threats"):
             if (value := getattr(args, name)) is not None:
@@ -197,7 +197,7 @@ def _check_replanning(args: argparse.Namespace) -> None:
 
 
 def _print_plan(made: "Plan") -> None:
-    """Print a plan."""
+    """Print the properties of a plan."""
     from logs.verdict.conditions import autopilot_line, condition_lines
     from planfly.api.planning import conditions_of_plan
     from planner.plan import Objective

@@ -29,15 +29,15 @@ def recover(args: argparse.Namespace) -> int:
     log = call(planfly.recover, args, out=target)
     if log is None:
         print(f"{source}: complete: there is nothing to recover, and nothing was written")
-        give_answer(args, lambda: _answer(None, None, None))
+        give_answer(args, lambda: _json_answer(None, None, None))
         return FLYABLE
     print(f"log       {target} ({len(log.track)} rows, to {log.end_time:.1f} s)")
     warn_of_loss(log)
-    give_answer(args, lambda: _answer(target, len(log.track), log.end_time))
+    give_answer(args, lambda: _json_answer(target, len(log.track), log.end_time))
     return LOSS
 
 
-def _answer(target: Path | None, rows: int | None, end: float | None) -> object:
+def _json_answer(target: Path | None, rows: int | None, end: float | None) -> object:
     from planfly.terminal.answers import RecoverAnswer
 
     code = FLYABLE if target is None else LOSS

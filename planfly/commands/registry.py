@@ -1,8 +1,8 @@
-"""List of the commands, from which the parser, the help, the schemas and the dispatch are made.
+"""List the commands, from which the parser, the help, the schemas and the dispatch are made.
 
-A command is a module of this package with two functions: ``NAME_options`` adds its parser to the line, and ``NAME``
-takes the parsed arguments, calls the API, prints, and returns the exit code.  The API compiles the kernels that it
-needs.
+A command is a module of this package with two functions: ``NAME_options`` adds its parser to the command line's parser,
+and ``NAME`` takes the parsed arguments, calls the API, prints, and returns the exit code.  The API compiles the kernels
+that it needs.
 All modules are light: the code that a command needs is imported when the command runs.
 """
 
@@ -15,15 +15,15 @@ from typing import Any, NamedTuple
 from planfly._version import __version__
 from planfly.terminal.command_parser import LineParser
 
-# Function of a command: from parsed arguments to exit code.
+# Function of a command, which takes parsed arguments and returns the exit code.
 CommandFunction = Callable[[argparse.Namespace], int]
 
 
 class Command(NamedTuple):
     """A command of planfly.
 
-    section: the heading above it in ``planfly --help``.
-    answer: class of its answer with --json, in `planfly.terminal.answers`, or "MODULE.CLASS" in `planfly.terminal`; ""
+    section: the heading above the command in ``planfly --help``.
+    answer: class of the answer with --json, in `planfly.terminal.answers`, or "MODULE.CLASS" in `planfly.terminal`; ""
         for a command without --json.
     module, function: names in this package; "" if they equal the name of the command.
     """
@@ -84,7 +84,7 @@ first steps:
 
 
 def build_parser() -> LineParser:
-    """Return the parser of the whole command line."""
+    """Return the parser for the whole command line."""
     line = LineParser(
         __version__,
         "Will this plan really fly?  Plans a fixed-wing path over terrain and threats,\n"
@@ -98,34 +98,34 @@ def build_parser() -> LineParser:
 
 
 def find_command(name: str) -> CommandFunction:
-    """Return the function that executes a command: from parsed arguments to exit code.
+    """Return the function that executes a command; it takes parsed arguments and returns the exit code.
 
-    Its results go to standard output, its progress to standard error.  Raises KeyError for an unknown name.
+    The function writes results to standard output and progress to standard error.  Raises KeyError for an unknown name.
 
     >>> find_command("scenarios").__module__
     'planfly.commands.shell'
     """
-    return _named(name).load()
+    return _find_entry(name).load()
 
 
-def _named(name: str) -> Command:
+def _find_entry(name: str) -> Command:
     return {command.name: command for command in COMMANDS}[name]
 
 
 # ----------------------------------------------------------------------
-# JSON schemas of the answers of commands.
+# Make JSON schemas of the answers of commands.
 
 # Identifier of JSON Schema, draft 2020-12.
 _JSON_SCHEMA_DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def answering_commands() -> list[str]:
-    """Return the commands that have ``--json``."""
+    """Return the names of the commands that have ``--json``."""
     return [command.name for command in COMMANDS if command.answer]
 
 
 def answer_schema(name: str) -> dict[str, Any]:
-    """Return the JSON schema, draft 2020-12, of a command's answer; raise KeyError without an answer.
+    """Return the JSON schema (draft 2020-12) of a command's answer.  Raises KeyError for a command without an answer.
 
     >>> sorted(answer_schema("scenarios")["properties"])
     ['exit_code', 'scenarios', 'schema']
@@ -135,14 +135,14 @@ def answer_schema(name: str) -> dict[str, Any]:
 
     if name not in answering_commands():
         raise KeyError(name)
-    module, _, answer = _named(name).answer.rpartition(".")
+    module, _, answer = _find_entry(name).answer.rpartition(".")
     answers = import_module(f"planfly.terminal.{module or 'answers'}")
     made = TypeAdapter(getattr(answers, answer)).json_schema(mode="serialization")
     return {"$schema": _JSON_SCHEMA_DRAFT, **made, "title": f"planfly {name} --json"}
 
 
 def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the object schema of an answer, or all of them if options choose between several.
+    """Return the object schemas of an answer; there are several if options choose between several objects.
 
     >>> [one["properties"]["schema"]["const"] for one in answer_objects(answer_schema("check"))]
     ['planfly.verdict/3', 'planfly.verdicts/1']
@@ -152,5 +152,5 @@ def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def schema_text(name: str) -> str:
-    """Return the schema as the text of a file."""
+    """Return the JSON schema of a command's answer as the text of a file."""
     return json.dumps(answer_schema(name), indent=1) + "\n"

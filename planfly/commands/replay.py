@@ -29,15 +29,15 @@ if TYPE_CHECKING:
 
 # Frame rate on a terminal, Hz.
 _RATE = 10.0
-# Terminal sequence: switch to the alternate screen and hide the cursor.
+# Terminal sequence that switches to the alternate screen and hides the cursor.
 _ENTER_SCREEN = "\x1b[?1049h\x1b[?25l"
-# Terminal sequence: show the cursor and leave the alternate screen.
+# Terminal sequence that shows the cursor and leaves the alternate screen.
 _LEAVE_SCREEN = "\x1b[?25h\x1b[?1049l"
-# Terminal sequence: move the cursor to the top left corner.
+# Terminal sequence that moves the cursor to the top left corner.
 _HOME = "\x1b[H"
-# Terminal sequence: erase to the end of the line.
+# Terminal sequence that erases to the end of the line.
 _ERASE_LINE_END = "\x1b[K"
-# Terminal sequence: erase to the end of the screen.
+# Terminal sequence that erases to the end of the screen.
 _ERASE_SCREEN_END = "\x1b[J"
 
 
@@ -102,7 +102,7 @@ def replay_options(line: LineParser) -> None:
 
 
 def replay(args: argparse.Namespace) -> int:
-    """Show instruments, the timeline or the output of the options; return 3 for an incomplete log."""
+    """Show the instruments or the timeline, or replay as the options request; return 3 for an incomplete log."""
     stations = isinstance(args.to, str)
     if bool(args.foxglove) + bool(args.movie) + stations > 1:
         options = "--foxglove, --movie, --to IP:PORT"
@@ -124,11 +124,11 @@ def replay(args: argparse.Namespace) -> int:
     if not log.complete:
         warn_of_loss(log)
     code = FLYABLE if log.complete else LOSS
-    give_answer(args, lambda: _answer(args, log, code))
+    give_answer(args, lambda: _json_answer(args, log, code))
     return code
 
 
-def _answer(args: argparse.Namespace, log: "FlightLog", code: int) -> object:
+def _json_answer(args: argparse.Namespace, log: "FlightLog", code: int) -> object:
     """Return the timeline of the replayed part, or of the whole flight if it is sent to ground stations."""
     from planfly.terminal.answers import ReplayAnswer, TimelineEvent
 
@@ -138,7 +138,7 @@ def _answer(args: argparse.Namespace, log: "FlightLog", code: int) -> object:
 
 
 def _print_timeline(log: "FlightLog", args: argparse.Namespace) -> None:
-    """Print the timeline, at ``--speed`` times real time or at once."""
+    """Print the timeline at ``--speed`` times real time, or immediately without ``--speed``."""
     from logs.views.replay.timeline import entry_lines
 
     speed = args.speed
@@ -151,7 +151,7 @@ def _print_timeline(log: "FlightLog", args: argparse.Namespace) -> None:
 
 
 def _show_instruments(log: "FlightLog", args: argparse.Namespace) -> None:
-    """Show frames until the end or an interruption; the last one stays on the terminal."""
+    """Show frames until the end or an interruption; the last frame stays on the terminal."""
     speed, lines = args.speed or 1.0, list[str]()
     frames = call(planfly.replay, args, log=log, width=lambda: shutil.get_terminal_size().columns)
     screen = plain_stream(sys.stdout)

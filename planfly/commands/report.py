@@ -33,7 +33,7 @@ def report_options(line: LineParser) -> None:
 
 
 def report(args: argparse.Namespace) -> int:
-    """Draw and write the report; the exit code follows the verdict, or is 3 for an incomplete log."""
+    """Draw and write the report; return the exit code of the verdict, or 3 for an incomplete log."""
     if args.layout:
         return _write_layout(args)
     if args.log is None:
@@ -54,11 +54,11 @@ def report(args: argparse.Namespace) -> int:
     if not log.complete:
         warn_of_loss(log)
         code = LOSS
-    give_answer(args, lambda: _answer(written.files, written.verdict, code))
+    give_answer(args, lambda: _json_answer(written.files, written.verdict, code))
     return code
 
 
-def _answer(written: Sequence[Path], verdict: "Verdict | None", code: int) -> object:
+def _json_answer(written: Sequence[Path], verdict: "Verdict | None", code: int) -> object:
     from planfly.terminal.answers import ReportAnswer
 
     document = None if verdict is None else verdict.document()
@@ -71,5 +71,5 @@ def _write_layout(args: argparse.Namespace) -> int:
         raise PlanflyError(message, file=args.log, field="--layout", value=args.layout)
     file = planfly.foxglove_layout(args.layout, overwrite=args.overwrite)
     print(f"layout    {file}")
-    give_answer(args, lambda: _answer([file], None, FLYABLE))
+    give_answer(args, lambda: _json_answer([file], None, FLYABLE))
     return FLYABLE

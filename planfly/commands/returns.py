@@ -23,7 +23,7 @@ from planfly.terminal.output import give_answer
 if TYPE_CHECKING:
     from planfly import ReturnsFound
 
-# Largest number of ranges of seconds that are listed.
+# Maximum number of ranges of seconds that are listed.
 _LISTED = 20
 
 
@@ -77,7 +77,7 @@ def returns_options(line: LineParser) -> None:
 
 
 def returns(args: argparse.Namespace) -> int:
-    """Judge every return; return 0 if all are safe, 4 if one is not, 3 if that is not known."""
+    """Judge every return; the exit code is 0 if all are safe, 4 if one is unsafe, and 3 if some are undecided."""
     from logs.verdict.conditions import flown_lines, setup_conditions
 
     found = call(planfly.returns, args)
@@ -107,11 +107,11 @@ def returns(args: argparse.Namespace) -> int:
         print(f"  note    {text}")
     for path in found.files:
         print(f"  written {path}")
-    give_answer(args, lambda: _answer(str(args.what), found, code))
+    give_answer(args, lambda: _json_answer(str(args.what), found, code))
     return code
 
 
-def _answer(what: str, found: "ReturnsFound", code: int) -> object:
+def _json_answer(what: str, found: "ReturnsFound", code: int) -> object:
     from logs.verdict.conditions import setup_conditions
     from planfly.terminal.returns_answers import (
         CauseEntry,

@@ -1,4 +1,4 @@
-"""``planfly run``: run the whole chain into one folder, once or in rounds."""
+"""``planfly run``: plan, fly, judge and report into one folder, once or in rounds."""
 
 import argparse
 from typing import TYPE_CHECKING
@@ -52,17 +52,17 @@ def run_options(line: LineParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Plan, export, fly, record, judge and report; with ``--refine N``, up to N more rounds."""
+    """Plan, export, fly, record, judge and report, with up to N more rounds for ``--refine N``."""
     result = call(planfly.run, args, on_round=_print_round)
     if args.refine:
         _print_rounds(result)
     code = verdict_code(result.verdict)
-    give_answer(args, lambda: _answer(result, bool(args.refine), code))
+    give_answer(args, lambda: _json_answer(result, bool(args.refine), code))
     give_junit(args, {result.scenario: result.verdict})
     return code
 
 
-def _answer(result: "RunResult", refined: bool, code: int) -> object:
+def _json_answer(result: "RunResult", refined: bool, code: int) -> object:
     from planfly.terminal.answers import RoundAnswer, RunAnswer
 
     rounds = [

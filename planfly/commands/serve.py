@@ -1,4 +1,4 @@
-"""``planfly serve``: simulate a vehicle that ground stations find, upload to, arm, start and follow."""
+"""``planfly serve``: simulate a vehicle to which ground stations connect to upload missions, arm and follow it."""
 
 import argparse
 

@@ -11,7 +11,7 @@ from planfly.terminal.options import json_option
 from planfly.terminal.output import give_answer
 from world.files import did_you_mean
 
-# Help text on the installation of the completion.
+# Help text on how to install the completion.
 _COMPLETION_HELP = """\
 to complete in this shell, and in those to come:
   bash   eval "$(planfly completion bash)", in ~/.bashrc
@@ -56,7 +56,7 @@ def show_help_options(line: LineParser) -> None:
 
 
 def show_help(args: argparse.Namespace) -> int:
-    """Print the help of one command or all, or a schema; return 2 for an unknown command."""
+    """Print the help of planfly or of one command, or a command's schema; return 2 for an unknown command."""
     # Imported here: the registry lists this module.
     from planfly.commands.registry import answering_commands, build_parser, schema_text
 

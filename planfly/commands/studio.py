@@ -1,4 +1,4 @@
-"""``planfly studio``: serve a local page to drag a mission, judge it while dragging, and fly it."""
+"""``planfly studio``: serve a local page on which a mission is dragged, judged and flown."""
 
 import argparse
 

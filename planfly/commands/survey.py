@@ -1,4 +1,4 @@
-"""``planfly survey``: judge how much of each photo line can be used."""
+"""``planfly survey``: judge which part of each photo line is usable."""
 
 import argparse
 from pathlib import Path
@@ -52,7 +52,7 @@ def survey_options(line: LineParser) -> None:
 
 
 def survey(args: argparse.Namespace) -> int:
-    """Judge every photo line; return 4 if one cannot be used, else the code of the verdict on the flight."""
+    """Judge every photo line; return 4 if one is not usable, otherwise the exit code of the verdict on the flight."""
     from logs.verdict.conditions import flown_lines, setup_conditions
 
     found = call(planfly.survey, args)
@@ -73,16 +73,16 @@ def survey(args: argparse.Namespace) -> int:
     for path in found.files:
         print(f"  written {path}")
     if missions := [path for path in found.files if path.suffix == ".waypoints"]:
-        # Without items that switch a camera, every other command judges a mission as a path.
+        # Other commands judge a mission without camera items as a path, not as a survey.
         settings = [f" --params {quote(str(path))}" for path in found.files if path.suffix == ".param"]
         also = settings[0] if missions[0].stem == "parameter" and settings else ""
         following = f"next      planfly survey {quote(str(missions[0]))}{also} with the same options, as it was flown"
         print(coloured(following, "hint"))
-    give_answer(args, lambda: _answer(str(args.what), found, code))
+    give_answer(args, lambda: _json_answer(str(args.what), found, code))
     return code
 
 
-def _answer(what: str, found: "SurveyFound", code: int) -> object:
+def _json_answer(what: str, found: "SurveyFound", code: int) -> object:
     from logs.verdict.conditions import setup_conditions
     from planfly.terminal.survey_answers import (
         SurveyAnswer,

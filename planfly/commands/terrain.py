@@ -11,7 +11,7 @@ from planfly.terminal.options import call, result_options
 from planfly.terminal.output import give_answer
 from planfly.terminal.results import print_warnings
 
-# Largest number of degree cells without data that are named.
+# Maximum number of degree cells without data that are listed.
 _NAMED = 4
 
 

@@ -1,1 +1,1 @@
-"""Identify an aircraft from flight logs: estimate a model, then write, replay and show it."""
+"""Identify an aircraft from flight logs by estimating a model, which is then written, replayed and shown."""

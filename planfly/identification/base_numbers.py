@@ -33,8 +33,8 @@ _SLUG_FT2 = 1.3558179483314004
 def base_model(aircraft: Aircraft) -> BaseModel:
     """Return the model values of an aircraft.
 
-    Raises FlightError for an aircraft without steady flight at cruise, and for a motor model in neither the form of the
-    Aerosonde nor the form of Zagi and X8.
+    Raises FlightError for an aircraft without steady flight at cruise, and for a motor model that has neither the form
+    of the Aerosonde's nor that of the Zagi's and X8's.
 
     >>> from aircraft.catalog import load_aircraft
     >>> numbers = base_model(load_aircraft("aerosonde")).coefficients
@@ -53,7 +53,7 @@ def base_model(aircraft: Aircraft) -> BaseModel:
         motor_lag=aircraft.motor_lag,
         coefficients=probe.coefficients(),
         motor=motor,
-        reacts=_reacts(aircraft),
+        reacts=_has_torque_reaction(aircraft),
     )
 
 
@@ -77,7 +77,7 @@ class _Probe:
         self._pressure = read("aero/qbar-psf")() * 47.88025898033584 * self._area
 
     def coefficients(self) -> Coefficients:
-        """Return central differences about the trim with closed throttle; the propeller may windmill."""
+        """Return coefficients by central differences about the trim at closed throttle; the propeller may windmill."""
         zero = self._at(0.0)
         # Fit drag over lift on the straight part of the lift curve.
         angles = np.radians([-2.0, 0.0, 2.0, 4.0, 6.0])
@@ -133,7 +133,7 @@ class _Probe:
     def _at(
         self, alpha: float, beta: float = 0.0, rates: Floats | None = None, surfaces: Floats | None = None
     ) -> Floats:
-        """Return aerodynamic coefficients (6,) of drag, lift, side force and moments, with closed throttle."""
+        """Return the coefficients of drag, lift, side force and moments at closed throttle, (6,)."""
         turning = np.zeros(3) if rates is None else rates
         deflections = np.zeros(3) if surfaces is None else surfaces
         speed = self._airspeed
@@ -150,22 +150,22 @@ class _Probe:
 
 
 def is_flying_wing(aircraft: Aircraft) -> bool:
-    """Return True if a model has elevons and mixes them from elevator and aileron itself."""
-    root = _model(aircraft)
+    """Return True if a model has elevons, which it mixes from elevator and aileron."""
+    root = _parse_model(aircraft)
     return root is not None and any(one.get("name") == "elevon/left-rad" for one in root.iter("actuator"))
 
 
-def _reacts(aircraft: Aircraft) -> bool:
+def _has_torque_reaction(aircraft: Aircraft) -> bool:
     """Return True if a model includes the reaction to propeller torque.
 
-    Models of flying wings leave it out.
+    Models of flying wings leave out this reaction.
     """
-    root = _model(aircraft)
+    root = _parse_model(aircraft)
     reactions = None if root is None else root.find("external_reactions")
     return reactions is None or reactions.find("moment") is not None
 
 
-def _model(aircraft: Aircraft) -> ElementTree.Element | None:
+def _parse_model(aircraft: Aircraft) -> ElementTree.Element | None:
     """Return the parsed model, or None if it cannot be parsed (JSBSim reports the fault later)."""
     try:
         return ElementTree.parse(aircraft.model_file).getroot()
@@ -174,16 +174,16 @@ def _model(aircraft: Aircraft) -> ElementTree.Element | None:
 
 
 def read_motor(aircraft: Aircraft) -> Motor:
-    """Return the constants of a model's motor, or of its propeller disc.
+    """Return the constants of a model's motor or propeller disc.
 
-    Raises FlightError for any other form.
+    Raises FlightError for a motor model of another form.
     """
     try:
         root = ElementTree.parse(aircraft.model_file).getroot()
         functions = {one.get("name", ""): one for one in root.iter("function")}
         if "motor/exit-mps" in functions:
-            return _disc(functions, aircraft.battery_voltage)
-        return _electric_motor(functions, aircraft.battery_voltage)
+            return _read_propeller_disc(functions, aircraft.battery_voltage)
+        return _read_electric_motor(functions, aircraft.battery_voltage)
     except (KeyError, ValueError, IndexError, StopIteration, OSError, ElementTree.ParseError):
         allowed = "a motor in the form of aircraft/aerosonde/aerosonde.xml or aircraft/x8/x8.xml is expected"
         raise FlightError(
@@ -193,29 +193,29 @@ def read_motor(aircraft: Aircraft) -> Motor:
         ) from None
 
 
-def _numbers(function: ElementTree.Element) -> list[float]:
+def _function_values(function: ElementTree.Element) -> list[float]:
     return [float(one.text or "nan") for one in function.iter("v")]
 
 
-def _disc(functions: dict[str, ElementTree.Element], volts: float) -> PropellerDisc:
+def _read_propeller_disc(functions: dict[str, ElementTree.Element], volts: float) -> PropellerDisc:
     behind, pull, power = (functions[f"motor/{name}"] for name in ("exit-mps", "thrust-n", "battery-power-w"))
-    (exit_speed,) = _numbers(behind)
-    (area,) = (value for value in _numbers(pull) if value != 0.0)
+    (exit_speed,) = _function_values(behind)
+    (area,) = (value for value in _function_values(pull) if value != 0.0)
     # The factor is half the power given to the air, divided by the efficiency.
-    (half,) = _numbers(power)
+    (half,) = _function_values(power)
     ducted = any((one.text or "").strip() == "motor/airspeed-mps" for one in behind.iter("p"))
     return PropellerDisc(area, exit_speed, ducted, losses=2.0 * half - 1.0, voltage=volts, nominal=volts)
 
 
-def _electric_motor(functions: dict[str, ElementTree.Element], volts: float) -> ElectricMotor:
+def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float) -> ElectricMotor:
     def numbers(name: str) -> list[float]:
-        return _numbers(functions[name])
+        return _function_values(functions[name])
 
     (q2,), (q1,), (q0,) = (numbers(f"motor/q{k}") for k in (2, 1, 0))
     (damping,) = numbers("motor/b")
     driven = numbers("motor/driven-rad_sec")
     per_volt = -next(value for value in driven if value < 0.0)
-    # The no-load torque stands in this function or in one of its own.
+    # The no-load torque is in this function or in a separate function.
     own = functions.get("motor/loss-n_m")
     idle = numbers("motor/loss-n_m")[0] if own is not None else next(v for v in driven if 0.0 < v < 2.0)
     back = damping / per_volt
@@ -235,10 +235,11 @@ def _electric_motor(functions: dict[str, ElementTree.Element], volts: float) -> 
 def scaled(base: BaseModel, mass: float, span: float, area: float, volts: float | None = None) -> BaseModel:
     """Return the same kind of aircraft with another mass (kg), span (m) and area (m^2).
 
-    Inertia scales with mass and span squared.  The ratio of chord to mean chord stays.  Induced drag is CL^2 divided by
-    pi, span efficiency and aspect ratio (Anderson, Fundamentals of Aerodynamics, section 5.3.2); the efficiency, all
-    other coefficients and the motor stay.
-    volts: battery voltage; for another voltage the motor is replaced by one of the same speed at full throttle.
+    Inertia scales with mass and span squared.  The ratio of chord to mean chord is kept.  Induced drag is CL^2 divided
+    by pi, span efficiency and aspect ratio (Anderson, Fundamentals of Aerodynamics, section 5.3.2); the efficiency, all
+    other coefficients and the motor are kept.
+
+    volts: battery voltage, V; if it differs, the motor is replaced by one with the same speed at full throttle.
     """
     weight, wide = mass / base.mass, span / base.span
     chord = base.chord * (area / span) / (base.area / base.span)

@@ -1,4 +1,4 @@
-"""Check an estimate for impossible results: reversed outputs, values at their bounds, a changing mass."""
+"""Check an estimate for impossible results, such as reversed outputs, values at their bounds, or a changing mass."""
 
 import numpy as np
 
@@ -9,23 +9,23 @@ from world.errors import LogError
 
 # Control of each parameter whose sign depends on the direction of a servo output.
 _POWERS = {"aileron-power": "aileron", "elevator-power": "elevator", "rudder-power": "rudder"}
-# The sign of a parameter is judged if the logs contribute at least this fraction of its interval.
+# Minimum fraction of a parameter's information that the logs must contribute for its sign to be judged.
 _KNOWN = 0.3
-# Lowest and highest plausible lift slope of a wing, per rad.
+# Minimum and maximum plausible lift slope of a wing, per rad.
 LIFT_SLOPES = (3.0, 7.0)
-# Largest accepted change of mass within the logs, as a fraction.
+# Maximum accepted change of mass within the logs, as a fraction.
 MASS_CHANGE = 0.05
-# A change of mass is reported only if it exceeds this number of standard deviations.
+# Minimum change of mass that is reported, in standard deviations.
 _MASS_CHANGE_SIGMAS = 4.0
-# Duration of the blocks that are averaged for the trend of the mass, s.
+# Duration of the blocks over which the trend of the mass is averaged, s.
 _BLOCK_SECONDS = 30.0
 
 
 def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int], source: str) -> None:
     """Raise LogError for an estimate that no aircraft can have.
 
-    outputs: servo output number of each control that has its own output.  source: name of the logs, for the message.
-    The message is one line.
+    outputs: servo output number of each control that has its own output.
+    source: name of the logs, for the one-line message.
     """
     known = estimate.of_log()
     for name, control in _POWERS.items():
@@ -61,8 +61,9 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
 def mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, float]:
     """Return the change of mass over all logs, as a fraction of the mass, and its standard deviation.
 
-    An aircraft that burns fuel or drops a load needs less and less angle of attack for its supposed mass.  The change
-    is the trend of measured less predicted angle of attack, divided by the predicted angle above zero lift.
+    An aircraft that burns fuel or drops a load needs an ever smaller angle of attack than its assumed mass requires.
+    The change is the trend of the measured minus the predicted angle of attack, divided by the predicted angle above
+    zero lift.
     """
     equation = estimate.equations[0]
     c = base.coefficients

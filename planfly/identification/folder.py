@@ -1,4 +1,4 @@
-"""Build the folder of an identified aircraft: its model and the files that go with it."""
+"""Build the folder of an identified aircraft, with its model and accompanying files."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -30,7 +30,7 @@ from world.files import temporary_folder
 AMSL = 480.0
 # Density of the standard atmosphere at that altitude, kg/m^3 (ISO 2533).
 DENSITY = 1.1695
-# Prefixes of the parameters that determine flight behaviour; the others describe hardware.
+# Prefixes of the parameters that determine flight behaviour; other parameters describe hardware.
 _FLYING = (
     "AIRSPEED_",
     "ARSPD_FBW_",
@@ -61,8 +61,11 @@ _FLYING = (
 class Identified:
     """Results of an identification.
 
-    base: the aircraft that the identification started from.  numbers: model values of the base, scaled.
-    draws: (512, n) draws of the estimate.  logs: the logs used.  outputs: the servo outputs.
+    base: the aircraft from which the identification started.
+    numbers: model values of the base, scaled to the aircraft.
+    draws: draws of the estimate, (512, n).
+    logs: the logs used.
+    outputs: the servo outputs.
     """
 
     base: Aircraft
@@ -74,7 +77,7 @@ class Identified:
     cruise: float
 
     def performance(self) -> tuple[Performance, Performance]:
-        """Return the performance of the estimate (1,) and of all draws (512,)."""
+        """Return the performance of the estimate, (1,), and of all draws, (512,)."""
         return (
             performance(self.numbers, self.estimate.values, self.cruise, DENSITY),
             performance(self.numbers, self.draws, self.cruise, DENSITY),
@@ -88,16 +91,19 @@ def make_identified(
     logs: Sequence[MotionLog],
     outputs: Mapping[str, ServoOutput],
 ) -> Identified:
-    """Return an identification with 512 draws, at the cruise speed (true, at `AMSL`) of the last log."""
+    """Return an identification with 512 draws, at the last log's cruise speed, a true airspeed at `AMSL`."""
     cruise = _airspeeds(logs[-1], base)[0]
     return Identified(base, numbers, estimate, draw_aircraft(estimate), logs, outputs, cruise)
 
 
 def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> dict[str, str]:
-    """Return the files of the folder by name, except the page; battery: V and J.
+    """Return the files of the folder by name, except the page.
 
-    The mission of manoeuvres begins at the home position of the last log that has one; without any it is left out.
-    Raises FlightError for an aircraft that does not trim.
+    The mission of manoeuvres starts at the home position of the last log that has one; without a home position it is
+    left out.
+
+    battery: voltage, V, and energy, J.
+    Raises FlightError for an aircraft that cannot be trimmed.
     """
     xml = identified_xml(found.base, name, found.numbers, found.estimate.values)
     with temporary_folder("planfly-identified-") as place:
@@ -105,10 +111,10 @@ def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> 
         folder.mkdir()
         (folder / f"{name}.xml").write_text(xml, encoding="utf-8")
         toml = folder / f"{name}.toml"
-        toml.write_text(_metadata(found, battery, 0.0), encoding="utf-8")
+        toml.write_text(_metadata_text(found, battery, 0.0), encoding="utf-8")
         envelope = load_envelope(read_aircraft(folder))
         slow, fast = envelope.level_speeds(0.0)
-        toml.write_text(_metadata(found, battery, slow, fast), encoding="utf-8")
+        toml.write_text(_metadata_text(found, battery, slow, fast), encoding="utf-8")
         aircraft = read_aircraft(folder)
         home = next((log.home for log in reversed(found.logs) if log.home is not None), None)
         files = {
@@ -121,19 +127,17 @@ def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> 
             files["identify.waypoints"] = waypoints_text(mission)
     properties = tuple(parameter.property_name for parameter in PARAMETERS)
     return files | {
-        "ardupilot.parm": _parameters(found.logs[-1]),
-        "ardupilot.toml": _servos(found.outputs),
+        "ardupilot.parm": _parameter_file_text(found.logs[-1]),
+        "ardupilot.toml": _servo_file_text(found.outputs),
         "posterior.toml": posterior_text(found),
         "draws.csv": draws_text(Draws(properties, found.draws)),
     }
 
 
 def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
-    """Return cruise, lowest and highest true airspeed at `AMSL`, m/s.
+    """Return cruise, minimum and maximum true airspeed at `AMSL`, m/s.
 
-    Values that the log does not state come from the base.
-
-    ArduPlane's parameters are equivalent airspeeds.
+    Values that the log does not state are taken from the base.  ArduPlane's parameters are equivalent airspeeds.
     """
     stated = flown_parameters(log)
     ratio = math.sqrt(1.225 / DENSITY)
@@ -148,8 +152,8 @@ def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
     return cruise, least, most
 
 
-def _metadata(found: Identified, battery: tuple[float, float], slow: float, fast: float = math.inf) -> str:
-    """Return the text of ``name.toml``; slow, fast: of level flight, m/s."""
+def _metadata_text(found: Identified, battery: tuple[float, float], slow: float, fast: float = math.inf) -> str:
+    """Return the text of ``name.toml``.  slow, fast: minimum and maximum airspeed of level flight, m/s."""
     base, value = found.base, flown_parameters(found.logs[-1]).get
     _, lowest, highest = _airspeeds(found.logs[-1], base)
     least = max(min(lowest, found.cruise), slow + 0.1)
@@ -185,9 +189,9 @@ def _metadata(found: Identified, battery: tuple[float, float], slow: float, fast
 
 
 def flown_parameters(log: MotionLog) -> dict[str, float]:
-    """Return the parameters of a log that determine flight behaviour, by their present names and units.
+    """Return the parameters of a log that determine flight behaviour, by their current names and units.
 
-    The log may use the parameter names of ArduPlane 4.4 and before; values out of range are left out.
+    The log may use the parameter names of ArduPlane 4.4 and earlier; values out of range are left out.
     """
     old = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
     present = {definition.name for definition in DEFINITIONS.values()}
@@ -200,13 +204,13 @@ def flown_parameters(log: MotionLog) -> dict[str, float]:
     return others | law.by_origin("file")
 
 
-def _parameters(log: MotionLog) -> str:
+def _parameter_file_text(log: MotionLog) -> str:
     lines = [f"# As {Path(log.source).name} was flown: parameters of flying; those of its hardware are left out."]
     lines += [f"{name} {value:.9g}" for name, value in sorted(flown_parameters(log).items())]
     return "\n".join(lines) + "\n"
 
 
-def _servos(outputs: Mapping[str, ServoOutput]) -> str:
+def _servo_file_text(outputs: Mapping[str, ServoOutput]) -> str:
     lines = ["# Which servo output moves what, and the control at these pulses.", ""]
     for name, output in outputs.items():
         values = output.value if name == "throttle" else [math.degrees(angle) for angle in output.value]
@@ -225,7 +229,7 @@ def posterior_text(found: Identified) -> str:
     """Return the text of ``posterior.toml``."""
     estimate = found.estimate
     best, drawn = found.performance()
-    # As a fraction; a standard deviation above the value itself is no knowledge at all.
+    # Standard deviation as a fraction; if it exceeds the value itself, nothing is known of the value.
     power = min(1.0, float(np.std(drawn.power) / best.power[0]))
     climb, sink = (float(np.degrees(np.std(angles))) for angles in (drawn.climb, drawn.sink))
     fastest = fastest_level(found.numbers, found.draws, DENSITY)
@@ -251,7 +255,7 @@ def posterior_text(found: Identified) -> str:
         "]",
     ]
     for log in found.logs:
-        lines += ["", "[[log]]", f'file = "{_plain(Path(log.source).name)}"', f'sha256 = "{log.sha256}"']
+        lines += ["", "[[log]]", f'file = "{_toml_safe(Path(log.source).name)}"', f'sha256 = "{log.sha256}"']
     for k, parameter in enumerate(PARAMETERS):
         lines += [
             "",
@@ -271,5 +275,5 @@ def posterior_text(found: Identified) -> str:
     return "\n".join([*lines, "]", ""])
 
 
-def _plain(text: str) -> str:
+def _toml_safe(text: str) -> str:
     return text.replace("\\", "/").replace('"', "'")

@@ -1,6 +1,6 @@
-"""Build the mission for an identification: climbs, glides, level runs at several speeds, and turns.
+"""Build the mission for an identification, with climbs, glides, level runs at several speeds, and turns.
 
-The mission is flown in AUTO.  Control doublets cannot be mission items: fly them by hand in FBWA, or with AUTOTUNE.
+The mission is flown in AUTO.  Control doublets cannot be mission items; fly them by hand in FBWA, or with AUTOTUNE.
 """
 
 import math
@@ -13,14 +13,14 @@ from aircraft.envelope import Envelope
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
 from world.frames import GeoOrigin, to_geo
 
-# Slopes of the mission as a fraction of the steepest climb and descent: slightly less than full throttle, so that the
-# mission can be flown in wind.
+# Slopes of the mission as a fraction of the steepest climb and descent, which need slightly less than full throttle, so
+# that the mission can be flown in wind.
 _SHARE = 0.85
 # Duration of a level run, s.
 _RUN = 25.0
 # Duration of a climb or a glide, s.
 _SLOPE_TIME_S = 25.0
-# Height above home at which the mission begins, m.
+# Height above home at which the mission starts, m.
 _START_HEIGHT_M = 150.0
 
 
@@ -29,11 +29,12 @@ def identification_mission(
 ) -> Mission:
     """Return the mission around a home position.
 
-    lat_deg, lon_deg, ground: home position, degrees and m AMSL.  repeats: number of times the sequence is flown.
+    lat_deg, lon_deg, ground: home position, degrees and m AMSL.
+    repeats: number of times that the sequence is flown.
 
     The legs form squares, so that every manoeuvre is flown with the wind and against it.
     """
-    places = list(_places(aircraft, envelope, ground + _START_HEIGHT_M, repeats))
+    places = list(_waypoints(aircraft, envelope, ground + _START_HEIGHT_M, repeats))
     east, north = np.array([place[:2] for place in places]).T
     lats, lons = to_geo(GeoOrigin(lat_deg, lon_deg), east, north)
     items: list[MissionItem] = []
@@ -53,10 +54,10 @@ def identification_mission(
     return Mission(Home(on_grid(lat_deg), on_grid(lon_deg), ground), tuple(items), source="identify.waypoints")
 
 
-def _places(
+def _waypoints(
     aircraft: Aircraft, envelope: Envelope, base: float, repeats: int
 ) -> Iterator[tuple[float, float, float, float]]:
-    """Yield east, north and altitude (m) of each waypoint, and the airspeed (m/s) towards it."""
+    """Yield east, north and altitude of each waypoint, m, and the airspeed on the leg to the waypoint, m/s."""
     cruise = aircraft.airspeed
     slow = aircraft.airspeed_min + 0.15 * (cruise - aircraft.airspeed_min)
     fast = cruise + 0.6 * (aircraft.airspeed_max - cruise)

@@ -1,8 +1,8 @@
-"""Write the JSBSim model of an identified aircraft: its base with properties ``ident/NAME``.
+"""Write the JSBSim model of an identified aircraft, which is its base with properties ``ident/NAME``.
 
-The coefficients of the base stay.  Next to each function of forces and moments stands another with the terms that the
-estimate adds.  Motor and propeller are written again, in the form that they have in the base.  The default values of
-the properties are the estimate; a draw of the aircraft sets them to other values.
+The coefficients of the base are kept.  Each function of forces and moments is followed by another function with the
+terms that the estimate adds.  Motor and propeller are rewritten in the form that they have in the base.  The default
+values of the properties are the estimate; a draw of the aircraft sets them to other values.
 """
 
 from xml.etree import ElementTree
@@ -21,38 +21,39 @@ from world.errors import FlightError
 _SLUG_FT2 = 1.3558179483314004
 # One pound, kg.
 _POUND = 0.45359237
-# Largest angle of attack seen in flight, rad; the estimated terms stay constant beyond it.
+# Maximum angle of attack seen in flight, rad; the estimated terms are constant beyond this angle.
 _LARGEST_ALPHA = 0.25
 
 
 def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats) -> str:
     """Return the text of ``name.xml``.
 
-    base: the aircraft whose model is extended.  numbers: scaled to the aircraft.  values: (n,) of
-    `aircraft.identification.parameters.PARAMETERS`.
+    base: the aircraft whose model is extended.
+    numbers: model values of the base, scaled to the aircraft.
+    values: values of `aircraft.identification.parameters.PARAMETERS`, (n,).
     """
     text = base.model_file.read_text(encoding="utf-8")
-    # A base from a data sheet has properties of these names: keep them, with their values, under another name.
+    # A base from a data sheet has properties with these names; keep them, with their values, under another name.
     text = text.replace("ident/", "base/")
     root = ElementTree.fromstring(text, parser=ElementTree.XMLParser(target=ElementTree.TreeBuilder()))
     root.set("name", name)
     _set_sizes(root, numbers, base)
     kept = [one for one in root.iter("property") if (one.text or "").strip().startswith("base/")]
-    old = _part(root, "external_reactions", base)
-    reactions = ElementTree.fromstring(_reactions(numbers, values, kept))
+    old = _find_part(root, "external_reactions", base)
+    reactions = ElementTree.fromstring(_reactions_text(numbers, values, kept))
     root.remove(old)
-    # Elements further down read these properties.
-    root.insert(list(root).index(_part(root, "flight_control", base)), reactions)
-    aerodynamics = _part(root, "aerodynamics", base)
+    # Insert the properties before the elements that read them.
+    root.insert(list(root).index(_find_part(root, "flight_control", base)), reactions)
+    aerodynamics = _find_part(root, "aerodynamics", base)
     shared = f"<a>{_lift_functions(numbers)}</a>"
-    first_axis = list(aerodynamics).index(_part(root, "aerodynamics/axis", base))
+    first_axis = list(aerodynamics).index(_find_part(root, "aerodynamics/axis", base))
     for k, function in enumerate(ElementTree.fromstring(shared)):
         aerodynamics.insert(first_axis + k, function)
     drag = " <p> aero/drag-factor </p>" if "aero/drag-factor" in text else ""
     control = " <p> aero/control-factor </p>" if "aero/control-factor" in text else ""
     for axis in aerodynamics.iter("axis"):
         for function in ElementTree.fromstring(
-            f"<a>{_additions(base, numbers, axis.get('name', ''), drag, control)}</a>"
+            f"<a>{_added_function(base, numbers, axis.get('name', ''), drag, control)}</a>"
         ):
             axis.append(function)
     ElementTree.indent(root)
@@ -70,20 +71,17 @@ _PARTS = (
 
 
 def check_base(base: Aircraft) -> None:
-    """Refuse a base whose model lacks a part that `identified_xml` needs.
-
-    Raises FlightError, in one line.
-    """
+    """Raise FlightError, with a one-line message, if the base's model lacks a part that `identified_xml` needs."""
     try:
         root = ElementTree.parse(base.model_file).getroot()
     except (OSError, ElementTree.ParseError) as error:
         message = f"{base.model_file}: {' '.join(str(error).split())}: a JSBSim model is expected"
         raise FlightError(message, file=base.model_file) from None
     for path in _PARTS:
-        _part(root, path, base)
+        _find_part(root, path, base)
 
 
-def _part(root: ElementTree.Element, path: str, base: Aircraft) -> ElementTree.Element:
+def _find_part(root: ElementTree.Element, path: str, base: Aircraft) -> ElementTree.Element:
     found = root.find(path)
     if found is None:
         allowed = "a model to identify from needs it, as aircraft/aerosonde/aerosonde.xml has it"
@@ -109,39 +107,39 @@ def _set_sizes(root: ElementTree.Element, numbers: BaseModel, base: Aircraft) ->
         "mass_balance/emptywt": (numbers.mass / _POUND, "LBS"),
     }
     for path, (value, unit) in sizes.items():
-        found = _part(root, path, base)
+        found = _find_part(root, path, base)
         found.text, found.attrib = f" {number(value)} ", {"unit": unit}
-    _part(root, "mass_balance", base).set("negated_crossproduct_inertia", "false")
+    _find_part(root, "mass_balance", base).set("negated_crossproduct_inertia", "false")
 
 
 # ----------------------------------------------------------------------
-# Aerodynamics: terms that the estimate adds, from the coefficients of the base.
+# Write the aerodynamic terms that the estimate adds, from the coefficients of the base.
 
 
-def _factor(name: str) -> str:
-    """Return the sum that subtracts 1 from a factor."""
+def _factor_minus_one(name: str) -> str:
+    """Return the XML sum of a factor and -1."""
     return f"<sum> <p> ident/{name} </p> <v> -1 </v> </sum>"
 
 
-def _term(coefficient: float, *factors: str) -> str:
+def _product_term(coefficient: float, *factors: str) -> str:
     return f"<product> <v> {number(coefficient)} </v> {' '.join(factors)} </product>"
 
 
 def _lift_functions(numbers: BaseModel) -> str:
-    """Return lift coefficients of base and estimate from angle of attack, up to the largest angle seen."""
+    """Return the functions of lift coefficient by angle of attack, of base and estimate, up to `_LARGEST_ALPHA`."""
     c = numbers.coefficients
     return f"""
     <function name="ident/alpha-rad"> <min> <v> {_LARGEST_ALPHA} </v>
       <max> <v> {-_LARGEST_ALPHA} </v> <p> aero/alpha-rad </p> </max> </min> </function>
     <function name="ident/lift-before">
-      <sum> <v> {number(c.lift_zero)} </v> {_term(c.lift_alpha, "<p> ident/alpha-rad </p>")} </sum> </function>
+      <sum> <v> {number(c.lift_zero)} </v> {_product_term(c.lift_alpha, "<p> ident/alpha-rad </p>")} </sum> </function>
     <function name="ident/lift-after">
       <sum> <v> {number(c.lift_zero)} </v> <p> ident/lift-offset </p>
-        {_term(c.lift_alpha, "<p> ident/lift-slope </p>", "<p> ident/alpha-rad </p>")} </sum> </function>"""
+        {_product_term(c.lift_alpha, "<p> ident/lift-slope </p>", "<p> ident/alpha-rad </p>")} </sum> </function>"""
 
 
-def _additions(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control: str) -> str:
-    """Return the function added to an axis; empty for an axis without estimated terms."""
+def _added_function(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control: str) -> str:
+    """Return the function added to an axis, or "" for an axis without estimated terms."""
     c = numbers.coefficients
     surfaces = [
         f"<product> <p> {reading.name} </p> <v> {number(reading.factor)} </v> </product>{control}"
@@ -158,32 +156,32 @@ def _additions(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control
     sums = {
         "X": (
             f"{drag} ",
-            _term(c.drag_zero, _factor("zero-lift-drag")),
-            _term(c.drag_induced, "<p> ident/induced-drag </p>", after),
-            _term(-c.drag_induced / numbers.induced_factor, before),
+            _product_term(c.drag_zero, _factor_minus_one("zero-lift-drag")),
+            _product_term(c.drag_induced, "<p> ident/induced-drag </p>", after),
+            _product_term(-c.drag_induced / numbers.induced_factor, before),
         ),
         "Z": ("", "<difference> <p> ident/lift-after </p> <p> ident/lift-before </p> </difference>"),
         "ROLL": (
             "<p> metrics/bw-ft </p>",
-            _term(c.roll_beta, _factor("dihedral-effect"), beta),
-            _term(c.roll_roll, _factor("roll-damping"), wide, roll),
-            _term(c.roll_yaw, _factor("roll-from-yaw"), wide, yaw),
-            _term(c.roll_aileron, _factor("aileron-power"), aileron),
+            _product_term(c.roll_beta, _factor_minus_one("dihedral-effect"), beta),
+            _product_term(c.roll_roll, _factor_minus_one("roll-damping"), wide, roll),
+            _product_term(c.roll_yaw, _factor_minus_one("roll-from-yaw"), wide, yaw),
+            _product_term(c.roll_aileron, _factor_minus_one("aileron-power"), aileron),
         ),
         "PITCH": (
             "<p> metrics/cbarw-ft </p>",
             "<p> ident/pitch-offset </p>",
-            _term(c.pitch_alpha, _factor("pitch-stiffness"), "<p> aero/alpha-rad </p>"),
-            _term(c.pitch_rate, _factor("pitch-damping"), long, pitch),
-            _term(c.pitch_elevator, _factor("elevator-power"), elevator),
+            _product_term(c.pitch_alpha, _factor_minus_one("pitch-stiffness"), "<p> aero/alpha-rad </p>"),
+            _product_term(c.pitch_rate, _factor_minus_one("pitch-damping"), long, pitch),
+            _product_term(c.pitch_elevator, _factor_minus_one("elevator-power"), elevator),
         ),
         "YAW": (
             "<p> metrics/bw-ft </p>",
-            _term(c.yaw_beta, _factor("weathercock"), beta),
-            _term(c.yaw_roll, _factor("yaw-from-roll"), wide, roll),
-            _term(c.yaw_yaw, _factor("yaw-damping"), wide, yaw),
-            _term(c.yaw_aileron, _factor("adverse-yaw"), aileron),
-            _term(c.yaw_rudder, _factor("rudder-power"), rudder),
+            _product_term(c.yaw_beta, _factor_minus_one("weathercock"), beta),
+            _product_term(c.yaw_roll, _factor_minus_one("yaw-from-roll"), wide, roll),
+            _product_term(c.yaw_yaw, _factor_minus_one("yaw-damping"), wide, yaw),
+            _product_term(c.yaw_aileron, _factor_minus_one("adverse-yaw"), aileron),
+            _product_term(c.yaw_rudder, _factor_minus_one("rudder-power"), rudder),
         ),
     }
     if axis not in sums:
@@ -194,15 +192,15 @@ def _additions(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control
 
 
 # ----------------------------------------------------------------------
-# Motor and propeller.
+# Write motor and propeller.
 
 _RHO = "<p> motor/rho-kg_m3 </p>"
 _SPEED = "<p> motor/propeller-rad_sec </p>"
 _AIR = "<p> motor/airspeed-mps </p>"
 
 
-def _reactions(numbers: BaseModel, values: Floats, kept: list[ElementTree.Element]) -> str:
-    """Return the text of ``<external_reactions>``: the properties, and the forces of motor and propeller."""
+def _reactions_text(numbers: BaseModel, values: Floats, kept: list[ElementTree.Element]) -> str:
+    """Return the text of ``<external_reactions>``, with the properties and the forces of motor and propeller."""
     own = "\n".join(
         f'<property value="{values[INDEX[parameter.name]]:.9g}"> {parameter.property_name} </property>'
         for parameter in PARAMETERS
@@ -231,7 +229,7 @@ def _reactions(numbers: BaseModel, values: Floats, kept: list[ElementTree.Elemen
 
 
 def _motor_functions(motor: Motor) -> dict[str, str]:
-    """Return the content of each JSBSim function ``motor/NAME``, in order of computation."""
+    """Return the content of each JSBSim function ``motor/NAME`` by NAME, in order of computation."""
     shared = {
         "rho-kg_m3": "<product> <p> atmosphere/rho-slugs_ft3 </p> <v> 515.3788183931961 </v> </product>",
         "airspeed-mps": "<product> <p> velocities/vt-fps </p> <v> 0.3048 </v> </product>",

@@ -1,4 +1,4 @@
-"""Resample a logged motion on one time grid, and select stretches that an identification can use."""
+"""Resample the logged motion on one time grid, and select the stretches that an identification can use."""
 
 from collections.abc import Mapping
 
@@ -12,24 +12,24 @@ from planfly.identification.servos import ServoOutput
 from world.arrays import Flags, Floats
 from world.errors import LogError
 
-# Lowest rate of inertial sensors and servo outputs that allows an estimate of the moments, Hz: a nominal 10 Hz varies
-# slightly in a log.
+# Minimum rate of inertial sensors and servo outputs that allows an estimate of the moments, Hz; it is below 10 Hz,
+# because a nominal 10 Hz varies slightly in a log.
 MIN_HZ = 9.5
-# Below this rate, Hz, the report names the setting that records more.
+# Rate below which the report names the setting that records more rows, Hz.
 PLENTY_HZ = 20.0
-# Least usable flight time of a log, after unusable parts are cut, s.
+# Minimum usable flight time of a log, after unusable parts are cut, s.
 MIN_SECONDS = 180.0
-# Least duration of a stretch, s.
+# Minimum duration of a stretch, s.
 MIN_STRETCH = 30.0
-# A longer pause between rows of the sensors splits a stretch, s.
+# Maximum pause between rows of the sensors within a stretch, s.
 _GAP = 0.5
-# The same limit for airspeed and wind, which are logged more slowly, s.
+# Maximum pause between rows of airspeed or wind, which are logged more slowly, s.
 _MAX_AIR_GAP_S = 1.0
-# The same limit for PX4's wind, which is logged about once a second, s.
+# Maximum pause between rows of PX4's wind, which is logged about once a second, s.
 _MAX_PX4_WIND_GAP_S = 2.5
 # Time after take-off or release that is cut, s.
 _SETTLING_TIME_S = 15.0
-# The aircraft flies above this fraction of AIRSPEED_MIN.
+# Fraction of AIRSPEED_MIN above which the aircraft is flying.
 _FLYING = 0.8
 # ArduPlane's quadplane modes (QSTABILIZE 17 to QACRO 23, QAUTOTUNE 22, LOITER_ALT_QLAND 25), and the mode that does not
 # control the surfaces: INITIALISING 16.
@@ -68,21 +68,21 @@ _PROFILE = 17
 def flight_records(
     log: MotionLog, aircraft: Aircraft, servos: Mapping[str, ServoOutput] | None = None
 ) -> list[FlightRecord]:
-    """Return the stretches of a log that an identification can use: flight on the wing alone.
+    """Return the stretches of a log that an identification can use, in which the aircraft flies on the wing alone.
 
     servos: the output of each control, if known better than from the SERVOn_* parameters of the log.
-    Raises LogError, in one line, for a log that cannot be used.
+    Raises LogError, with a one-line message, for a log that cannot be used.
     """
-    _refuse(log)
+    _refuse_unusable(log)
     if log.elevons:
         _refuse_base_of_elevons(log, aircraft)
-    grid = _grid(log)
+    grid = _time_grid(log)
     pulses = _held(log.outputs, grid) if len(log.outputs.time) else np.zeros((len(grid), log.outputs.values.shape[1]))
     if len(log.controls.time):
         controls = _shares_as_angles(_held(log.controls, grid), aircraft)
     else:
-        controls = _controls(servos or log_outputs(log, aircraft), pulses)
-    # A surface commanded beyond its stop stays at the stop.
+        controls = _pulses_as_controls(servos or log_outputs(log, aircraft), pulses)
+    # A surface that is commanded beyond its stop stays at the stop.
     stops = np.array([aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder, 1.0])
     controls = np.clip(controls, -stops, stops)
     ratio = _at(log.ratio, grid)[:, 0] if len(log.ratio.time) else _ratio_of_height(_at(log.height, grid)[:, 0])
@@ -93,9 +93,9 @@ def flight_records(
     attitude = np.column_stack([np.interp(grid, log.attitude.time, np.unwrap(a)) for a in log.attitude.values.T])
     unknown = np.full(len(grid), np.nan)
     battery = _at(log.battery, grid) if _has_current(log) else np.column_stack([unknown, unknown])
-    usable = _usable(log, grid, airspeed / ratio, pulses)
+    usable = _usable_rows(log, grid, airspeed / ratio, pulses)
     made = []
-    for first, last in _stretches(usable):
+    for first, last in _find_stretches(usable):
         rows = slice(first, last)
         made.append(
             FlightRecord(
@@ -122,10 +122,10 @@ def flight_records(
     return made
 
 
-def _controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:
-    """Return elevator, aileron, rudder (rad) and throttle, (n, 4), for pulses (n, m).
+def _pulses_as_controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:
+    """Return elevator, aileron, rudder, rad, and throttle, (n, 4).  pulses: pulses of the outputs, us, (n, m).
 
-    Elevator and aileron are half the sum and half the difference of the elevons.
+    With elevons, elevator and aileron are half the sum and half the difference of the elevons.
     """
     found = {name: output.control(pulses[:, output.output - 1]) for name, output in outputs.items()}
     if LEFT in found:
@@ -136,9 +136,9 @@ def _controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:
 
 
 def _shares_as_angles(shares: Floats, aircraft: Aircraft) -> Floats:
-    """Convert fractions of full travel to controls (n, 4).
+    """Convert fractions of full travel to controls, rad and throttle, (n, 4).
 
-    Full travel is the base aircraft's largest deflection.
+    Full travel is the maximum deflection of the base aircraft.
     """
     # Positive fractions are nose up and yaw to the right; the model's elevator and rudder have the opposite sign.
     largest = np.array([-aircraft.max_elevator, aircraft.max_aileron, -aircraft.max_rudder, 1.0])
@@ -169,30 +169,30 @@ _SERIES = {
 }
 
 
-def _refuse(log: MotionLog) -> None:
+def _refuse_unusable(log: MotionLog) -> None:
     """Raise LogError for a log that no identification can use."""
     if log.vehicle not in ("plane", "unknown"):
         raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): a plane is expected", file=log.source)
     named = _SERIES[log.program_kind]
     for samples, name in ((log.inertial, "inertial"), (log.moved, "outputs")):
         if len(samples.time) < 2:
-            raise LogError(f"{log.source}: no {named[name]}: {_recording(log)}", file=log.source)
+            raise LogError(f"{log.source}: no {named[name]}: {_recording_hint(log)}", file=log.source)
     for samples, name in ((log.attitude, "attitude"), (log.velocity, "velocity"), (log.height, "height")):
         if len(samples.time) < 2:
             raise LogError(f"{log.source}: no {named[name]}", file=log.source)
     air = ((log.airspeed, "airspeed"), (log.wind, "wind"))
     if lacking := [named[name] for samples, name in air if len(samples.time) < 2]:
         raise LogError(f"{log.source}: no {'; no '.join(lacking)}", file=log.source)
-    for number, kind in _functions(log).items():
+    for number, kind in _servo_functions(log).items():
         if kind in _FLAPS:
-            lowest, highest = _range(log, number)
+            lowest, highest = _pulse_range(log, number)
             if highest - lowest > 20.0:
                 message = f"output {number} (SERVO{number}_FUNCTION {kind}, {_FLAPS[kind]}) moves in flight"
                 raise LogError(f"{log.source}: {message}, and no model is estimated for that", file=log.source)
 
 
 def slowest_rows(log: MotionLog) -> float:
-    """Return the lower of the rates of the inertial sensors and the surface commands, rows a second."""
+    """Return the lower of the rates of inertial sensors and surface commands, rows per second."""
     return min(log.inertial.rate, log.moved.rate)
 
 
@@ -201,7 +201,7 @@ def recording_setting(log: MotionLog) -> str:
     return f"SDLOG_PROFILE {_PROFILE}" if log.program_kind == "px4" else f"LOG_BITMASK {_BITMASK}"
 
 
-def _recording(log: MotionLog) -> str:
+def _recording_hint(log: MotionLog) -> str:
     """Describe the setting that records the missing series."""
     if log.program_kind == "px4":
         return f"{recording_setting(log)}, the default set at a high rate, records them (PX4 1.14 or later)"
@@ -209,14 +209,14 @@ def _recording(log: MotionLog) -> str:
     return f"{recording_setting(log)} records them{'' if mask is None else f' (it is {mask:.0f})'}"
 
 
-def _range(log: MotionLog, number: int) -> tuple[float, float]:
+def _pulse_range(log: MotionLog, number: int) -> tuple[float, float]:
     used = log.outputs.values[:, number - 1]
     used = used[used > 0.0]
     return (float(used.min()), float(used.max())) if len(used) else (0.0, 0.0)
 
 
-def _functions(log: MotionLog) -> dict[int, int]:
-    """Return SERVOn_FUNCTION by output, or ArduPlane's defaults if the log has none."""
+def _servo_functions(log: MotionLog) -> dict[int, int]:
+    """Return SERVOn_FUNCTION for each output, or ArduPlane's defaults if the log has none."""
     found = {
         k: int(log.parameters[f"SERVO{k}_FUNCTION"])
         for k in range(1, log.outputs.values.shape[1] + 1)
@@ -225,18 +225,19 @@ def _functions(log: MotionLog) -> dict[int, int]:
     return found or {1: _AILERON, 2: _ELEVATOR, 3: _THROTTLE, 4: _RUDDER}
 
 
-def _first(log: MotionLog, function: int) -> int:
-    return next((number for number, kind in _functions(log).items() if kind == function), 0)
+def _first_output(log: MotionLog, function: int) -> int:
+    return next((number for number, kind in _servo_functions(log).items() if kind == function), 0)
 
 
 def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
-    """Assign servo outputs to controls by SERVOn_*; full travel is the base aircraft's largest deflection.
+    """Return the servo output of each control, by the log's SERVOn_* parameters.
 
-    In ArduPlane a longer pulse means roll to the right, nose up and yaw to the right; the model's elevator and rudder
-    have the opposite sign.  Elevons are returned as `LEFT` and `RIGHT`, positive trailing edge down, in place of
-    elevator and aileron.  Raises LogError for mixes that are not modelled, and for elevons if the base has a tail.
+    Full travel is the maximum deflection of the base aircraft.  In ArduPlane a longer pulse means roll to the right,
+    nose up and yaw to the right; the model's elevator and rudder have the opposite sign.  Elevons are returned as
+    `LEFT` and `RIGHT`, positive trailing edge down, in place of elevator and aileron.  Raises LogError for mixes that
+    are not modelled, and for elevons if the base has a tail.
     """
-    functions = _functions(log)
+    functions = _servo_functions(log)
     for number, kind in functions.items():
         if kind in _MIXED:
             message = f"output {number} (SERVO{number}_FUNCTION {kind}) is one half of {_MIXED[kind]}"
@@ -254,13 +255,13 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
         (LEFT, _ELEVON_LEFT, -aircraft.max_elevator),
         (RIGHT, _ELEVON_RIGHT, -aircraft.max_elevator),
     ):
-        number = _first(log, function)
+        number = _first_output(log, function)
         if number:
-            lowest, middle, highest, sign = _travel(log, number)
+            lowest, middle, highest, sign = _pulse_travel(log, number)
             made[name] = ServoOutput(number, (lowest, middle, highest), (-largest * sign, 0.0, largest * sign))
-    number = _first(log, _THROTTLE)
+    number = _first_output(log, _THROTTLE)
     if number:
-        lowest, _, highest, _ = _travel(log, number)
+        lowest, _, highest, _ = _pulse_travel(log, number)
         made["throttle"] = ServoOutput(number, (lowest, highest), (0.0, 1.0))
     for name in ("throttle",) if LEFT in made else ("elevator", "aileron", "throttle"):
         if name not in made:
@@ -275,15 +276,15 @@ def _refuse_base_of_elevons(log: MotionLog, aircraft: Aircraft) -> None:
         raise LogError(f"{log.source}: {message}", file=log.source)
 
 
-def _travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
-    """Return lowest, trim and highest pulse of an output, us, and its sign."""
+def _pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
+    """Return the minimum, trim and maximum pulse of an output, us, and its sign."""
     value = log.parameters.get
     lowest, highest = value(f"SERVO{number}_MIN", 1100.0), value(f"SERVO{number}_MAX", 1900.0)
     middle = min(max(value(f"SERVO{number}_TRIM", 1500.0), lowest + 1.0), highest - 1.0)
     return lowest, middle, highest, -1.0 if value(f"SERVO{number}_REVERSED", 0.0) > 0.0 else 1.0
 
 
-def _grid(log: MotionLog) -> Floats:
+def _time_grid(log: MotionLog) -> Floats:
     """Return the time grid over the span that all series cover."""
     series = (log.inertial, log.moved, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
     first, last = max(one.time[0] for one in series), min(one.time[-1] for one in series)
@@ -301,7 +302,7 @@ def _held(samples: Samples, grid: Floats) -> Floats:
 
 
 def _ratio_of_height(height: Floats) -> Floats:
-    """Return the ratio of true to equivalent airspeed at an altitude (m) of the standard atmosphere."""
+    """Return the ratio of true to equivalent airspeed in the standard atmosphere.  height: altitude, m AMSL."""
     return np.asarray((1.0 - 2.25577e-5 * np.clip(height, -500.0, 9000.0)) ** -2.12794)
 
 
@@ -310,21 +311,21 @@ def _has_current(log: MotionLog) -> bool:
 
 
 def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
-    """Return the rows at which lifting motors ran or a VTOL mode was set."""
+    """Flag the rows at which lifting motors ran or a VTOL mode was set."""
     rows = np.zeros(len(grid), np.bool_)
     for (start, number), (end, _) in zip(log.modes, (*log.modes[1:], (np.inf, 0)), strict=False):
         if number in _VTOL_MODES:
             rows |= (grid >= start) & (grid < end)
     for start, end in log.hovering:
         rows |= (grid >= start) & (grid < end)
-    for number, kind in _functions(log).items() if len(log.outputs.time) else ():
+    for number, kind in _servo_functions(log).items() if len(log.outputs.time) else ():
         if kind in _LIFT_MOTORS and log.parameters.get("Q_ENABLE", 0.0) > 0.0:
             rows |= pulses[:, number - 1] > 1100.0
     return rows
 
 
-def _usable(log: MotionLog, grid: Floats, equivalent: Floats, pulses: Floats) -> Flags:
-    """Return the rows in free flight on the wing, without gaps in sensors, airspeed or wind."""
+def _usable_rows(log: MotionLog, grid: Floats, equivalent: Floats, pulses: Floats) -> Flags:
+    """Flag the rows in free flight on the wing, without gaps in sensors, airspeed or wind."""
     least = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))
     flying = (equivalent > _FLYING * least) & ~_vtol_rows(log, grid, pulses)
     sensors = [(samples, _GAP) for samples in (log.inertial, log.moved, log.attitude, log.velocity)]
@@ -334,12 +335,12 @@ def _usable(log: MotionLog, grid: Floats, equivalent: Floats, pulses: Floats) ->
         for k in np.flatnonzero(steps > longest):
             flying &= ~((grid > samples.time[k]) & (grid < samples.time[k + 1]))
     made = flying.copy()
-    for first, last in _stretches(flying, 0.0):
+    for first, last in _find_stretches(flying, 0.0):
         made[first : min(last, first + round(_SETTLING_TIME_S * GRID_HZ))] = False
     return made
 
 
-def _stretches(flags: Flags, least: float = MIN_STRETCH) -> list[tuple[int, int]]:
+def _find_stretches(flags: Flags, least: float = MIN_STRETCH) -> list[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     return [(first, last) for first, last in pairs if last - first >= least * GRID_HZ]

@@ -1,7 +1,7 @@
 """Check a model by flying an unused log again in JSBSim, five seconds at a time.
 
-Each window begins in the logged state and uses the logged controls; the motion of the air follows from logged airspeed,
-accelerometers and velocity.  The simulated motion is compared with the logged one.
+Each window starts in the logged state and uses the logged controls; the motion of the air is computed from logged
+airspeed, accelerometers and velocity.  The simulated motion is compared with the logged motion.
 """
 
 import math
@@ -24,7 +24,7 @@ from world.files import temporary_folder
 
 # Duration of a window, s.
 WINDOW = 5.0
-# Largest number of windows of a log.
+# Maximum number of windows of a log.
 COUNT = 40
 # Rate of JSBSim steps, Hz.
 _JSBSIM_RATE_HZ = 100.0
@@ -40,9 +40,10 @@ UNITS = ("deg/s", "deg/s", "deg/s", "deg", "deg", "m/s")
 class Replay:
     """A log replayed by one model.
 
-    model: name of the model for display: the name of the base, or "identified".
-    rms: root mean square of replayed less logged value over all windows, by quantity of `QUANTITIES`, in `UNITS`.
-    windows: number of windows.  shown: (2, k, 6) logged and replayed values of some windows, one after the other.
+    model: displayed name of the model, which is the name of the base, or "identified".
+    rms: root mean square of replayed minus logged value over all windows, for each of `QUANTITIES`, in `UNITS`.
+    windows: number of windows.
+    shown: logged and replayed values of some windows, one after the other, (2, k, 6).
     """
 
     model: str
@@ -54,7 +55,7 @@ class Replay:
 def replay_log(
     found: Identified, files: Mapping[str, str], name: str, records: Sequence[FlightRecord]
 ) -> tuple[Replay, ...]:
-    """Replay with the base, scaled to the aircraft, and with the identified model.
+    """Replay a log with the base, scaled to the aircraft, and with the identified model.
 
     files: texts of the aircraft's folder by file name.
     """
@@ -68,17 +69,17 @@ def replay_log(
         for file, text in files.items():
             (folder / file).write_text(text, encoding="utf-8")
         aircraft = read_aircraft(folder)
-        before = _replayed(found.base.name, aircraft, prior_means(), signals, flow, folder)
-        after = _replayed("identified", aircraft, found.estimate.values, signals, flow, folder)
+        before = _replay_model(found.base.name, aircraft, prior_means(), signals, flow, folder)
+        after = _replay_model("identified", aircraft, found.estimate.values, signals, flow, folder)
     return before, after
 
 
-def _replayed(model: str, aircraft: Aircraft, values: Floats, signals: Signals, flow: Flow, folder: Path) -> Replay:
+def _replay_model(model: str, aircraft: Aircraft, values: Floats, signals: Signals, flow: Flow, folder: Path) -> Replay:
     fdm = Fdm(aircraft, rate_hz=_JSBSIM_RATE_HZ)
     for parameter, value in zip(PARAMETERS, values.tolist(), strict=True):
         fdm.properties.set(parameter.property_name, value)
     del folder
-    air = _air(signals, flow)
+    air = _wind_velocity(signals, flow)
     rows = round(WINDOW * GRID_HZ)
     starts = [
         start
@@ -86,22 +87,22 @@ def _replayed(model: str, aircraft: Aircraft, values: Floats, signals: Signals, 
         for start in range(first, last - rows, rows)
     ]
     chosen = [starts[k] for k in np.unique(np.linspace(0, len(starts) - 1, COUNT).astype(int))]
-    flown = np.array([_window(fdm, signals, air, start, rows) for start in chosen])
-    logged = np.array([_logged(signals, start, rows) for start in chosen])
+    flown = np.array([_fly_window(fdm, signals, air, start, rows) for start in chosen])
+    logged = np.array([_logged_quantities(signals, start, rows) for start in chosen])
     off = flown - logged
     rms = np.sqrt(np.nanmean(np.square(off), axis=(0, 1)))
     shown = np.stack([logged[:4].reshape(-1, len(QUANTITIES)), flown[:4].reshape(-1, len(QUANTITIES))])
     return Replay(model, dict(zip(QUANTITIES, rms.tolist(), strict=True)), len(chosen), shown)
 
 
-def _logged(signals: Signals, start: int, rows: int) -> Floats:
+def _logged_quantities(signals: Signals, start: int, rows: int) -> Floats:
     part = slice(start, start + rows)
     angles = np.degrees(np.column_stack([signals.rates[part], signals.attitude[part, :2]]))
     return np.column_stack([angles, signals.airspeed[part]])
 
 
-def _air(signals: Signals, flow: Flow) -> Floats:
-    """Return the velocity of the air (n, 3), north, east, down, m/s: ground velocity less air velocity."""
+def _wind_velocity(signals: Signals, flow: Flow) -> Floats:
+    """Return the wind velocity north, east, down, which is ground velocity minus air velocity, m/s, (n, 3)."""
     roll, pitch, yaw = signals.attitude.T
     alpha, beta, speed = flow.alpha, flow.beta, signals.airspeed
     u, v, w = speed * np.cos(alpha) * np.cos(beta), speed * np.sin(beta), speed * np.sin(alpha) * np.cos(beta)
@@ -111,15 +112,15 @@ def _air(signals: Signals, flow: Flow) -> Floats:
     return signals.smooth(signals.velocity - np.column_stack([north, east, down]), _GUST_BANDWIDTH_HZ)
 
 
-def _window(fdm: Fdm, signals: Signals, air: Floats, start: int, rows: int) -> Floats:
-    """Fly a window with the model and return its `QUANTITIES`, (rows, 6)."""
+def _fly_window(fdm: Fdm, signals: Signals, air: Floats, start: int, rows: int) -> Floats:
+    """Fly a window with the model, and return `QUANTITIES` at each row, (rows, 6)."""
     begin = slice(start, start + 1)
     fdm.begin_at(
         attitude=signals.attitude[begin][0],
         velocity=signals.velocity[begin][0],
         rates=signals.rates[begin][0],
         wind=air[start],
-        amsl=_height_of(float(signals.density[start])),
+        amsl=_density_altitude(float(signals.density[start])),
         commands=[*signals.surfaces[start], float(signals.throttle[start])],
     )
     made = np.full((rows, len(QUANTITIES)), np.nan)
@@ -128,7 +129,7 @@ def _window(fdm: Fdm, signals: Signals, air: Floats, start: int, rows: int) -> F
         state = fdm.read()
         made[k] = (
             *np.degrees([state.roll_rate, state.pitch_rate, state.yaw_rate]),
-            *np.degrees([_near(state.roll, signals.attitude[start + k, 0]), state.pitch]),
+            *np.degrees([_unwrap_near(state.roll, signals.attitude[start + k, 0]), state.pitch]),
             state.airspeed,
         )
         fdm.set_wind(*air[start + k])
@@ -137,11 +138,11 @@ def _window(fdm: Fdm, signals: Signals, air: Floats, start: int, rows: int) -> F
     return made
 
 
-def _near(angle: float, other: float) -> float:
-    """Return an angle, shifted by whole turns to be nearest to another."""
+def _unwrap_near(angle: float, other: float) -> float:
+    """Return an angle shifted by whole turns to be as near as possible to another angle, rad."""
     return angle + 2.0 * math.pi * round((other - angle) / (2.0 * math.pi))
 
 
-def _height_of(density: float) -> float:
-    """Return the altitude at which the standard atmosphere has a density (kg/m^3), m."""
+def _density_altitude(density: float) -> float:
+    """Return the altitude at which the standard atmosphere has a density, m.  density: kg/m^3."""
     return float((1.0 - (density / 1.225) ** (1.0 / 4.25588)) / 2.25577e-5)

@@ -1,4 +1,4 @@
-"""Read servo outputs and the controls that they move from an aircraft's ``ardupilot.toml``."""
+"""Read the servo outputs of an aircraft's ``ardupilot.toml``, and the controls that they move."""
 
 import math
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ class ServoOutput:
     value: tuple[float, ...]
 
     def control(self, pulses: Floats) -> Floats:
-        """Return the control (n,) at pulses (n,), constant beyond the end pulses.
+        """Return the control at each pulse, constant beyond the end pulses, (n,).  pulses: (n,), us.
 
         >>> ServoOutput(3, (1000.0, 2000.0), (0.0, 1.0)).control(np.array([900.0, 1250.0]))
         array([0.  , 0.25])
@@ -30,14 +30,14 @@ class ServoOutput:
 
     @property
     def reversed(self) -> "ServoOutput":
-        """Return the same output reversed."""
+        """Return a copy of the output with the opposite direction."""
         return ServoOutput(self.output, self.pulse, tuple(-value for value in self.value))
 
 
 def read_servos(file: Path) -> Mapping[str, ServoOutput]:
-    """Read the outputs of a file by control: elevator, aileron, rudder, throttle.
+    """Read the servo outputs of a file, by control (elevator, aileron, rudder, throttle).
 
-    Raises FlightError for a bad file.
+    Raises FlightError for an invalid file.
 
     >>> from aircraft.catalog import load_aircraft
     >>> outputs = read_servos(load_aircraft("aerosonde").folder / "ardupilot.toml")

@@ -1,12 +1,12 @@
-"""Uncertain quantities of an identified aircraft, and flights that would narrow them down."""
+"""Find the uncertain quantities of an identified aircraft, and flights that would narrow their intervals."""
 
 from dataclasses import dataclass
 
-# The sink is uncertain if its 95 % interval reaches further than this fraction of the estimate to either side.
+# Maximum half width of the sink's 95 % interval, as a fraction of the estimate; a wider interval makes it uncertain.
 WIDE_SINK = 0.10
-# The same limit for the power in level flight.
+# Maximum half width of the 95 % interval of the power in level flight, as a fraction of the estimate.
 WIDE_POWER = 0.20
-# Duration of a glide that shows what half an hour of powered flight cannot, s; from
+# Duration of a glide that shows what half an hour of powered flight does not show, s; from
 # `benchmarks.identification_information`.
 GLIDE_SECONDS = 20
 
@@ -15,7 +15,8 @@ GLIDE_SECONDS = 20
 class WideNumber:
     """A quantity with a wide interval.
 
-    title: "sink at idle" or "power in level flight".  half: half the 95 % interval, as a fraction of the estimate.
+    title: "sink at idle" or "power in level flight".
+    half: half the 95 % interval, as a fraction of the estimate.
     show: flights or logging that would narrow the interval.
     """
 
@@ -25,7 +26,7 @@ class WideNumber:
 
     @property
     def text(self) -> str:
-        """Description in words.
+        """Description of the quantity, its interval, and the flight that would narrow the interval.
 
         >>> WideNumber("sink at idle", 0.23, "glides").text
         'sink at idle: known to ±23 % only; fly glides'
@@ -37,7 +38,7 @@ Interval = tuple[float, float, float]
 
 
 def wide_numbers(sink: Interval, power: Interval, *, with_current: bool) -> tuple[WideNumber, ...]:
-    """Return sink and power, as far as their intervals (lower end, estimate, upper end) are wide.
+    """Return the sink and the power, each if its interval (lower end, estimate, upper end) is wide.
 
     with_current: True if the battery's current was logged; without it the propeller power is unknown.
 

@@ -1,1 +1,1 @@
-"""Vehicles that ground stations connect to."""
+"""Serve vehicles to which ground stations connect."""

@@ -1,4 +1,4 @@
-"""The flight process of ``planfly serve``: scenario, verdicts as status texts, and logs."""
+"""Run the flight process of ``planfly serve``, with its scenario, verdicts as status texts, and logs."""
 
 import contextlib
 import math
@@ -61,18 +61,18 @@ from world.scenario import Scenario, in_the_air
 
 # Duration of a loiter in LOITER and GUIDED in one log, s: each lap of a loiter is laid out, and judged, separately.
 HELD = 900.0
-# Greatest number of texts about one verdict; the log has the rest.
+# Maximum number of texts about one verdict; the log has the others.
 _MAX_TEXTS = 4
 
 
 @dataclass(frozen=True, slots=True)
 class ServeOptions:
-    """Options of the command line for serving; both processes load them for themselves.
+    """Options of the command line for serving; both processes load the files that the options name.
 
-    mission: a file's path, "" for none.
-    speed: times real time.
+    mission: path of a mission file, or "".
+    speed: multiple of real time.
     logs: the folder of the flight logs.
-    flown: how it is flown.  A station that uploads another fence replaces the items of named fences, not their zones.
+    flown: options of the flight.  An uploaded fence replaces the items of named fences, but not their zones.
     """
 
     mission: str
@@ -83,7 +83,7 @@ class ServeOptions:
 
 @dataclass(frozen=True, slots=True)
 class ServedScenario:
-    """The scenario, the aircraft in it, the seed, the mission to begin with, and the fence items that are named."""
+    """Scenario with its aircraft and seed, the initial mission, and the items of named fences."""
 
     scenario: Scenario
     airframe: Airframe
@@ -93,7 +93,7 @@ class ServedScenario:
 
 
 def open_served(options: ServeOptions) -> ServedScenario:
-    """Load what is served.  Raises PlanflyError."""
+    """Load the scenario and the mission that the options name.  Raises PlanflyError for bad input."""
     if options.mission:
         setup = open_flight(options.mission, options.flown)
         return ServedScenario(setup.scenario, airframe_of(setup), setup.seed, setup.mission)
@@ -108,9 +108,9 @@ def open_served(options: ServeOptions) -> ServedScenario:
 
 
 def flown_parameters(scenario: Scenario, stated: Mapping[str, float]) -> dict[str, float]:
-    """Return the parameters of the control law of a scenario by name, after stated values are applied.
+    """Return the parameters of a scenario's autopilot by name, with stated values applied.
 
-    The cruise airspeed is the one that is flown.  Raises PlanflyError for values that are not allowed.
+    The cruise airspeed is the airspeed that is flown.  Raises PlanflyError for values that are not allowed.
     """
     airframe = load_airframe(scenario, stated)
     parameters = airframe.autopilot.parameters
@@ -125,12 +125,12 @@ def fly_process(connection: Connection, options: ServeOptions) -> None:
     end_with_parent(in_service)
     factory = ServedFlights(options)
     factory.warm()
-    # A signal to the whole group reaches the link too, which orders this process to end: its log is closed first.
+    # A signal to the process group also reaches the link, which orders this process to end after closing its log.
     in_service.set()
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     send_event(connection, ProcessReady())
     serve_flights(connection, factory)
-    # The link waits for this, not for the shutdown of the interpreter.
+    # The link waits until here, but not for the shutdown of the interpreter.
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     connection.close()
 
@@ -148,7 +148,7 @@ class ServedFlights:
         self.speed = options.speed
 
     def warm(self) -> None:
-        """Fly half a second and judge it, so that no station has to wait for compilers later."""
+        """Fly and judge half a second, so that no station has to wait for compilers later."""
         scenario = self._served.scenario
         points = np.linspace(scenario.start, scenario.destination, 3)
         lats, lons = to_geo(scenario.origin, points[:, 0], points[:, 1])
@@ -171,7 +171,7 @@ class ServedFlights:
                 self._airframe = load_airframe(served.scenario, dict(request.parameters))
                 self._parameters = request.parameters
             setup = make_setup(served.scenario, self._airframe, request.mission, served.seed)
-            # The first tick shows whether it can start, and compiles the flight loop.
+            # The first tick shows if the flight can start, and compiles the flight loop.
             flight = Flight(setup, self.aircraft)
             flight.block(1)
         except PlanflyError as error:
@@ -184,13 +184,13 @@ class ServedFlights:
             home = Home(start.lat_deg, start.lon_deg, start.amsl - (0.0 if math.isnan(start.height) else start.height))
         items = tuple(int(item) for item in setup.route.items)
         texts = mission_texts(setup, verdict)
-        # A mission that is not judged in full is armed, with a warning: MAVSDK writes speeds over ground, for example.
+        # A mission that is not judged in full is armed with a warning; for example, MAVSDK writes ground speeds.
         arms = verdict.flies or verdict.undecided
         judged = MissionJudged(request.number, True, arms, texts, home, items, start)
         return PreparedFlight(setup, flight.map), judged
 
     def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:
-        """Lay out the path that a station requests from the present position; a loiter lasts `HELD`."""
+        """Return the flight that a station requests from the current position; a loiter lasts `HELD`."""
         served = self._served
         lat, lon = (on_grid(float(value)) for value in to_geo(served.scenario.origin, here[0], here[1]))
         none = (0.0, 0.0, 0.0, 0.0)
@@ -202,12 +202,12 @@ class ServedFlights:
         else:
             items = (_loiter_item(begin, request.place),)
         mission = replace(request.mission, items=(begin, *items), source=MODE_NAMES[request.mode])
-        # The aircraft is in the air: there is no take-off, and it does not land.
+        # The aircraft is in the air, so there is no take-off, and it does not land.
         setup = make_setup(in_the_air(served.scenario), self._airframe, mission, served.seed)
         return PreparedFlight(setup, LocalMap.around(setup))
 
     def open_log(self, setup: FlightSetup, mode: int) -> "ServedLog":
-        """Open the next free ``flight-NNN.mcap``."""
+        """Open a log with the next free name ``flight-NNN.mcap``."""
         self._logs.mkdir(parents=True, exist_ok=True)
         number = 1
         while True:
@@ -235,7 +235,7 @@ def _loiter_item(here: MissionItem, place: Place) -> MissionItem:
 
 
 class ServedLog:
-    """The log of one served flight."""
+    """Log of one served flight."""
 
     def __init__(self, path: Path, setup: FlightSetup, aircraft: Aircraft, mode: int) -> None:
         self._path, self._setup, self._aircraft = path, setup, aircraft
@@ -244,7 +244,7 @@ class ServedLog:
         self._blocks: list[Track] = []
 
     def write(self, block: Track) -> None:
-        """Append rows and flush them to the file."""
+        """Append rows, and flush them to the file."""
         self._blocks.append(block)
         self._recorder.write(block)
         self._recorder.flush()
@@ -252,8 +252,9 @@ class ServedLog:
     def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
         """Judge the flight and close the log.
 
-        hurry: see `planfly.workflow.reference_flights.judge_with_reference_flights`.  In a hurry, a path that was
-        abandoned is not judged: `planfly check` does it.  A path abandoned within a second leaves no log.
+        A path that was abandoned within a second leaves no log.  In a hurry, an abandoned path is not judged;
+        `planfly check` can judge it.
+        hurry: see `planfly.workflow.reference_flights.judge_with_reference_flights`.
         """
         track = join_tracks(self._blocks)
         left = ended.startswith((DIVERTED_TEXT, STILL_LOITERING_TEXT))
@@ -276,12 +277,12 @@ class ServedLog:
         return FlightJudged(verdict.flyable, (*texts, StatusText(f"log {self._path}", INFO)))
 
     def abandon(self) -> None:
-        """Close the log as it is."""
+        """Close the log without a verdict."""
         self._recorder.abandon()
 
 
 def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...]:
-    """Return texts about a mission for stations: verdict, size, and items that are not flown as written."""
+    """Return texts for stations on a mission's verdict, its size, and items that are not flown as written."""
     route = setup.route
     length = float(np.linalg.norm(np.diff(route.waypoints[:, :2], axis=0), axis=1).sum()) / 1000.0
     size = StatusText(f"mission: {len(route.waypoints)} waypoints, {length:.1f} km; {route.started}", INFO)
@@ -294,7 +295,7 @@ _RULES_OF_UNFINISHED_PATHS = ("completion", "loiter", "waypoint", "turn", "surve
 
 
 def left_texts(level: str, ended: str, verdict: Verdict) -> tuple[StatusText, ...]:
-    """Return the verdict on the flown part of a path that the aircraft left early."""
+    """Return texts on the verdict on the flown part of a path that the aircraft left early."""
     failed = [item for item in verdict.findings if item.ok is False and item.rule not in _RULES_OF_UNFINISHED_PATHS]
     found = "1 finding" if len(failed) == 1 else f"{len(failed) or 'no'} findings"
     first = StatusText(f"verdict ({level}): {ended}; {found} failed until then", INFO)
@@ -320,6 +321,6 @@ def _failed_texts(failed: list[Finding]) -> list[StatusText]:
 
 
 def _heading(item: Finding) -> str:
-    """Return the rule and the place, without repeating the place."""
+    """Return the rule of a finding, and its place unless the text of the finding names the place."""
     word = rule_word(item.rule)
     return word if item.placed else f"{word} at {place_text(item.place)}"

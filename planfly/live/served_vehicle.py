@@ -1,4 +1,4 @@
-"""The vehicle that ``planfly serve`` presents to ground stations: its link and its flight processes."""
+"""Serve the vehicle of ``planfly serve`` to ground stations, with its link and its flight processes."""
 
 import contextlib
 import math
@@ -19,7 +19,7 @@ from world.frames import to_geo
 from world.interruption import children_ignore_sigint, end_children, uninterrupted
 from world.scenario import Scenario
 
-# Time that a process has to end when asked to, before it is killed, s.
+# Maximum time for a process to end by itself before it is killed, s.
 _CHILD_END_TIMEOUT_S = 0.3
 
 
@@ -30,7 +30,7 @@ def serve_vehicle(
     stop: Callable[[], bool],
     on_message: Callable[[str], None],
 ) -> None:
-    """Serve as the vehicle until ``stop`` is true.  on_message: called with each message in a line."""
+    """Serve the vehicle until ``stop`` returns True.  on_message: called with each message, in one line."""
     with contextlib.ExitStack() as opened:
         link = Link(access)
         opened.callback(link.close)
@@ -79,7 +79,7 @@ def _make_vehicle(
 
 
 class _FlightPool:
-    """Flight processes; the vehicle requests another when one has died."""
+    """Pool of flight processes; the vehicle requests another process when one has died."""
 
     def __init__(self, options: ServeOptions) -> None:
         self._options = options
@@ -105,7 +105,7 @@ class _FlightPool:
 
 
 def standby_at_start(scenario: Scenario) -> Standby:
-    """Return state and home without a mission: at the scenario's start, on a course to its destination."""
+    """Return state and home without a mission, at the scenario's start on the course to its destination."""
     east, north, amsl = (float(value) for value in scenario.start)
     lat, lon = (float(value) for value in to_geo(scenario.origin, east, north))
     ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(east, north))

@@ -1,1 +1,1 @@
-"""Plans beyond a single one: Pareto fronts, the paper's experiments, and margins for gusts."""
+"""Plan Pareto fronts, repeat the paper's experiments, and add margins for gusts to plans."""

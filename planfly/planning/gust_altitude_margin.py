@@ -1,9 +1,9 @@
 """Altitude margin a plan needs because gusts can exceed the climb or sink rate of the aircraft.
 
-In a downdraft planfly's guidance gives up altitude before it stalls; in an updraft ArduPlane and PX4 rise before they
-exceed their airspeed.  A plan is safe only if each leg leaves as much height as a gust may take or give there: above
-its clearance, below a maximum height above ground, and above or below missiles and zones.  If a plan leaves less,
-another one is searched for that keeps further away and leaves more climb or sink unused.
+In a downdraft planfly's guidance descends rather than stall; in an updraft ArduPlane and PX4 climb rather than exceed
+their airspeed.  A plan is safe only if each leg has a margin for the altitude lost or gained in a gust, above its
+clearance, below a maximum height above ground, and above or below missiles and zones.  If a plan has less margin,
+another plan is searched for that stays further away and leaves more climb or sink rate unused.
 """
 
 import math
@@ -33,39 +33,40 @@ Gust = Literal["downdrafts", "updrafts"]
 
 # Rate of climb that a higher plan leaves unused for downdrafts, in standard deviations of the vertical gusts.
 _UNUSED_SIGMAS = 1.2
-# Largest fraction of the fastest climb that is left unused.
+# Maximum fraction of the maximum climb rate that is left unused.
 _UNUSED_CLIMB_FRACTION = 0.25
-# The same if a height limit lies above the plan: the more climb is left, the less height a downdraft takes.
+# The same fraction if a height limit lies above the plan; the more climb rate is unused, the less altitude a downdraft
+# costs.
 _UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT = 0.75
 # Rate of sink that a lower plan leaves unused for updrafts, in standard deviations of the vertical gusts.
 _UNUSED_SINK_SIGMAS = 1.0
-# Largest fraction of the fastest sink that is left unused.
+# Maximum fraction of the maximum sink rate that is left unused.
 _UNUSED_SINK_FRACTION = 0.6
-# Fraction of the height needed in level flight that a plan keeps at a fixed end, where a flight spends only seconds.
-# Of 24 flights each of a Zagi in moderate turbulence between ends with a half, none came below its clearance over
-# ground at 0, 1,500 and 3,000 m; with a quarter 5 did at 3,000 m.
+# Fraction of the margin needed in level flight that a plan has at a fixed end, where a flight spends only seconds.  Of
+# 24 flights each of a Zagi in moderate turbulence between ends with a half, none came below its clearance over ground
+# at 0, 1,500 and 3,000 m; with a quarter, 5 did at 3,000 m.
 _END_HEIGHT_FRACTION = 0.5
-# Distance from an end at which a plan keeps the full height that its leg needs, m; it grows linearly up to there.
+# Distance from an end at which a plan has the full margin that its leg needs, m; the margin grows linearly up to there.
 _FULL_HEIGHT_DISTANCE_M = 1500.0
 # Length of the parts of a leg near an end that are judged separately, m.
 _PART_LENGTH_M = 250.0
-# Height step at which a path is compared with missiles and zones, m: none thicker is missed.
+# Height step at which a path is compared with missiles and zones, m, so that none thicker than this is missed.
 _HEIGHT_STEP_M = 2.5
-# Least ratio of the length of a part of a leg to the tangent of a turn in it.
+# Minimum ratio of the length of a leg's part to the tangent of the turn in this part.
 _TANGENT_RATIO = 1.05
 # Tolerance for rounding, m.
 _ROUNDING_TOLERANCE_M = 1e-6
 
 
 class Shortfall(NamedTuple):
-    """Hazard that gusts may take a plan into.
+    """Hazard into which gusts may move the aircraft.
 
     gust: "downdrafts" or "updrafts".
-    depth: how deep, m.
-    into: "into" a clearance, a missile's reach or a zone, "out of" a zone, or "above" a height, with its name.
-    where: the leg or the end.
+    depth: depth of the displacement into the hazard, m.
+    into: "into" a clearance, a missile's sphere or a zone, "out of" a zone, or "above" a height, with its name.
+    where: the leg or the end of the path.
     at_end: "start" or "destination" if no other path helps, because the end itself is too low or high; otherwise "".
-    of_threats: true for a missile or a zone.
+    of_threats: True for a missile or a zone.
     """
 
     gust: Gust
@@ -77,11 +78,11 @@ class Shortfall(NamedTuple):
 
 
 def keep_height(plan: Plan, airframe: Airframe, search: Search | None = None) -> Plan:
-    """Return the plan if each leg leaves the height for a one-in-a-hundred gust, or another plan.
+    """Return the plan if each leg has a margin for a one-in-a-hundred gust, otherwise another plan.
 
-    If no other plan is found, the plan is returned with the reason in its certificate, and is not safe.
+    If no other plan is found, the given plan is returned as not safe, with the reason in its certificate.
 
-    search: plans the same scenario within other limits; None to search for no other path.
+    search: plans the same scenario within other limits; None if no other path is to be searched for.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -95,7 +96,7 @@ def keep_height(plan: Plan, airframe: Airframe, search: Search | None = None) ->
     if not plan.safe or not _gusts_matter(plan, airframe):
         return plan
     if climb_problem := _climb_problem(plan, airframe):
-        return _refused(plan, [climb_problem])
+        return _with_problems(plan, [climb_problem])
     shortfalls = find_shortfalls(plan, airframe)
     if not shortfalls:
         return plan
@@ -103,11 +104,11 @@ def keep_height(plan: Plan, airframe: Airframe, search: Search | None = None) ->
         other = _other_plan(plan, airframe, search, shortfalls)
         if other is not None:
             return other
-    return _refused(plan, [_shortfall_text(one, plan, airframe) for one in shortfalls])
+    return _with_problems(plan, [_shortfall_text(one, plan, airframe) for one in shortfalls])
 
 
 def _gusts_matter(plan: Plan, airframe: Airframe) -> bool:
-    """Return True if gusts may move the aircraft further than its tracking error allows for."""
+    """Return True if gusts may move the aircraft further than its tracking error includes."""
     return any(
         displacement(0.0, plan.scenario.wind.turbulence)
         for _, displacement in _gust_displacements(plan.scenario, airframe.autopilot)
@@ -117,24 +118,24 @@ def _gusts_matter(plan: Plan, airframe: Airframe) -> bool:
 def _gust_displacements(
     scenario: Scenario, autopilot: Autopilot
 ) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
-    """Return the gusts that matter, with their displacement (m) as a function of the rate left (m/s)."""
+    """Return the gusts that matter, each with its displacement, m, as a function of the unused rate, m/s."""
     found: list[tuple[Gust, Callable[[float, Turbulence], float]]] = [("downdrafts", autopilot.gust_sink)]
-    # Above a path there is nothing to hit but a maximum height or a zone.
+    # Above a path there are no hazards other than a maximum height or a zone.
     if scenario.zones or scenario.limits.max_height_m is not None:
         found.append(("updrafts", autopilot.gust_rise))
     return found
 
 
-def _refused(plan: Plan, problems: list[str]) -> Plan:
+def _with_problems(plan: Plan, problems: list[str]) -> Plan:
     certificate = plan.certificate
     return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, *problems)))
 
 
 def _climb_problem(plan: Plan, airframe: Airframe) -> str:
-    """Explain in a line why no height is enough for downdrafts at the plan's altitude; "" if one is.
+    """Return a line on why no margin is enough for downdrafts at the plan's altitude, or "" if a margin is enough.
 
-    With a climb of less than `LEAST_SIGMAS`, several downdrafts take an aircraft down before it has climbed back. Of 24
-    flights of a Zagi that climbs 0.57 standard deviations 3 came down by more than 47 m, of 24 with 0.8 none did.
+    With a climb rate of less than `LEAST_SIGMAS`, several downdrafts follow before the aircraft has climbed back.  Of
+    24 flights of a Zagi with a climb rate of 0.57 standard deviations, 3 lost more than 47 m; of 24 with 0.8, none did.
     """
     amsl, turbulence = float(plan.waypoints[:, 2].max()), plan.scenario.wind.turbulence
     climb, least = airframe.limits.surely().rates(amsl)[0], LEAST_SIGMAS * gust_deviation(turbulence)
@@ -148,13 +149,13 @@ def _climb_problem(plan: Plan, airframe: Airframe) -> str:
 
 
 def _other_plan(plan: Plan, airframe: Airframe, search: Search, shortfalls: list[Shortfall]) -> Plan | None:
-    """Search for a plan that leaves the height that gusts need, or return or None without one."""
+    """Search for a plan with the margin that gusts need; return None if there is none."""
     shares = [_UNUSED_CLIMB_FRACTION]
     if _exceeds_a_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
         shares.append(_UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT)
     seen = list(shortfalls)
     for unused, from_threats in product(shares, (False, True)):
-        # Most paths lead past missiles and zones at the side: keep away from their tops only if a path led above one.
+        # Most paths pass missiles and zones at the side, so stay away from their tops only if a path led above one.
         if from_threats and not any(one.of_threats for one in seen):
             continue
         within = limits_in_gusts(plan, airframe, unused)
@@ -162,7 +163,7 @@ def _other_plan(plan: Plan, airframe: Airframe, search: Search, shortfalls: list
         from_zones_alone = all(one.of_threats for one in shortfalls) and plan.scenario.limits.max_height_m is None
         if not from_threats and from_zones_alone and not within.reserve_height:
             continue
-        other = search(_from_threats(within) if from_threats else within)
+        other = search(_with_margin_at_threats(within) if from_threats else within)
         if not other.safe:
             continue
         lacking = find_shortfalls(other, airframe)
@@ -172,13 +173,13 @@ def _other_plan(plan: Plan, airframe: Airframe, search: Search, shortfalls: list
     return None
 
 
-def _from_threats(kept: Limits) -> Limits:
-    """Extend the distance that limits keep from the ground or the maximum height to missiles and zones."""
+def _with_margin_at_threats(kept: Limits) -> Limits:
+    """Return limits that also require their margin to the ground or the maximum height at missiles and zones."""
     return replace(kept, reserve_threats=max(kept.reserve_height, kept.reserve_above))
 
 
 def _exceeds_a_limit(plan: Plan, higher: float) -> bool:
-    """Return True if a plan flown `higher` m higher exceeds a ceiling or a maximum height."""
+    """Return True if a plan raised by `higher`, m, exceeds a ceiling or a maximum height."""
     if not higher:
         return False
     scenario, inner = plan.scenario, plan.waypoints[1:-1]
@@ -191,9 +192,9 @@ def _exceeds_a_limit(plan: Plan, higher: float) -> bool:
 
 
 def limits_in_gusts(plan: Plan, airframe: Airframe, unused: float = _UNUSED_CLIMB_FRACTION) -> Limits:
-    """Return search limits for paths that leave the height that gusts need, at the plan's altitude.
+    """Return search limits for paths with the margin that gusts need at the plan's altitude.
 
-    unused: largest fraction of the fastest climb that is left unused for downdrafts.
+    unused: maximum fraction of the maximum climb rate that is left unused for downdrafts.
     """
     limits, autopilot, turbulence = airframe.limits.surely(), airframe.autopilot, plan.scenario.wind.turbulence
     climb, sink = limits.rates(float(plan.waypoints[:, 2].max()))
@@ -213,13 +214,13 @@ def limits_in_gusts(plan: Plan, airframe: Airframe, unused: float = _UNUSED_CLIM
 
 
 def limits_of_others(plan: Plan, airframe: Airframe) -> Limits:
-    """Return search limits for alternatives to a safe plan: the tightest limits that it meets."""
+    """Return search limits for alternatives to a safe plan, which are the tightest limits that this plan meets."""
     limits = airframe.limits.surely()
     if not _gusts_matter(plan, airframe):
         return limits
     for unused in (_UNUSED_CLIMB_FRACTION, _UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT):
         kept = limits_in_gusts(plan, airframe, unused)
-        for within in (_from_threats(kept), kept):
+        for within in (_with_margin_at_threats(kept), kept):
             if certify(make_problem(plan.scenario, within), plan.waypoints).ok:
                 return within
     return limits
@@ -232,8 +233,9 @@ class _Parts(NamedTuple):
     """Path cut into parts near its ends.
 
     gust: the kind of gusts.
-    points: (p, 3) m. legs: (p - 1) the leg of each part.
-    before, after: (p,) height that a gust may take or give at a point, on the part before it and the part after it, m.
+    points: ends of the parts, (p, 3), m.
+    legs: leg of each part, (p - 1,).
+    before, after: altitude that a gust may cost or add at a point, on the part before and the part after it, (p,), m.
     """
 
     gust: Gust
@@ -244,7 +246,7 @@ class _Parts(NamedTuple):
 
 
 def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
-    """Find the deepest displacement by gusts into each of clearance or maximum height, missile and zone."""
+    """Find the deepest displacement by gusts into a clearance or above a maximum height, into a missile and a zone."""
     limits, autopilot, turbulence = airframe.limits.surely(), airframe.autopilot, plan.scenario.wind.turbulence
     problem = make_problem(plan.scenario, limits)
     rates = np.array([limits.rates(float(amsl)) for amsl in plan.waypoints[:, 2]])
@@ -254,7 +256,7 @@ def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
             continue
         down = gust == "downdrafts"
         able, used = (rates[:, 0], np.maximum(0.0, climbs)) if down else (rates[:, 1], np.maximum(0.0, -climbs))
-        # The least that a leg leaves, at its beginning or at its end.
+        # Minimum of the unused rates at the start and at the end of each leg.
         left = np.minimum(able[:-1] - used[:, 0], able[1:] - used[:, 1])
         # ArduPlane and PX4 have an altitude error even without such a gust; planfly's guidance does not.
         strays = 0.0 if down else float(problem.certified.tracking.up)
@@ -270,9 +272,11 @@ def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
 
 
 def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, needs: Floats, at_ends: Floats) -> _Parts:
-    """Cut the legs of a path (w, 3) near its ends into parts, but not within a turn.
+    """Cut the legs of a path near its ends into parts, but not within a turn.
 
-    needs: (w - 1,) height that gusts may take or give on each leg, m. at_ends: (2,) height needed at the ends, m.
+    waypoints: (w, 3), m.
+    needs: altitude that gusts may cost or add on each leg, (w - 1,), m.
+    at_ends: margin needed at the ends, (2,), m.
     """
     ends = waypoints[[0, -1]]
     tangents = turn_tangents(problem.certified.aircraft, waypoints) * _TANGENT_RATIO
@@ -296,7 +300,7 @@ def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, needs: Floa
 
 
 def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, int]]:
-    """Return name, height above ground (m) and index of the points at both ends."""
+    """Return the name, the height above ground, m, and the index of the points at both ends."""
     terrain = problem.scenario.terrain
     if terrain is None:  # pragma: no cover - a problem has one
         return []
@@ -305,7 +309,7 @@ def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, 
 
 
 def _into_clearance(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Find the deepest displacement of a path by a downdraft below its clearance; or None without one."""
+    """Return the deepest displacement of a path by a downdraft below its clearance, or None without one."""
     data = problem.certified
     into = f"into the clearance of {data.clearance:g} m"
     for name, over, k in _heights_at_ends(problem, parts):
@@ -314,7 +318,7 @@ def _into_clearance(problem: Problem, parts: _Parts) -> Shortfall | None:
     lowest = Shortfall(parts.gust, 0.0, into, "")
     for piece in heights_above_ground(data, parts.points):
         k = int(piece["number"])
-        # A part needs the height of its end that is nearer to the end of the path.
+        # A part needs the margin of that of its ends which is nearer to the end of the path.
         need = max(parts.before[k], parts.after[k]) if piece["of_arc"] else min(parts.after[k], parts.before[k + 1])
         depth = float(need) + data.clearance - float(piece["height"])
         if depth > lowest.depth:
@@ -323,7 +327,7 @@ def _into_clearance(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _above_maximum(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Find the highest displacement by an updraft above the maximum height; or None without one."""
+    """Return the highest displacement by an updraft above the maximum height, or None without one."""
     data, most = problem.certified, problem.certified.airspace.max_height
     if most == math.inf:
         return None
@@ -338,7 +342,7 @@ def _above_maximum(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _into_missile(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Find the deepest displacement by a gust into the sphere of a missile; or None without one."""
+    """Return the deepest displacement by a gust into the sphere of a missile, or None without one."""
     threats = problem.scenario.threats
     paths = _gust_paths(parts) if (threats.kill_radius > 0.0).any() else []
     deepest = min(paths, key=lambda path: kill_distance(problem.certified, path), default=None)
@@ -357,7 +361,7 @@ def _into_missile(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _into_zone(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Find the deepest displacement into exclusion or out of inclusion zones; or None without one."""
+    """Return the deepest displacement by a gust into an exclusion zone or out of an inclusion zone, or None."""
     data = problem.certified
     if not is_limited(data.airspace) or not problem.scenario.zones:
         return None
@@ -373,7 +377,7 @@ def _into_zone(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _gust_paths(parts: _Parts) -> list[Floats]:
-    """Return the path (p, 3) displaced by gusts in steps that miss no hazard, up to the full displacement."""
+    """Return the path displaced by gusts, (p, 3) each, in steps that miss no hazard, up to the full displacement."""
     heights = np.maximum(parts.before, parts.after)
     count = max(1, math.ceil(float(heights.max()) / _HEIGHT_STEP_M))
     whole = np.array([0.0, 0.0, -1.0 if parts.gust == "downdrafts" else 1.0]) * heights[:, None]
@@ -381,7 +385,7 @@ def _gust_paths(parts: _Parts) -> list[Floats]:
 
 
 def _shortfall_text(one: Shortfall, plan: Plan, airframe: Airframe) -> str:
-    """Describe a shortfall in one line, with what would help."""
+    """Describe a shortfall and its remedies in one line."""
     better = "climbs better" if one.gust == "downdrafts" else "sinks faster"
     helps = f"less turbulence, an aircraft that {better}"
     is_held_down = one.gust == "updrafts" and not one.of_threats

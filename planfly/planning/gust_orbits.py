@@ -1,9 +1,9 @@
-"""Limit on the number of waypoints, because gusts can make an autopilot orbit a waypoint.
+"""Limit the number of waypoints, because gusts can make an autopilot orbit a waypoint.
 
 PX4 flies on at a waypoint only within NAV_FW_ALT_RAD of its altitude; otherwise it orbits the waypoint.  Moderate
-turbulence displaces light aircraft further than that now and then, and an orbit leaves the airspace that the plan was
-checked for.  Therefore a plan may have only as many waypoints as give less than `MAX_EXPECTED_ORBITS` expected orbits a
-flight. A plan that needs more is refused with the reason.
+turbulence sometimes displaces light aircraft further than this, and an orbit leaves the airspace for which the plan was
+checked.  Therefore the number of expected orbits per flight must be less than `MAX_EXPECTED_ORBITS`.  A plan that needs
+more waypoints than this allows is refused with the reason.
 """
 
 from collections.abc import Callable
@@ -20,10 +20,10 @@ from planner.search.fewer_waypoints import drop_waypoints
 from world.geometry import turning_angles
 from world.scenario import Scenario
 
-# Expected orbits in a flight that are accepted; about every second one leaves the corridor (of 186 flights, with 58
-# waypoints passed too high or too low, 30 failed).
+# Maximum accepted number of expected orbits in a flight; about every second orbit leaves the corridor (of 186 flights,
+# with 58 waypoints passed too high or too low, 30 failed).
 MAX_EXPECTED_ORBITS = 0.03
-# Growth of the excursion at a corner in gusts, m: of 28 m they made 36 at the most in 8 flights.
+# Growth of the excursion at a corner in gusts, m; in 8 flights, gusts increased it from 28 m to 36 m at most.
 GUST_CORNER_MARGIN_M = 8.0
 # Values of the autopilot's altitude parameter that are tried as a remedy, m.
 _TRIED_ALTITUDE_RADII_M = range(5, 105, 5)
@@ -35,12 +35,13 @@ def limit_waypoint_orbits(
     search: Callable[[Scenario], Plan] | None = None,
     within: Limits | None = None,
 ) -> Plan:
-    """Return the plan if it has few enough waypoints for its turbulence; otherwise a plan with fewer.
+    """Return the plan if it has few enough waypoints for its turbulence, otherwise a plan with fewer waypoints.
 
-    If no plan with fewer is found, the plan is returned with the reason in its certificate, and is not safe.
+    If no plan with fewer waypoints is found, the given plan is returned as not safe, with the reason in its
+    certificate.
 
-    search: plans a scenario as the plan was planned; None to search for no other path.
-    within: limits that the plan was made in; None for the limits of the aircraft.
+    search: plans a scenario as the plan was planned; None if no other path is to be searched for.
+    within: limits within which the plan was made; None for the limits of the aircraft.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -56,42 +57,44 @@ def limit_waypoint_orbits(
     if not plan.safe or expected == 0.0:
         return plan
     if expected <= MAX_EXPECTED_ORBITS:
-        # With as many waypoints as plans have without orbits, no corner is too sharp.
+        # A plan with the number of waypoints that is usual without orbits has no corner that is too sharp.
         has_all = len(plan.waypoints) >= plan.scenario.planner.waypoints
-        return plan if has_all or _is_accepted(plan, airframe) else _refused(plan, _corridor_problem(plan, airframe))
+        return (
+            plan if has_all or _is_accepted(plan, airframe) else _with_problem(plan, _corridor_problem(plan, airframe))
+        )
     fewer = drop_waypoints(plan, limits if within is None else within)
     if _is_accepted(fewer, airframe):
         return fewer
     circles, count = expected_circles(fewer, autopilot, limits), len(fewer.waypoints) - 2
     if search is not None:
-        # Assume the orbit probability per waypoint of this path: on another path it may be lower.
+        # Assume the orbit probability per waypoint of this path; it may be lower on another path.
         allowed, scenario = max(1, int(MAX_EXPECTED_ORBITS * count / circles)), plan.scenario
         table = scenario.planner.model_copy(update={"waypoints": allowed + 2})
         other = replace(search(replace(scenario, planner=table)), scenario=scenario)
         if other.safe and _is_accepted(other, airframe):
             return other
-    return _refused(plan, _orbit_problem(plan, autopilot, limits))
+    return _with_problem(plan, _orbit_problem(plan, autopilot, limits))
 
 
-def _refused(plan: Plan, problem: str) -> Plan:
+def _with_problem(plan: Plan, problem: str) -> Plan:
     certificate = plan.certificate
     return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, problem)))
 
 
 def _is_accepted(plan: Plan, airframe: Airframe) -> bool:
-    """Return True if a plan expects few enough orbits and no corner leaves the corridor."""
+    """Return True if few enough orbits are expected and the aircraft stays in the corridor at every corner."""
     if expected_circles(plan, airframe.autopilot, airframe.limits.surely()) > MAX_EXPECTED_ORBITS:
         return False
     return max(_excursions(plan, airframe), default=0.0) <= _half_width(plan, airframe)
 
 
 def _half_width(plan: Plan, airframe: Airframe) -> float:
-    """Return the largest distance from its legs that a flight of the plan may have, m."""
+    """Return the maximum distance from the legs that a flight of the plan may have, m."""
     return corridor_half_width(plan.scenario.limits.corridor_m, airframe.autopilot.acceptance_radius)
 
 
 def _excursions(plan: Plan, airframe: Airframe) -> list[float]:
-    """Return the distance from the legs at each corner in gusts, m; an empty list if not known."""
+    """Return the distance from the legs at each corner in gusts, m; empty if unknown."""
     limits = airframe.limits
     if (tracking := limits.tracking) is None:
         return []
@@ -102,7 +105,7 @@ def _excursions(plan: Plan, airframe: Airframe) -> list[float]:
 
 
 def _corridor_problem(plan: Plan, airframe: Airframe) -> str:
-    """Describe in a line the corner that leaves the corridor."""
+    """Describe the corner at which the aircraft leaves the corridor in a line."""
     excursions = _excursions(plan, airframe)
     aside = max(excursions)
     return (
@@ -114,7 +117,7 @@ def _corridor_problem(plan: Plan, airframe: Airframe) -> str:
 def expected_circles(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
     """Return the expected number of orbits at the inner waypoints of a plan in one flight.
 
-    A leg that climbs or sinks leaves less of the climb or sink rate of the aircraft to act against the gusts.
+    On a leg that climbs or sinks, less of the aircraft's climb or sink rate remains to act against the gusts.
     """
     turbulence, expected = plan.scenario.wind.turbulence, 0.0
     for rate, waypoint in zip(limits.climb_rates(plan.waypoints)[:-1, 1].tolist(), plan.waypoints[1:-1], strict=True):
@@ -124,7 +127,7 @@ def expected_circles(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
 
 
 def waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
-    """Return the most waypoints, ends included, that level flight allows in alternatives to a safe plan.
+    """Return the maximum number of waypoints, including the ends, for alternatives to a safe plan in level flight.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -143,7 +146,7 @@ def waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
 
 
 def _orbit_problem(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
-    """Explain in a line why a plan is not safe in its turbulence, and what would help."""
+    """Return a line on why a plan is not safe in its turbulence, and on the remedies."""
     count, name = len(plan.waypoints) - 2, autopilot.height_parameter
     circles = expected_circles(plan, autopilot, limits)
     radius = first_that_passes(

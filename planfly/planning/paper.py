@@ -1,4 +1,4 @@
-"""Section V of the paper: seeded plans of each problem in each encoding, and their table."""
+"""Repeat section V of the paper, with seeded plans of each problem in each encoding, and their table."""
 
 import csv
 import io
@@ -31,10 +31,10 @@ from world.scenario import Scenario, load_scenario, with_planner
 PROBLEMS = (7, 15, 30, 60)
 # Planner of the paper.
 PAPER = "umda"
-# Planners of comparison: the baselines of Figs. 9-12, polar with two ranges of its angle, as the paper states none, and
-# a polar encoding of planfly.
+# Planners for comparison.  They are the baselines of Figs. 9-12, with two ranges of the polar encoding's angle, because
+# the paper states none, and a polar encoding of planfly.
 BASELINES = ("umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing")
-# The planner of the paper in a strip along the straight line, which no other encoding gets; an addition of planfly.
+# The planner of the paper in a strip along the straight line, an addition of planfly that other encodings do not get.
 STRIP = "umda-strip"
 # Half width of the strip by the number of threats, m.
 STRIP_ACROSS = {7: 2500.0, 15: 2500.0, 30: 2500.0, 60: 1500.0}
@@ -44,13 +44,13 @@ STRIP_ACROSS = {7: 2500.0, 15: 2500.0, 30: 2500.0, 60: 1500.0}
 class SeededPlan:
     """Values of one plan for tables and figures.
 
-    threats: number in the problem.
-    waypoints: (w, 3) world m.
-    violations, objectives: (4,) counts and values, on the paper's points.
-    certified: the continuous check passes and no missile reaches the path.
-    kill_probability, detection_probability: of `exposure_probability`.
-    history: (g, 3) length ratio, kill exposure and violations of the best path after each generation.
-    seconds: CPU time of the search.
+    threats: number of threats in the problem.
+    waypoints: world coordinates, m, (w, 3).
+    violations, objectives: counts and values on the paper's points, (4,).
+    certified: True if the continuous check passes and no missile reaches the path.
+    kill_probability, detection_probability: values of `exposure_probability`.
+    history: length ratio, kill exposure and violations of the best path after each generation, (g, 3).
+    seconds: CPU time of the search, s.
     """
 
     threats: int
@@ -68,22 +68,22 @@ class SeededPlan:
 
     @property
     def safe(self) -> bool:
-        """True if safe by the paper: no violation and no kill exposure on its six points a leg."""
+        """True if safe by the paper's definition, without violation or kill exposure on its six points per leg."""
         return not any(self.violations) and self.objectives[Objective.KILL_EXPOSURE] == 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class TableRow:
-    """One line of the table: the plans of one algorithm for one problem.
+    """One line of the table, on the plans of one algorithm for one problem.
 
     The columns of table.csv have these names.
     runs: number of seeds.
     safe: number of plans that are safe on the points of the paper.
     certified: number of plans that pass the continuous check.
-    length_median, length_worst: path length ratio of the safe plans, None without any.
-    kill_median, kill_worst, detection_median: the sums of the paper, of all plans.
-    kill_probability_worst: of all plans.
-    seconds_median: CPU time of a search.
+    length_median, length_worst: path length ratio of the safe plans, None without a safe plan.
+    kill_median, kill_worst, detection_median: the paper's sums, over all plans.
+    kill_probability_worst: maximum kill probability of all plans.
+    seconds_median: median CPU time of a search, s.
     """
 
     threats: int
@@ -108,8 +108,11 @@ def problem_name(threats: int) -> str:
 def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> float:
     """Return 1 minus the product of (1 - p) over points and units in reach; p = (scale / d)^4, at most 1.
 
-    The points are the dividing points of the legs.
-    waypoints: (w, 3).  kind: "kill" or "detection".  The sums of the paper (eq. 9, 10) have no upper bound; this has.
+    The points are the dividing points of the legs.  The sums of the paper (eq. 9, 10) have no upper bound, but this
+    probability has one.
+
+    waypoints: (w, 3), m.
+    kind: "kill" or "detection".
     """
     share = np.arange(6)[:, None] / 6.0
     points = np.concatenate([a + share * (b - a) for a, b in itertools.pairwise(waypoints)])
@@ -123,7 +126,7 @@ def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> fl
 
 
 def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
-    """Plan once and keep the values for tables and figures; algorithm: name of a planner, or `STRIP`."""
+    """Plan once, and return the values for tables and figures.  algorithm: name of a planner, or `STRIP`."""
     scenario = load_scenario(problem_name(threats))
     searched = algorithm
     if algorithm == STRIP:
@@ -151,11 +154,11 @@ def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
 def plan_section(
     problems: Sequence[int], seeds: int, algorithm: str, jobs: int | None = None, advance: Advance | None = None
 ) -> list[SeededPlan]:
-    """Make all plans, ordered by problem, algorithm and seed 1..seeds for any number of processes.
+    """Make all plans, in the order of problem, algorithm and seed 1..seeds for any number of processes.
 
-    algorithm: listed in place of the paper's planner; the strip and the baselines are always planned, too.
-    jobs: processes, by default one for each core that this process may use.  Raises ScenarioError for an unknown
-    algorithm.
+    algorithm: replaces the paper's planner; the strip and the baselines are always planned, too.
+    jobs: number of processes, by default one for each core that this process may use.
+    Raises ScenarioError for an unknown algorithm.
     """
     names = [find_algorithm(algorithm, "algorithm").name]
     names += [name for name in (STRIP, *BASELINES) if name not in names]
@@ -164,7 +167,7 @@ def plan_section(
     done: list[SeededPlan] = []
     if advance is not None:
         advance(0, len(tasks), f"0 of {len(tasks)} plans")
-    for item in _results(tasks, count):
+    for item in _plan_in_processes(tasks, count):
         done.append(item)
         if advance is not None:
             remark = f"{item.threats} threats, {item.algorithm}, seed {item.seed}"
@@ -173,7 +176,7 @@ def plan_section(
 
 
 def usable_cores() -> int:
-    """Return the number of cores that this process may use, or all cores if the system does not say.
+    """Return the number of cores that this process may use, or of all cores if the system does not state it.
 
     >>> usable_cores() >= 1
     True
@@ -182,8 +185,8 @@ def usable_cores() -> int:
     return len(may_use(0)) if may_use is not None else os.cpu_count() or 1
 
 
-def _results(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPlan]:
-    """Yield results in the order of the tasks; the first runs here and compiles kernels for the others."""
+def _plan_in_processes(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPlan]:
+    """Yield results in the order of the tasks; the first runs in this process and compiles kernels for the others."""
     yield plan_once(*tasks[0])
     if count == 1:
         yield from (plan_once(*task) for task in tasks[1:])
@@ -195,7 +198,7 @@ def _results(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPl
             results = pool.map(_plan_task, tasks[1:])
         yield from results
     except BaseException:
-        # End the processes: their results are no longer needed.
+        # End the processes, because their results are no longer needed.
         pool.shutdown(wait=False, cancel_futures=True)
         end_children(active_children())
         raise
@@ -210,14 +213,14 @@ def _plan_task(task: tuple[int, str, int]) -> SeededPlan:
 
 
 def table(plans: Sequence[SeededPlan]) -> list[TableRow]:
-    """Return one row for each problem and algorithm, in the order they were planned."""
+    """Return the table, with one row for each problem and algorithm, in the order of planning."""
     groups: dict[tuple[int, str], list[SeededPlan]] = {}
     for item in plans:
         groups.setdefault((item.threats, item.algorithm), []).append(item)
-    return [_row(group) for group in groups.values()]
+    return [_table_row(group) for group in groups.values()]
 
 
-def _row(group: list[SeededPlan]) -> TableRow:
+def _table_row(group: list[SeededPlan]) -> TableRow:
     lengths = [item.objectives[Objective.LENGTH_RATIO] for item in group if item.safe]
     kills = _column(group, lambda item: item.objectives[Objective.KILL_EXPOSURE])
     return TableRow(
@@ -242,7 +245,7 @@ def _column(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Fl
 
 # ----------------------------------------------------------------------
 # ----------------------------------------------------------------------
-# Output: the table on the terminal, and JSON, CSV and figures in a folder.
+# Print the table on the terminal, and write JSON, CSV and figures into a folder.
 
 PAPER_SCHEMA = "planfly.planning.paper/1"
 # Files that any command may write; older files of these names are cleared first.
@@ -265,8 +268,8 @@ def table_text(rows: Sequence[TableRow]) -> str:
     for row in rows:
         safe, certified = f"{row.safe}/{row.runs}", f"{row.certified}/{row.runs}"
         lines.append(
-            f"{row.threats:>7}  {row.algorithm:<15}{safe:>7}{certified:>11}  {_number(row.length_median, 4):>10}  "
-            f"{_number(row.length_worst, 4):>6}  {row.kill_median:>12.3g}  {row.kill_worst:>6.3g}  "
+            f"{row.threats:>7}  {row.algorithm:<15}{safe:>7}{certified:>11}  {_number_text(row.length_median, 4):>10}  "
+            f"{_number_text(row.length_worst, 4):>6}  {row.kill_median:>12.3g}  {row.kill_worst:>6.3g}  "
             f"{row.detection_median:>10.3g}  {row.seconds_median:>6.2f}"
         )
     lines += [
@@ -276,17 +279,17 @@ def table_text(rows: Sequence[TableRow]) -> str:
     return "\n".join(lines)
 
 
-def _number(value: float | None, digits: int) -> str:
+def _number_text(value: float | None, digits: int) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
 def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededPlan]) -> None:
-    """Write table.csv, runs.csv and runs.json, reproducible for a seed, and times.csv, which is not."""
+    """Write table.csv, runs.csv and runs.json, which are reproducible for a seed, and times.csv, which is not."""
     columns = [item.name for item in fields(TableRow) if item.name != "seconds_median"]
-    write_whole(folder / "table.csv", _csv(columns, ([getattr(row, name) for name in columns] for row in rows)))
-    write_whole(folder / "runs.csv", _csv(_PLAN_COLUMNS, (list(_plan_row(item).values()) for item in plans)))
+    write_whole(folder / "table.csv", _csv_text(columns, ([getattr(row, name) for name in columns] for row in rows)))
+    write_whole(folder / "runs.csv", _csv_text(_PLAN_COLUMNS, (list(_plan_row(item).values()) for item in plans)))
     times = ([item.threats, item.algorithm, item.seed, f"{item.seconds:.3f}"] for item in plans)
-    write_whole(folder / "times.csv", _csv(["threats", "algorithm", "seed", "cpu_s"], times))
+    write_whole(folder / "times.csv", _csv_text(["threats", "algorithm", "seed", "cpu_s"], times))
     kept = [{key: value for key, value in asdict(row).items() if key != "seconds_median"} for row in rows]
     runs = [
         _plan_row(item)
@@ -331,7 +334,7 @@ _PLAN_COLUMNS = [
 ]
 
 
-def _csv(columns: Sequence[str], rows: Any) -> str:
+def _csv_text(columns: Sequence[str], rows: Any) -> str:
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(columns)
@@ -340,7 +343,7 @@ def _csv(columns: Sequence[str], rows: Any) -> str:
 
 
 def write_figures(folder: Path, plans: Sequence[SeededPlan]) -> None:
-    """Draw the figures of the paper: 5-8 (paths), 9-12 (encodings) and the convergence over generations."""
+    """Draw the paper's figures 5-8 (paths) and 9-12 (encodings), and the convergence over generations."""
     from logs.views.drawing import write_png
     from logs.views.paper import PaperPath, draw_convergence, draw_encodings, draw_paths
 
@@ -365,14 +368,15 @@ def write_figures(folder: Path, plans: Sequence[SeededPlan]) -> None:
 
 
 # ----------------------------------------------------------------------
-# All of it in one call.
+# Plan, and write everything in one call.
 
 
 @dataclass(frozen=True, slots=True)
 class PaperTables:
     """Result of `planfly.paper_tables`.
 
-    rows: the table, a row for each problem and algorithm.  plans: the plans in it.
+    rows: rows of the table, one for each problem and algorithm.
+    plans: the plans in the table.
     """
 
     rows: tuple[TableRow, ...]
@@ -388,13 +392,16 @@ def paper_tables(
     out: str | Path | None = None,
     overwrite: bool = False,
 ) -> PaperTables:
-    """Plan section V of the paper again: seeded plans of its problems in three encodings.
+    """Repeat section V of the paper, with seeded plans of its problems in three encodings.
 
-    problems: numbers of threats, out of 7, 15, 30 and 60.  runs: seeds 1..runs of each.
-    algorithm: planned in addition to the baselines.  jobs: processes; None for one a core.
-    out: folder for tables and figures; None writes none.  overwrite: true to replace existing results.
+    problems: numbers of threats, out of 7, 15, 30 and 60.
+    runs: number of seeds for each problem and algorithm, from 1 on.
+    algorithm: name of the algorithm that is planned in addition to the baselines.
+    jobs: number of processes; None for one per core.
+    out: folder for tables and figures; None writes no files.
+    overwrite: True replaces existing results.
 
-    A script must call it under ``if __name__ == "__main__":``, because its processes import the script.
+    A script must call this function under ``if __name__ == "__main__":``, because its processes import the script.
     Raises a `planfly.PlanflyError` for bad input.
     """
     check_arguments(problems=tuple(problems), runs=runs, jobs=jobs)

@@ -1,4 +1,4 @@
-"""Pareto front of plans for a scenario: the default plan of every command, and alternatives."""
+"""Plan a Pareto front for a scenario, with the default plan of every command and alternatives."""
 
 from planfly.planning.gust_altitude_margin import limits_of_others
 from planfly.planning.gust_orbits import waypoints_in_gusts
@@ -22,10 +22,9 @@ def make_pareto_plans(
 ) -> Front:
     """Return up to `count` plans of a front, each safe by all checks of `planfly.workflow.make_plan.make_plan`.
 
-    The default plan is made by `make_plan`, and if it is not safe there is no front. Alternatives that are not safe
-    once they are finished are left out; if gusts make the autopilot orbit, they have no more waypoints than gusts
-    allow.
-    stop, onward: as for `make_plan`.
+    The default plan is made by `make_plan`; if it is not safe, the front is empty.  Alternatives that are not safe when
+    completed are left out.  If gusts make the autopilot orbit, alternatives have no more waypoints than gusts allow.
+    stop, onward: see `make_plan`.
     """
     default = make_plan(scenario, airframe, seed, advance=advance, stop=stop, onward=onward)
 

@@ -1,1 +1,1 @@
-"""Recorded flights played to other programs, and as movies."""
+"""Play recorded flights to other programs, and draw them as movies."""

@@ -1,9 +1,9 @@
-"""Certificates that live as long as a process: who holds one proves that it belongs to that process's run."""
+"""Make certificates that last as long as a process and prove that a connection belongs to the process's run."""
 
 from datetime import UTC, datetime
 from typing import NamedTuple
 
-# Whatever a clock is set to while a run lasts, its certificate stays valid.
+# Start of validity, so early that the certificate stays valid if the clock is changed during the run.
 _FROM = datetime(1970, 1, 1, tzinfo=UTC)
 _UNTIL = datetime(9999, 12, 31, tzinfo=UTC)
 
@@ -20,13 +20,13 @@ class Certificate(NamedTuple):
 
 
 def temporary_certificate() -> Certificate:
-    """Make a certificate for ``localhost`` with a new key (elliptic curve P-256); no two are alike.
+    """Return a certificate for ``localhost`` with a new key (elliptic curve P-256), different in each call.
 
     >>> one, other = temporary_certificate(), temporary_certificate()
     >>> one.certificate.splitlines()[0], one.key == other.key
     ('-----BEGIN CERTIFICATE-----', False)
     """
-    # It takes as long to load as some commands take.
+    # Imported here because loading takes as long as some commands.
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes, serialization
     from cryptography.hazmat.primitives.asymmetric import ec

@@ -1,7 +1,7 @@
 """Play a log to Foxglove over a WebSocket that only this machine can reach.
 
-The server is foxglove-sdk's server: it speaks only the WebSocket subprotocol `foxglove.sdk.v1`, and refuses a viewer
-that requests the older name `foxglove.websocket.v1`.  It does not check origins: a gate precedes it.
+The server is that of foxglove-sdk, which supports only the WebSocket subprotocol `foxglove.sdk.v1` and refuses a viewer
+that requests the older name `foxglove.websocket.v1`.  It does not check origins; a gate in front of it does.
 """
 
 import contextlib
@@ -46,8 +46,8 @@ def play_to_foxglove(
 
     allowed: origins of web pages that are accepted in addition to `planfly.replays.origin_gate.VIEWERS`.
 
-    Wait for the first client that subscribes, ``wait`` s at most; a later client is sent the present scenes.
-    Raises FlightError if no client subscribes in time, OSError for a port in use.
+    Wait at most ``wait`` seconds for the first client that subscribes; a later client is sent the current scenes.
+    Raises FlightError if no client subscribes in time, and OSError for a port in use.
     """
     import foxglove
 
@@ -60,12 +60,12 @@ def play_to_foxglove(
         opened.callback(server.stop)
         on_message(f"foxglove  ws://{HOST}:{gate.port} (Open connection, Foxglove WebSocket; {SUBPROTOCOL})")
         messages = broadcast.up_to(log_messages(file), round(start * 1e9) + EPOCH_NS)
-        _wait(broadcast, wait, stopped)
-        _play(broadcast, server, messages, round(end * 1e9) + EPOCH_NS, speed, stopped)
+        _wait_for_listener(broadcast, wait, stopped)
+        _play_messages(broadcast, server, messages, round(end * 1e9) + EPOCH_NS, speed, stopped)
 
 
 def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: OriginGate) -> Any:
-    """Start the server behind the gate; no browser trusts its certificate, so no page bypasses the gate."""
+    """Start the server behind the gate; no browser trusts its certificate, so that no page can bypass the gate."""
     certificate = temporary_certificate()
     try:
         server = foxglove.start_server(
@@ -84,7 +84,7 @@ def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: Origi
     return server
 
 
-def _wait(broadcast: "_Broadcast", timeout: float | None, stopped: Stopped) -> None:
+def _wait_for_listener(broadcast: "_Broadcast", timeout: float | None, stopped: Stopped) -> None:
     waited = RunningClock()
     while not broadcast.listeners and not stopped():
         if timeout is not None and waited() > timeout:
@@ -92,7 +92,7 @@ def _wait(broadcast: "_Broadcast", timeout: float | None, stopped: Stopped) -> N
         time.sleep(_POLL_INTERVAL_S)
 
 
-def _play(
+def _play_messages(
     broadcast: "_Broadcast", server: Any, messages: Iterator[LogMessage], end_ns: int, speed: float, stopped: Stopped
 ) -> None:
     played, first, newest = RunningClock(), None, 0
@@ -105,7 +105,7 @@ def _play(
             time.sleep(min(ahead, _POLL_INTERVAL_S))
         if stopped():
             return
-        # An event that was noted afterwards stands later in the file than its time.
+        # An event that was recorded afterwards is later in the file than its time.
         if message.log_time > newest:
             newest = message.log_time
             server.broadcast_time(newest)
@@ -117,7 +117,7 @@ def _play(
 
 
 class _Broadcast:
-    """Topics of the log, the newest message of each scene, and the subscribers: a listener in Foxglove's sense."""
+    """Topics of the log, the newest message of each scene, and the subscribers, as a listener of Foxglove's server."""
 
     def __init__(self, foxglove: Any, channels: list[LogChannel]) -> None:
         self.context = foxglove.Context()
@@ -141,19 +141,19 @@ class _Broadcast:
         for message in messages:
             if message.log_time >= start_ns:
                 return itertools.chain([message], messages)
-            self._note(message)
+            self._record_scene(message)
         return iter(())
 
     def show(self, message: LogMessage) -> None:
         """Send a message to the subscribers."""
         self.catch_up()
-        self._note(message)
+        self._record_scene(message)
         channel = self._channels.get(message.channel.topic)
         if channel is not None:
             channel.log(message.data, log_time=message.log_time)
 
     def catch_up(self) -> None:
-        """Send the present scenes to new subscribers."""
+        """Send the current scenes to new subscribers."""
         while not self._arrivals.empty():
             self._waiting.append(self._arrivals.get())
         now = time.monotonic()
@@ -163,7 +163,7 @@ class _Broadcast:
                 self._channels[topic].log(scene.data, log_time=scene.log_time)
         self._waiting = [item for item in self._waiting if now - item[0] < _SUBSCRIPTION_DELAY_S]
 
-    def _note(self, message: LogMessage) -> None:
+    def _record_scene(self, message: LogMessage) -> None:
         if message.channel.topic.startswith(("/scene/", "/points/")):
             self._scenes[message.channel.topic] = message
 

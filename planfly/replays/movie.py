@@ -1,4 +1,4 @@
-"""The frames of a flight as a GIF, an MP4 or a folder of PNG files."""
+"""Write the frames of a flight as a GIF, an MP4 or a folder of PNG files."""
 
 import contextlib
 import errno
@@ -37,7 +37,8 @@ def write_movie(
 ) -> list[Path]:
     """Write a .gif or .mp4 file, or a folder of frame-0000.png and so on.
 
-    start, end: of the flight, s.  speed: ratio to real time; None for a film of 20 s.
+    start, end: start and end in flight time, s.
+    speed: multiple of real time; None for a film of 20 s.
     Raises PlanflyError for a target that exists, too many frames, and an .mp4 without ffmpeg and the extra ``films``.
     """
     kind = target.suffix.lower()
@@ -55,11 +56,11 @@ def write_movie(
         raise PlanflyError.of_argument("movie", len(film), allowed, shown="", file=target)
     if not kind:
         return _write_folder(target, film)
-    write_whole(target, _gif(film) if kind == ".gif" else _mp4(film, program))
+    write_whole(target, _encode_gif(film) if kind == ".gif" else _mp4(film, program))
     return [target]
 
 
-def _shown(film: MovieFrames) -> Iterator[Image.Image]:
+def _draw_frames(film: MovieFrames) -> Iterator[Image.Image]:
     with stage("drawing", "drawing frames") as advance:
         for number, frame in enumerate(film.frames(), 1):
             yield Image.fromarray(frame)
@@ -67,12 +68,12 @@ def _shown(film: MovieFrames) -> Iterator[Image.Image]:
 
 
 def _write_folder(folder: Path, film: MovieFrames) -> list[Path]:
-    """Write the frames, one file each, and replace old frames."""
+    """Write each frame to a file, and remove old frames."""
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("frame-[0-9][0-9][0-9][0-9].png"):
         old.unlink()
     files = []
-    for number, image in enumerate(_shown(film)):
+    for number, image in enumerate(_draw_frames(film)):
         data = io.BytesIO()
         image.save(data, "PNG")
         files.append(folder / f"frame-{number:04d}.png")
@@ -81,15 +82,15 @@ def _write_folder(folder: Path, film: MovieFrames) -> list[Path]:
 
 
 def _make_palette(frame: Image.Image) -> Image.Image:
-    """Make an image whose palette holds the drawing colors exactly, and a blend of the other colors of the frame.
+    """Return an image whose palette has the exact drawing colors, and blends of the frame's other colors.
 
-    With few colors chosen by area alone, thin lines and small marks would take the colors of the ground.
+    If the few colors were chosen by area alone, thin lines and small marks would get the colors of the ground.
     """
     kept = [ImageColor.getrgb(colour)[:3] for colour in drawn_colours()]
     blended = frame.quantize(_TRANSPARENT - len(kept), dither=Image.Dither.NONE).getpalette() or []
     palette = [part for colour in kept for part in colour] + blended[: 3 * (_TRANSPARENT - len(kept))]
     holder = Image.new("P", (1, 1))
-    # The rest of the 256 entries repeats the first.
+    # The rest of the 256 entries repeats the first entry.
     holder.putpalette(palette + palette[:3] * (256 - len(palette) // 3))
     return holder
 
@@ -103,9 +104,9 @@ def _apply_palette(frame: Image.Image, palette: Image.Image) -> Image.Image:
     return same
 
 
-def _gif(film: MovieFrames) -> bytes:
-    """Encode all frames in the same colors, against flicker; a frame holds only changed pixels."""
-    images = _shown(film)
+def _encode_gif(film: MovieFrames) -> bytes:
+    """Encode all frames in the same colors, to prevent flicker; each frame contains only changed pixels."""
+    images = _draw_frames(film)
     start = next(images)
     palette = _make_palette(start)
     first = _apply_palette(start, palette)

@@ -1,1 +1,1 @@
-"""Returns to launch flown by JSBSim or by a real autopilot, and their summary."""
+"""Fly returns to launch in JSBSim or by a real autopilot, and summarise them."""

@@ -1,4 +1,4 @@
-"""A return to launch flown in JSBSim, by the full control law or by the ArduPlane program."""
+"""Fly a return to launch in JSBSim, by the simulated ArduPlane or by the ArduPlane program."""
 
 import math
 from dataclasses import replace
@@ -22,19 +22,22 @@ from world.kernels import Record
 
 # Length of the lead-in, m, so that the flight is steady at the start of the return.
 LEAD = 500.0
-# A flight that passes the start at a larger horizontal distance has not begun there, m.
+# Maximum horizontal distance at which a flight passes the start of a return, m.
 _MAX_START_DISTANCE_M = 60.0
-# The same for the vertical distance, m.
+# Maximum vertical distance at which a flight passes the start of a return, m.
 _MAX_START_HEIGHT_ERROR_M = 15.0
-# Delay of the control law in following a slope after a waypoint, s; the start waypoint is set ahead in altitude by it.
+# Delay of the simulated autopilot in following a slope after a waypoint, s, by which the altitude of the start waypoint
+# is set ahead.
 _SLOPE_DELAY_S = 3.0
 
 
 class Met(NamedTuple):
     """Nearest approaches of a path to ground and missiles.
 
-    clearance: least height above ground, m, NaN if not known; at: (3,) its place, m.
-    outside: least distance outside a kill sphere, m, inf without any; threat: index of the threat, -1 without any.
+    clearance: minimum height above ground, m; NaN if unknown.
+    at: place of this minimum, (3,), m.
+    outside: minimum distance outside a kill sphere, m; inf without missiles.
+    threat: index of this threat, -1 without missiles.
     """
 
     clearance: float
@@ -44,10 +47,12 @@ class Met(NamedTuple):
 
 
 def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
-    """Return least height above ground and least distance outside a kill sphere of a flight in JSBSim, m.
+    """Fly a return in JSBSim, and return the minimum height above ground and distance outside a kill sphere, m.
 
-    The flight has exact navigation and the mean wind alone, as with the point mass.  start: a record of
-    `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.  None for a return that cannot be flown.
+    The flight has exact navigation and the mean wind alone, as with the point mass.  Return None for a return that
+    cannot be flown.
+
+    start: a record of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
     """
     try:
         setup, airframe = return_setup(world, start)
@@ -64,10 +69,10 @@ def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
 def return_setup(
     world: ReturnWorld, start: Record, landing: LandingStart | None = None
 ) -> tuple[FlightSetup, Airframe]:
-    """Make the setup of a return by the control law, in the mean wind alone, with a lead-in to its start.
+    """Return setup and airframe of a return by the simulated ArduPlane, in the mean wind, with a lead-in to its start.
 
-    landing: the landing sequence that it leads to, None for none.
-    Raises MissionError for a return that cannot be laid out, and ScenarioError or ParameterError as `load_airframe`.
+    landing: the landing sequence to which the return leads, or None.
+    Raises MissionError for a return without a valid route, and the ScenarioError or ParameterError of `load_airframe`.
     """
     scenario = replace(world.scenario, wind=replace(world.scenario.wind, turbulence="none"))
     airframe = replace(load_airframe(scenario), autopilot=ArduPlane(world.parameters))
@@ -75,7 +80,7 @@ def return_setup(
 
 
 def from_start(track: Track, start: Record) -> Floats | None:
-    """Return positions (t, 3) from the start of the return on; None if the flight does not reach it."""
+    """Return the positions from the start of the return on, (t, 3), or None if the flight does not reach the start."""
     begin = np.array([float(start["east"]), float(start["north"])])
     near = np.hypot(*(track.position[: round(2.0 * LEAD / 10.0 * 60.0), :2] - begin).T)
     if not near.size or float(near.min()) > _MAX_START_DISTANCE_M:
@@ -85,7 +90,7 @@ def from_start(track: Track, start: Record) -> Floats | None:
 
 
 def met_on_way(world: ReturnWorld, position: Floats) -> Met:
-    """Find the nearest approaches of a path (t, 3) to ground and missiles."""
+    """Find the nearest approaches of a path to ground and missiles.  position: path points, (t, 3), m."""
     low, at = math.nan, (math.nan, math.nan, math.nan)
     if world.scenario.terrain is not None:
         above = position[:, 2] - world.scenario.terrain.height(position[:, 0], position[:, 1])
@@ -102,7 +107,7 @@ def met_on_way(world: ReturnWorld, position: Floats) -> Met:
 
 
 def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | None) -> Mission:
-    """Make a mission that passes a start on its course and slope, and returns from there."""
+    """Return a mission that passes the start on its course and slope, and then returns to launch."""
     east, north, up = (float(start[name]) for name in ("east", "north", "up"))
     ve, vn, vu = (float(start[f"velocity_{name}"]) for name in ("east", "north", "up"))
     over = max(1.0, math.hypot(ve, vn))

@@ -1,4 +1,4 @@
-"""Summary of returns to launch next to a verdict: judge a few starts for a line, a scene and pictures."""
+"""Summarise returns to launch from a few places of a flight, for a line, a scene and pictures next to its verdict."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from world.errors import PlanflyError
 
 
 def return_starts(setup: FlightSetup, track: Track | None, every: float) -> ReturnStarts:
-    """Return starts on the track, or on the planned path if nothing was flown."""
+    """Return the starts of returns on the track, or on the planned path if nothing was flown.  every: interval, s."""
     if track is not None and len(track):
         return flown_starts(setup, track, every)
     return planned_starts(setup, every)
@@ -27,8 +27,8 @@ _SUMMARY_RETURNS = 50
 class ReturnSummary:
     """Returns from a few places of a flight, without simulation in JSBSim, to accompany its verdict.
 
-    line: summary of all returns in a line; "" if nothing can be judged.
-    world, starts, returns: None if nothing is judged.
+    line: summary of all returns in a line; "" if no return can be judged.
+    world, starts, returns: data of the returns; None if no return is judged.
     """
 
     line: str = ""
@@ -43,14 +43,14 @@ class ReturnSummary:
         return drawn_returns(self.world, self.starts, self.returns, judge_glides(self.world, self.starts))
 
     def draw_returns_without_glides(self) -> DrawnReturns | None:
-        """Return the data of the pictures without glides and least heights, in some hundredths of a second."""
+        """Return the data of the pictures without glides and minimum heights, within some hundredths of a second."""
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
         return draw_returns_without_glides(self.world, self.starts, self.returns)
 
 
 def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
-    """Judge returns of a flight or of the planned path; empty without a home or a terrain."""
+    """Judge returns of a flight or of the planned path; the summary is empty without a home or a terrain."""
     if setup.mission.home is None or setup.scenario.terrain is None:
         return ReturnSummary()
     try:
@@ -69,5 +69,5 @@ def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
 
 
 def returns_line(setup: FlightSetup, track: Track | None) -> str:
-    """Summarise returns of a flight or of the planned path in a line; "" without a home or a terrain."""
+    """Return a line on the returns of a flight or of the planned path, or "" without a home or a terrain."""
     return return_summary(setup, track).line

@@ -1,7 +1,7 @@
-"""Worst returns to launch, flown again by the ArduPlane program to check planfly's control law.
+"""Fly the worst returns to launch again by the ArduPlane program, to check planfly's simulated ArduPlane.
 
-Each is a separate flight, on the mission by which `planfly.rtl.jsbsim_returns` flies a return by the control law.
-The result of the program replaces the result of the law only if it is worse; it never improves a judgement.
+Each return is a separate flight, on the mission with which `planfly.rtl.jsbsim_returns` flies it by the simulated
+ArduPlane.  The result of the program replaces the simulated result only if it is worse; it never improves a judgement.
 """
 
 import math
@@ -44,22 +44,24 @@ from world.errors import ArgumentError, MissionError
 from world.kernels import Record
 from world.scenario import Scenario
 
-# Least height above ground of the lead-in to the start of a return, m; a return with a lower lead-in is not flown.
+# Minimum height above ground of the lead-in to the start of a return, m; a return with a lower lead-in is not flown.
 _MIN_LEAD_IN_HEIGHT_M = 20.0
-# A return that ends within this distance of a place has arrived there, m.
+# Maximum distance from a place at which a return that ends has arrived, m.
 _ARRIVAL_DISTANCE_M = 500.0
-# A return that heads for a place within this angle is on its path there, rad.
+# Maximum angle between course and bearing at which a return heads for a place, rad.
 _ARRIVAL_HEADING_TOLERANCE_RAD = math.radians(10.0)
-# Rows of a track in a second.
+# Number of rows of a track per second.
 _ROWS_PER_SECOND = 60
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramReturn:
-    """One return as flown by the control law and by the program.
+    """One return as flown by the simulated ArduPlane and by the program.
 
-    law: the return as it was judged.  flown: the return by the program, or None if it could not be flown.
-    reason: why the program could not fly it; "" if it did.  log: the log of the flight, or None if it was not kept.
+    law: the return by the simulated ArduPlane, as judged.
+    flown: the return by the program, or None if the program could not fly it.
+    reason: reason why the program could not fly the return, or "".
+    log: the log of the flight, or None if it was not kept.
     """
 
     law: ReturnFlown
@@ -69,7 +71,7 @@ class ProgramReturn:
 
     @property
     def agrees(self) -> bool:
-        """True if both go to the same place with the same kind of outcome."""
+        """True if both returns go to the same place and have the same kind of outcome."""
         return self.flown is not None and (self.flown.kind, self.flown.target.name) == (
             self.law.kind,
             self.law.target.name,
@@ -77,7 +79,7 @@ class ProgramReturn:
 
     @property
     def worse(self) -> bool:
-        """True if the program does harm that the control law does not."""
+        """True if the outcome by the program is worse than that by the simulated ArduPlane."""
         return self.flown is not None and KINDS.index(self.flown.kind) < KINDS.index(self.law.kind)
 
 
@@ -85,7 +87,8 @@ class ProgramReturn:
 class ProgramReturns:
     """Returns that the program flew.
 
-    program: its name and version; "" if it flew none.  each: the returns, the worst first.
+    program: name and version of the program; "" if it flew no return.
+    each: the returns, the worst first.
     """
 
     program: str
@@ -93,7 +96,7 @@ class ProgramReturns:
 
     @property
     def flown(self) -> tuple[ProgramReturn, ...]:
-        """The returns that the program could fly."""
+        """Returns that the program could fly."""
         return tuple(one for one in self.each if one.flown is not None)
 
     def headline(self) -> str:
@@ -111,7 +114,7 @@ class ProgramReturns:
         return f"by {self.program} itself: {len(self.flown)} of the worst flown, {compared}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
-        """Describe each return in a line: start, outcome by the law and by the program, agreement."""
+        """Describe each return in a line with its start, both outcomes, and their agreement."""
         out = []
         for one in self.each:
             east, north, _ = one.law.start
@@ -132,13 +135,13 @@ class ProgramReturns:
         return out
 
     def put_right(self, returns: Returns) -> Returns:
-        """Return the returns, with the result of the program wherever it is worse than the result of the law."""
+        """Return the returns, with the program's result for each return for which it is worse."""
         worse = {id(one.law): one.flown for one in self.each if one.worse}
         return replace(returns, each=tuple(worse.get(id(one)) or one for one in returns.each))
 
 
 def refuse_program(program: Path) -> None:
-    """Raise ArgumentError for a program whose returns planfly cannot compare, as it has no model of them."""
+    """Raise ArgumentError for a program whose returns planfly does not simulate and so cannot compare."""
     kind = program_autopilot(program)
     if not issubclass(kind, ArduPlaneSitl):
         allowed = f"ArduPlane's program is expected: how {kind.title} returns is not flown here"
@@ -150,8 +153,8 @@ def worst_apart(
 ) -> list[tuple[ReturnFlown, int]]:
     """Choose at most `points` of the worst returns that can be flown, each with the number of its start.
 
-    The worst comes first.  Starts closer together than half of their share of the path are skipped: neighbouring
-    seconds show the same.
+    The worst comes first.  Starts closer together than half of the path divided by `points` are skipped, because
+    neighbouring seconds show the same.
     """
     rows = starts.rows
     place = np.column_stack([rows["east"], rows["north"]])
@@ -170,7 +173,7 @@ def worst_apart(
 
 
 def _badness_key(one: ReturnFlown) -> tuple[int, float]:
-    """Return the sort key of a return: `badness`, and for safe returns the one nearest to a limit first."""
+    """Return the sort key of a return, which is `badness`, or for a safe return how near it is to a limit."""
     return (KINDS.index("safe"), doubt(one)) if one.safe else badness(one)
 
 
@@ -188,7 +191,7 @@ def _is_clear(world: ReturnWorld, row: Record) -> bool:
 def fly_by_program(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, program: Path, points: int, folder: Path | None
 ) -> ProgramReturns:
-    """Fly at most `points` of the worst returns by ArduPlane, in the mean wind, with exact navigation.
+    """Fly at most `points` of the worst returns by the ArduPlane program, in the mean wind, with exact navigation.
 
     folder: folder for the flight logs of planfly and of the program; None writes no logs.
     Raises FlightError if the program does not start or breaks off.
@@ -213,7 +216,7 @@ def fly_by_program(
 def _judge_flown_return(
     world: ReturnWorld, law: ReturnFlown, start: Record, track: Track, ended: str
 ) -> ReturnFlown | None:
-    """Judge a return flown by the program; None if the flight did not reach the start of the return."""
+    """Judge a return flown by the program; return None if the flight did not reach the start of the return."""
     whole = from_start(track, start)
     if whole is None:
         return None
@@ -249,23 +252,25 @@ def _judge_flown_return(
 
 
 def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
-    """Return the place where judgement ends: the loiter center, or the last place before the landing."""
+    """Return the place where the judgement of a return ends, its loiter center or the last place before the landing."""
     if target.landing is None:
         return target.position
     return (target.landing, *target.landing.onward)[-1].place
 
 
 def _cut_at_landing(target: ReturnTarget, position: Floats) -> Floats:
-    """Cut a path (t, 3) to a landing sequence at the last place before the landing."""
+    """Cut a path to a landing sequence at the last place before the landing.  position: path points, (t, 3), m."""
     if target.landing is None:
         return position
     return position[: int(np.argmin(np.linalg.norm(position - np.array(_end_position(target)), axis=1))) + 1]
 
 
 def _flown_target(world: ReturnWorld, law: ReturnTarget, position: Floats) -> ReturnTarget:
-    """Identify the target of a path (t, 3): the place where it ends, or else the place that it heads for.
+    """Identify the target of a path, which is the place where it ends, or otherwise the place for which it heads.
 
-    All places that a return may go to are tried.  Falls back to the target of the law.
+    All places to which a return may go are tried.  If none fits, return the target of the simulated ArduPlane.
+
+    position: path points, (t, 3), m.
     """
     last, before = position[-1, :2], position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
     course = math.atan2(*(last - before))
@@ -274,7 +279,7 @@ def _flown_target(world: ReturnWorld, law: ReturnTarget, position: Floats) -> Re
         off = np.array(_end_position(target)[:2]) - last
         away = math.hypot(*off)
         turned = abs(math.remainder(math.atan2(*off) - course, math.tau))
-        # A place at which the path ends ranks before any that it heads for.
+        # A place at which the path ends ranks before any place for which the path heads.
         rank = (
             away / _ARRIVAL_DISTANCE_M if away < _ARRIVAL_DISTANCE_M else 1.0 + turned / _ARRIVAL_HEADING_TOLERANCE_RAD
         )
@@ -284,7 +289,7 @@ def _flown_target(world: ReturnWorld, law: ReturnTarget, position: Floats) -> Re
 
 
 def _other_targets(world: ReturnWorld, law: ReturnTarget) -> Iterator[ReturnTarget]:
-    """Yield home and all rally points, except the target of the law."""
+    """Yield home and all rally points, except the target of the simulated ArduPlane."""
     home = ArduPlane(world.parameters).return_rules.height + world.home.up
     places = [
         ("home", (world.home.east, world.home.north, home)),

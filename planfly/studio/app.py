@@ -1,4 +1,4 @@
-"""Addresses of the studio: a fixed table of page files, and one websocket."""
+"""Make the studio's web application, with a fixed table of page files and one websocket."""
 
 from importlib import resources
 
@@ -19,24 +19,24 @@ FILES = (
 
 
 def page_files() -> dict[str, tuple[bytes, str]]:
-    """Return bytes and type of each file of the page, by address.
+    """Return the bytes and the media type of each page file, by address.
 
     >>> page_files()["/"][1]
     'text/html; charset=utf-8'
     """
     folder = resources.files("planfly.studio") / "page"
-    found = {f"/{name}": ((folder / name).read_bytes(), _type(name)) for name in FILES}
+    found = {f"/{name}": ((folder / name).read_bytes(), _media_type(name)) for name in FILES}
     found["/"] = found.pop("/studio.html")
-    found["/theme.css"] = (css_variables().encode(), _type("theme.css"))
+    found["/theme.css"] = (css_variables().encode(), _media_type("theme.css"))
     return found
 
 
-def _type(name: str) -> str:
+def _media_type(name: str) -> str:
     return f"{_TYPES[name[name.rindex('.') :]]}; charset=utf-8"
 
 
 def make_app(server: Server, port: int) -> App:
-    """Make the whole application, with its guard."""
+    """Make the whole application, including its guard."""
     files = page_files()
 
     def answer(request: Request) -> Response:

@@ -1,6 +1,6 @@
-"""Autosave of a session, in case the server dies: the mission, its settings, and its plan.
+"""Save the mission, settings and plan of a session automatically, in case the server dies.
 
-An autosave applies only to its own document, which is identified by its first mission.
+An autosave is restored only into its own document, which is identified by its first mission.
 """
 
 import hashlib
@@ -21,7 +21,7 @@ from world.files import read_small_file, utf8_text
 from world.scenario import Scenario, from_spec
 
 _SCHEMA = "planfly.studio/1"
-# Maximum size of an autosave, bytes: two missions, a plan and the settings.
+# Maximum size of an autosave with two missions, a plan and the settings, bytes.
 _MAX_BYTES = 4 * MAX_BYTES
 # Tables of a scenario that the studio changes.
 _SAVED_TABLES = ("wind", "flight", "limits", "area")
@@ -30,10 +30,11 @@ _SAVED_TABLES = ("wind", "flight", "limits", "area")
 def kept_text(desk: EditContext, first: Mission, mission: Mission, plan: Plan | None, name: str) -> str:
     """Return the text of the autosave file.
 
-    first: the mission that was opened.  plan: the plan of the mission, None if the mission was changed since.
+    first: the mission that was opened.
+    plan: the plan of the mission, or None if the mission was changed after planning.
     """
     spec = desk.scenario.to_json()
-    # An area that was made around a mission is made again when it is restored.
+    # Do not save an area that was made around a mission; it is made again when the mission is restored.
     names = [one for one in _SAVED_TABLES if one in spec and (one != "area" or not desk.scenario.external)]
     data = {
         "schema": _SCHEMA,
@@ -49,7 +50,7 @@ def kept_text(desk: EditContext, first: Mission, mission: Mission, plan: Plan | 
 
 
 def read_kept(file: Path, desk: EditContext, first: Mission) -> tuple[Mission, EditContext] | None:
-    """Return the saved mission and its editing context; None if this document was not changed, or there is no file.
+    """Return the saved mission and its editing context, or None if there is no autosave of this document.
 
     Raises one of `INTERNAL` or PlanflyError for a file that cannot be read.
     """
@@ -62,19 +63,19 @@ def read_kept(file: Path, desk: EditContext, first: Mission) -> tuple[Mission, E
     try:
         found = _with_plan(_with_settings(desk, data), mission, data)
     except (*INTERNAL, PlanflyError):
-        # If the settings cannot be restored, the edited mission still is.
+        # If the settings cannot be restored, restore at least the edited mission.
         found = mission, desk
     return None if found[0] is first and found[1] is desk else found
 
 
 def kept_beside(file: Path, first: Mission) -> Path:
-    """Return the autosave path of a document opened after the first: a sibling of the file of the first."""
+    """Return the autosave path of a document opened after the first one, next to the first one's file."""
     digest = hashlib.sha256(json.dumps(mission_data(first)).encode()).hexdigest()[:8]
     return file.with_name(f"{file.stem}-{digest}{file.suffix}")
 
 
 def _with_settings(desk: EditContext, data: Json) -> EditContext:
-    """Return the context with the saved settings; the same object if they are equal."""
+    """Return the editing context with the saved settings, or the same object if these do not differ."""
     before: Scenario = desk.scenario
     spec, found = json.loads(json.dumps(before.to_json())), data.get("settings", {})
     own = data.get("parameters") or asdict(SetParameters())
@@ -90,18 +91,18 @@ def _with_settings(desk: EditContext, data: Json) -> EditContext:
 
 
 def _with_plan(desk: EditContext, mission: Mission, data: Json) -> tuple[Mission, EditContext]:
-    """Return a mission and its context, with its plan if one was saved."""
+    """Return a mission and its editing context, with the saved plan if there is one."""
     if not data.get("plan"):
         return mission, desk
     plan = parse_plan(data["plan"], "kept", ground=desk.scenario.terrain)
     plan = replace(plan, scenario=desk.scenario)
     made = planned_mission(plan, desk.airframe)
-    # The autosave has whole digits: if the items differ, the mission was changed after planning.
+    # The autosave keeps all digits, so items that differ mean that the mission was changed after planning.
     return (made, desk.of_plan(plan, made)) if made.items == mission.items else (mission, desk)
 
 
 def mission_data(mission: Mission) -> Json:
-    """Convert a mission to plain data, from which `mission_from` makes the same mission; NaN becomes null."""
+    """Convert a mission to plain data, from which `mission_from` makes the same mission; NaN becomes None."""
 
     def plain(item: MissionItem) -> list[Any]:
         numbers = [*item.params, item.lat_deg, item.lon_deg, item.alt]
@@ -115,9 +116,9 @@ def mission_data(mission: Mission) -> Json:
 
 
 def mission_from(data: Json, first: Mission) -> Mission:
-    """Make a mission of its data; all other fields are taken from the first mission.
+    """Make a mission from the data of `mission_data`; all other fields are taken from the first mission.
 
-    Raises ValueError, LookupError or TypeError for data that `mission_data` does not make.
+    Raises ValueError, LookupError or TypeError for other data.
     """
 
     def number(value: Any) -> float:

@@ -1,7 +1,7 @@
-"""Differences between a flight and the previous one, although items were inserted or deleted.
+"""Compare a flight with the previous flight, even if items were inserted or deleted.
 
-Inserting or deleting an item renumbers the later ones: equal items of both missions, and items between equal ones, are
-matched first, and legs are identified by the items at their ends.
+An inserted or deleted item renumbers the later items.  Therefore equal items of both missions, and items between equal
+items, are matched first, and legs are identified by the items at their ends.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,11 +15,11 @@ from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import place_text, quantity_text
 
-# Identity of a place: its kind, and its items, by their order in the mission or by their number; None for no item.
+# Identity of a place, which is its kind and its items, by their order in the mission or by their number, or None.
 PlaceKey = tuple[str, int | None, int | None]
-# Greatest number of changes of state that are named.
+# Maximum number of changes of state that are named.
 _MAX_STATE_CHANGES = 6
-# Greatest number of changes of value that are named if no state has changed.
+# Maximum number of changes of value that are named if no state has changed.
 _MAX_VALUE_CHANGES = 3
 # Sort key of the states.
 _WORST_FIRST = {False: 0, None: 1, True: 2}
@@ -28,8 +28,10 @@ _WORST_FIRST = {False: 0, None: 1, True: 2}
 class Figure(NamedTuple):
     """Result of a rule at a place.
 
-    ok: None if not judged.  value, margin: in ``unit``, or None.
-    place: in words, by the numbers of its own mission.  scale: smallest noticeable difference of the margin.
+    ok: True if it passes, None if not judged.
+    value, margin: in ``unit``, or None.
+    place: description of the place, with the item numbers of its own mission.
+    scale: smallest noticeable difference of the margin.
     """
 
     ok: bool | None
@@ -41,7 +43,7 @@ class Figure(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Value in words, "" for none."""
+        """Value with its unit, or "" without a value."""
         return "" if self.value is None else quantity_text(self.value, self.unit)
 
 
@@ -49,9 +51,10 @@ _Found = dict[tuple[str, PlaceKey], Figure]
 
 
 class Figures(NamedTuple):
-    """Results of a flight, for a comparison with another.
+    """Results of a flight, for a comparison with another flight.
 
-    items: contents of each item of its mission, in order.  found: worst result of each rule at each place.
+    items: contents of each item of its mission, in order.
+    found: worst result of each rule at each place.
     seconds: duration of the flight.
     """
 
@@ -70,17 +73,17 @@ def flight_figures(mission: Mission, route: Route, findings: Iterable[Finding], 
         value = item.planned if item.flown is None else item.flown
         figure = Figure(item.ok, value, item.margin, item.unit, words, RULE_WORDS[item.rule].scale)
         old = found.get((item.rule, key))
-        if old is None or _badness(figure) < _badness(old):
+        if old is None or _severity_key(figure) < _severity_key(old):
             found[item.rule, key] = figure
     return Figures(items, found, seconds)
 
 
-def _badness(figure: Figure) -> tuple[int, float]:
+def _severity_key(figure: Figure) -> tuple[int, float]:
     return _WORST_FIRST[figure.ok], 0.0 if figure.margin is None else figure.margin
 
 
 def _place_key(place: Place, route: Sequence[int], order: dict[int, int]) -> tuple[PlaceKey, str]:
-    """Return the identity of a place across missions, and its words: legs and waypoints by item numbers."""
+    """Return the identity of a place across missions, and its description with item numbers."""
     if place.kind == "leg" and place.index is not None:
         first, last = (route[place.index + k] for k in (0, 1))
         if first in order and last in order:
@@ -94,7 +97,7 @@ def _place_key(place: Place, route: Sequence[int], order: dict[int, int]) -> tup
 
 
 def same_items(before: Sequence[tuple[float, ...]], now: Sequence[tuple[float, ...]]) -> dict[int, int]:
-    """Map the order of items in one mission to their order in another; removed items are left out.
+    """Map the position of each item in one mission to its position in another; removed items are left out.
 
     >>> a, b, c, d = [(16.0, 46.0, 8.0 + k, 100.0) for k in range(4)]
     >>> same_items([a, b, c], [a, d, b, c]), same_items([a, b, c], [a, c]), same_items([a, b, c], [a, d, c])
@@ -110,7 +113,7 @@ def same_items(before: Sequence[tuple[float, ...]], now: Sequence[tuple[float, .
 
 
 def changes(before: Figures | None, now: Figures) -> list[str]:
-    """Describe the changes since the previous flight, in words; nothing for the first flight.
+    """Describe the changes since the previous flight, a line each; empty for the first flight.
 
     >>> leg = ("clearance", ("leg", 0, 1))
     >>> items = ((16.0, 46.0, 8.0, 100.0), (16.0, 46.0, 8.1, 100.0))
@@ -123,7 +126,7 @@ def changes(before: Figures | None, now: Figures) -> list[str]:
     """
     if before is None:
         return []
-    old = _renumbered(before, now)
+    old = _renumber(before, now)
     found = _state_changes(old, now.found)
     if len(found) > _MAX_STATE_CHANGES:
         found[_MAX_STATE_CHANGES:] = [f"and {len(found) - _MAX_STATE_CHANGES} more"]
@@ -139,12 +142,12 @@ def changes(before: Figures | None, now: Figures) -> list[str]:
 _OF_ITEMS = ("leg", "waypoint", "mission")
 # Kind of a place whose item was removed.
 _GONE_PLACE = "gone"
-# Order of a removed item.
+# Position of a removed item.
 _GONE = -1
 
 
-def _renumbered(before: Figures, now: Figures) -> _Found:
-    """Return the earlier results by present places; results at removed items get places of their own."""
+def _renumber(before: Figures, now: Figures) -> _Found:
+    """Return the earlier results by their current places; each result at a removed item gets its own place."""
     same, found = same_items(before.items, now.items), {}
     for number, ((rule, (kind, first, last)), figure) in enumerate(before.found.items()):
         if kind in _OF_ITEMS and first is not None and last is not None:
@@ -156,7 +159,7 @@ def _renumbered(before: Figures, now: Figures) -> _Found:
 
 
 def _state_changes(old: _Found, new: _Found) -> list[str]:
-    """Describe the places whose state has changed, with both values; the worse first."""
+    """Describe the places whose state has changed, with both values; those that became worse come first."""
     worse, better = [], []
     for (rule, key), now in new.items():
         was = old.get((rule, key))
@@ -184,7 +187,7 @@ def _change_text(rule: str, now: Figure, was: Figure | None, end: str) -> str:
 
 
 def _value_changes(old: _Found, new: _Found) -> list[str]:
-    """Describe changes of value if no state has changed: of failures, then of the closest margins."""
+    """Describe changes of value if no state has changed, first of failures, then of each rule's smallest margin."""
     both = [(rule, old[rule, key], now) for (rule, key), now in new.items() if now.ok is False and (rule, key) in old]
     still = [_change_text(rule, now, was, "still fails") for rule, was, now in both if was.text != now.text]
     least_old, least_new = _closest_by_rule(old), _closest_by_rule(new)

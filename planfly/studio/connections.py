@@ -1,4 +1,4 @@
-"""Connections to the studio: without a token they are few, short-lived, and send little."""
+"""Limit the number, lifetime and message size of connections to the studio that have not given a token."""
 
 import asyncio
 import itertools
@@ -9,27 +9,28 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from planfly.studio.messages import MAX_FIRST
 
-# Lifetime of a connection, s.  The files of the page are read in far less; its websocket lasts as long as the page.
+# Lifetime of an HTTP connection, s.  The files of the page are read much faster; its websocket lasts as long as the
+# page.
 LIFETIME = 10.0
-# Greatest number of connections that have not given a token; a page has a few.
+# Maximum number of connections that have not given a token; a page has a few.
 MAX_UNKNOWN = 32
-# Key in a websocket's scope of the function that allows messages of full size, once the token is given.
+# Key in a websocket's scope of the function that allows messages of full size, called when the token has been given.
 WELCOME = "planfly.welcome"
-# Order in which connections were made.
+# Counter that numbers connections in the order in which they were made.
 _numbers = itertools.count()
 
 
 class _Unknown:
-    """Connection that has not given a token: above `MAX_UNKNOWN` the oldest one ends.
+    """Connection that has not given a token; if there are more than `MAX_UNKNOWN`, the oldest is closed.
 
-    number: its place in the order of connections, or None if it has given a token or is ending.
+    number: position in the order of connections, or None if the connection has given a token or is ending.
     """
 
     connections: set[Any]
     transport: Any
     number: int | None = None
 
-    def _take_place(self) -> None:
+    def _register(self) -> None:
         self.number = next(_numbers)
         unknown = [one for one in self.connections if getattr(one, "number", None) is not None]
         if len(unknown) > MAX_UNKNOWN:
@@ -41,16 +42,16 @@ class _Unknown:
 
 
 class ShortLived(_Unknown, H11Protocol):
-    """HTTP on a connection that ends after `LIFETIME`, so that silent ones leave their places to others."""
+    """HTTP on a connection that ends after `LIFETIME`, so that silent connections make room for others."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Begin a connection, and schedule its end."""
+        """Start a connection, and schedule its end."""
         super().connection_made(transport)
-        self._take_place()
+        self._register()
         asyncio.get_running_loop().call_later(LIFETIME, self._end, transport)
 
     def _end(self, transport: asyncio.Transport) -> None:
-        # A websocket has replaced the protocol, and stays.
+        # If a websocket has replaced this protocol, the connection stays open.
         if transport.get_protocol() is self:
             transport.abort()
 
@@ -63,12 +64,12 @@ class FirstMessageBounded(_Unknown, WebSocketsSansIOProtocol):
         self._limit_messages(MAX_FIRST)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Begin a connection."""
+        """Start a connection."""
         super().connection_made(transport)
-        self._take_place()
+        self._register()
 
     def handle_connect(self, event: Any) -> None:
-        """Begin a websocket, whose scope holds the function that allows messages of full size."""
+        """Start a websocket, and add the function that allows messages of full size to its scope."""
         super().handle_connect(event)
         scope: Any = getattr(self, "scope", {})
         scope[WELCOME] = self._welcome
@@ -78,7 +79,7 @@ class FirstMessageBounded(_Unknown, WebSocketsSansIOProtocol):
         self._limit_messages(self.config.ws_max_size)
 
     def _limit_messages(self, most: int) -> None:
-        # The name in websockets 16 and later, and the name before.
+        # The first name is that of websockets 16 and later, the second that of earlier versions.
         for name in ("max_message_size", "max_size"):
             if hasattr(self.conn, name):
                 setattr(self.conn, name, most)

@@ -1,4 +1,4 @@
-"""Open documents in the studio, and save the mission under edit, with the losses of each file format."""
+"""Open documents in the studio, and save the edited mission, with a list of the contents that each format loses."""
 
 import contextlib
 import json
@@ -35,17 +35,17 @@ from world.errors import LogError, MissionError, PlanflyError
 from world.files import temporary_folder
 from world.scenario import Scenario, embedded_names
 
-# Largest file that may be dropped on the page, bytes.
+# Maximum size of a file dropped on the page, bytes.
 MAX_DROPPED = 16 * 2**20
-# File types that may be dropped: all that `planfly check` reads and that name no other file.
+# File types that may be dropped.  They are those that `planfly check` reads and that do not name other files.
 DROPPED = (".waypoints", ".txt", ".plan", ".json", ".mcap", ".bin", ".tlog", ".ulg", ".gpx", ".igc", ".kml", ".kmz")
-# File types that a mission is opened from and saved as.
+# File types that a mission can be opened from and saved as.
 KINDS = {"waypoints": ".waypoints", "plan": ".plan", "plan.json": ".json", "kml": ".kml"}
-# All file types that are saved.
+# All file types that can be saved.
 SAVED = KINDS | {"parm": ".parm"}
-# Latitudes and longitudes within this are the same place, degrees; a file has a grid of 1e-7 degrees.
+# Latitudes and longitudes within this difference are the same place, degrees; files round to 1e-7 degrees.
 _SAME_PLACE_DEG = 2e-7
-# Altitudes within this are the same, m.
+# Altitudes within this difference are the same, m.
 _SAME_ALTITUDE_M = 0.02
 
 
@@ -53,11 +53,14 @@ _SAME_ALTITUDE_M = 0.02
 class Document:
     """Opened mission and its origin.
 
-    name: for people; stem: of files that are saved.
-    setup: what was opened.
-    kind: of `KINDS`, "" for what was no mission file; data: its bytes, which an unchanged mission is saved as.
-    path: the file that the command named; None for any other.  on_disk: the bytes that it has, as far as is known.
-    to_plan: whether it is a scenario that has no path yet.
+    name: name shown to the user.
+    stem: stem of the names of saved files.
+    setup: setup of the opened mission.
+    kind: key in `KINDS`, or "" if the document was not a mission file.
+    data: bytes of the file, which an unchanged mission is saved as.
+    path: the file that the command named; None for any other document.
+    on_disk: bytes of this file, as last known.
+    to_plan: True for a scenario that has no path yet.
     """
 
     name: str
@@ -73,7 +76,7 @@ class Document:
 def open_document(target: str, options: MissionOptions) -> Document:
     """Open a scenario, a plan, a mission or a log, by name or path.  Raises PlanflyError."""
     if target in embedded_names() or target.lower().endswith(".toml"):
-        return _of_scenario(named_scenario(target, options), options.get("seed"))
+        return _scenario_document(named_scenario(target, options), options.get("seed"))
     path = Path(target)
     setup = _open_file(path, options)
     kind = next((kind for kind, suffix in KINDS.items() if suffix == path.suffix.lower()), "")
@@ -83,7 +86,7 @@ def open_document(target: str, options: MissionOptions) -> Document:
 
 
 def open_dropped(name: str, data: bytes, options: MissionOptions) -> Document:
-    """Open a file that was dropped on the page: its bytes, and of its name the suffix.  Raises PlanflyError."""
+    """Open a file that was dropped on the page, by its bytes and the suffix of its name.  Raises PlanflyError."""
     suffix = Path(name).suffix.lower()
     shown = "".join(ch if ch.isprintable() and ch not in "/\\" else "_" for ch in name)[-60:] or "dropped"
     if suffix not in DROPPED:
@@ -103,11 +106,11 @@ def open_dropped(name: str, data: bytes, options: MissionOptions) -> Document:
 
 
 def _refuse_log_naming_files(name: str, file: Path) -> None:
-    """Refuse a log whose scenario, or whose plan's scenario, names files of this machine."""
+    """Raise PlanflyError for a log whose scenario, or whose plan's scenario, names files of this machine."""
     found = Container()
     with file.open("rb") as stream, contextlib.suppress(PlanflyError, *PARSE_ERRORS):
         stream.seek(len(MAGIC))
-        # Errors of the log are reported when it is read; attachments before the error are checked here.
+        # Errors in the log are reported when the log is read; here the attachments before an error are checked.
         for _ in read_chunks(stream, found):
             pass
     if SCENARIO_FILE in found.attachments:
@@ -116,13 +119,13 @@ def _refuse_log_naming_files(name: str, file: Path) -> None:
 
 
 def _refuse_other_files(name: str, data: bytes) -> None:
-    """Refuse a plan whose scenario names files of this machine, which a page must not read."""
+    """Raise PlanflyError for a plan whose scenario names files of this machine, which a page must not read."""
     try:
         scenario = json.loads(data)["scenario"]
         named = [scenario.get("terrain", {}).get("path"), scenario.get("flight", {}).get("params")]
         named += [scenario.get("zones_file"), _aircraft_folder(scenario.get("flight", {}).get("aircraft"))]
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
-        # Errors of the plan are reported when it is read.
+        # Errors in the plan are reported when the plan is read.
         return
     for one in named:
         if one is not None and str(one) not in EMBEDDED:
@@ -135,18 +138,21 @@ def _aircraft_folder(aircraft: Any) -> str | None:
 
 
 def _open_file(path: Path, options: MissionOptions) -> FlightSetup:
-    """Open a plan, a mission, or the mission of a log."""
+    """Return the setup of a plan, of a mission, or of the mission in a log."""
     if path.is_file() and is_imported_log(path):
-        setup = _imported(path, options).setup
-        return _unflown(setup.scenario, setup.mission, setup.seed)
+        setup = _read_imported_log(path, options).setup
+        return _log_mission_setup(setup.scenario, setup.mission, setup.seed)
     if path.is_file() and is_log(path):
         setup = read_log(path).setup
-        return _unflown(apply_options(setup.scenario, options), setup.mission, setup.seed)
+        return _log_mission_setup(apply_options(setup.scenario, options), setup.mission, setup.seed)
     return open_flight(path, options)
 
 
-def _imported(path: Path, options: MissionOptions) -> ImportedFlight:
-    """Read the flight of another program's log.  Raises PlanflyError, in the studio's words for a track alone."""
+def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
+    """Read the flight of another program's log.
+
+    Raises PlanflyError; for a track without a mission, its message fits the studio.
+    """
     world: LogOptions = {
         "scenario": options.get("scenario"),
         "terrain": options.get("terrain"),
@@ -161,13 +167,13 @@ def _imported(path: Path, options: MissionOptions) -> ImportedFlight:
         raise MissionError(f"{path}: {alone}", file=path) from None
 
 
-def _unflown(scenario: Scenario, mission: Mission, seed: int) -> FlightSetup:
-    """Set up the mission of a log to be flown again."""
+def _log_mission_setup(scenario: Scenario, mission: Mission, seed: int) -> FlightSetup:
+    """Return the setup to fly the mission of a log again."""
     return make_setup(scenario, load_airframe(scenario), mission, seed)
 
 
-def _of_scenario(scenario: Scenario, seed: int | None) -> Document:
-    """Open a scenario with the straight line from its start to its destination, until a path is planned."""
+def _scenario_document(scenario: Scenario, seed: int | None) -> Document:
+    """Return a document of a scenario, with a straight line from start to destination until a path is planned."""
     airframe, number = load_airframe(scenario), choose_seed(scenario, seed)
     mission = planned_mission(straight_plan(scenario, number), airframe)
     setup = make_setup(scenario, airframe, mission, number)
@@ -175,24 +181,24 @@ def _of_scenario(scenario: Scenario, seed: int | None) -> Document:
 
 
 def straight_plan(scenario: Scenario, seed: int) -> Plan:
-    """Return the straight line as a plan without a certificate."""
+    """Return the straight line from start to destination as a plan that is not certified."""
     line = np.stack([scenario.start, scenario.destination])
     certificate = Certificate(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ("not planned yet",))
     return Plan(scenario, line, np.zeros(4, dtype=np.int64), np.zeros(4), certificate, seed, "", 0, np.zeros((0, 3)))
 
 
 def planned_mission(plan: Plan, airframe: Airframe) -> Mission:
-    """Write the mission of a plan, named after its scenario."""
+    """Return the mission of a plan, named after the scenario."""
     return mission_of_plan(plan, airframe, plan.scenario.name)
 
 
 # ----------------------------------------------------------------------
-# Saving.
+# Save a document.
 
 
 @dataclass(frozen=True, slots=True)
 class Saved:
-    """Name and bytes of a file, and a list of the contents that the format cannot hold, a line each."""
+    """Name and bytes of a saved file, and one line for each content that the format cannot store."""
 
     name: str
     data: bytes
@@ -215,19 +221,19 @@ def save_document(document: Document, desk: EditContext, judged: JudgedMission, 
         return _saved_plan(name, desk, judged)
     if kind == "kml":
         text = kml_text(desk.scenario.name, [plan_line(judged.setup)], map_zones(judged.setup))
-        return Saved(name, _bytes(text), ("a map only: the commands, speeds and frames of the items are not in it",))
+        return Saved(name, _to_bytes(text), ("a map only: the commands, speeds and frames of the items are not in it",))
     mission = replace(mission, autopilot=judged.setup.autopilot.name)
     text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
     losses = (*_format_losses(desk, mission, text, name, kind), *_lost_settings(before, desk))
     return Saved(name, text.encode(), losses)
 
 
-def _bytes(text: str | bytes) -> bytes:
+def _to_bytes(text: str | bytes) -> bytes:
     return text.encode() if isinstance(text, str) else text
 
 
 def _format_losses(desk: EditContext, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
-    """List what the file of a ground station cannot hold of a mission and its world."""
+    """List the contents of a mission and its world that a ground station's file cannot store."""
     kept, found = parse_mission(text, name), []
     apart: Mapping[str, tuple[int, str]] = {
         "fence items": (len(mission.fences) - len(kept.fences), ".plan holds them"),
@@ -245,7 +251,7 @@ def _format_losses(desk: EditContext, mission: Mission, text: str, name: str, ki
 
 
 def _lost_settings(before: Scenario, desk: EditContext) -> tuple[str, ...]:
-    """List the settings changed here, which no file of a ground station holds."""
+    """List the settings changed in the studio, which a ground station's file cannot store."""
     now = desk.scenario
     differs = {
         "wind": before.spec.wind != now.spec.wind,
@@ -258,13 +264,13 @@ def _lost_settings(before: Scenario, desk: EditContext) -> tuple[str, ...]:
 
 
 def _lost_parameters(desk: EditContext) -> tuple[str, ...]:
-    """Note the autopilot parameters set here, which only a parameter file holds."""
+    """Return a line on the autopilot parameters set in the studio, which only a parameter file stores, or nothing."""
     count = len(desk.parameters.values)
     return (f"{count} parameter{'s' if count != 1 else ''} set here: .parm holds them",) if count else ()
 
 
 def _saved_parameters(name: str, desk: EditContext) -> Saved:
-    """Return the parameters that were set here as a file.  Raises PlanflyError if none was set."""
+    """Return a file of the parameters set in the studio.  Raises PlanflyError if no parameter was set."""
     if not desk.parameters.values:
         raise PlanflyError("no parameter was set here: Settings sets them", field="form")
     return Saved(name, desk.parameters.text(f"set in planfly studio for {desk.airframe.autopilot.title}").encode())
@@ -285,7 +291,7 @@ def _saved_plan(name: str, desk: EditContext, judged: JudgedMission) -> Saved:
 
 
 def _require_plain_waypoints(mission: Mission) -> None:
-    """Refuse items that a plan of waypoints would drop: take-off, landing, speed changes en route."""
+    """Raise MissionError for items that a plan would drop, which are take-off, landing and speed changes en route."""
     first = next((k for k, item in enumerate(mission.items) if item.has_position), 0)
     for k, item in enumerate(mission.items):
         lost = "its take-off" if item.command in TAKEOFFS else "its landing" if item.command in LANDINGS else ""
@@ -299,7 +305,8 @@ def _require_plain_waypoints(mission: Mission) -> None:
 def certified_plan(desk: EditContext, judged: JudgedMission) -> Plan:
     """Make a plan of the waypoints of the route, scored and certified like plans of the planner.
 
-    Raises MissionError for a mission that no plan can hold: without a scenario, or with more than plain waypoints.
+    Raises MissionError for a mission without a scenario, and for a mission with items other than plain waypoints,
+    because a plan cannot store it.
     """
     mission, route, scenario = judged.mission, judged.setup.route, desk.scenario
     name = mission.source
@@ -330,11 +337,10 @@ def _scored_plan(desk: EditContext, waypoints: Floats) -> Plan:
 
 
 def _plan_with_ground_phases(desk: EditContext, mission: Mission) -> Plan | None:
-    """Return an edited plan with its unchanged departure and approach, or None if it has none.
+    """Return the edited plan with its unchanged departure and approach, or None if it has neither.
 
     Departure and approach were certified with the turns at their ends, so the adjacent legs in the air must be
-    unchanged.
-    Raises MissionError if they are not.
+    unchanged.  Raises MissionError if these legs were changed.
     """
     base = desk.opened.plan
     if base is None or base.ways is None or (base.ways.climb, base.ways.descent) == (None, None):

@@ -15,7 +15,7 @@ from planfly.workflow.open_flight import make_setup
 from planner.plan import Plan
 from world.scenario import Scenario
 
-# Distance from the edge of its scenario, m, at which a mission without a given scenario gets a new one around it.
+# Distance from the edge of its scenario, m, at which a mission without a given scenario gets a new scenario around it.
 _EDGE_DISTANCE_M = 500.0
 _NO_FENCES = NamedFences()
 _DEFAULT_PARAMETERS = SetParameters()
@@ -38,7 +38,7 @@ class EditContext(MissionContext):
     def of(
         cls, setup: FlightSetup, terrain: str | Path | None = None, fences: NamedFences = _NO_FENCES
     ) -> "EditContext":
-        """Make the desk of an opened mission or plan."""
+        """Make the editing context of an opened mission or plan."""
         return cls(
             setup.scenario,
             airframe_of(setup),
@@ -50,7 +50,7 @@ class EditContext(MissionContext):
         )
 
     def flown_as(self, scenario: Scenario, parameters: SetParameters) -> "EditContext":
-        """Return the context of the same mission in other weather, or with another aircraft or autopilot.
+        """Return the context of the same mission in another scenario, with its weather, aircraft and autopilot.
 
         The certificate of a plan applies only to the world in which it was planned.
         """
@@ -64,7 +64,7 @@ class EditContext(MissionContext):
         return replace(self, opened=setup, planned=True)
 
     def around(self, mission: Mission) -> "EditContext":
-        """Return the context, in a new scenario if the mission has left the one that was made around it."""
+        """Return the context, with a new scenario if the mission has left the scenario that was made around it."""
         if not self.scenario.external:
             return self
         points = self.points(mission)[:, :2]
@@ -86,14 +86,14 @@ class EditContext(MissionContext):
     # Verdicts while a mission is dragged.
 
     def route(self, mission: Mission) -> Route:
-        """Lay out the route of a mission, without the notes for people."""
+        """Return the route of a mission, without the notes for the user."""
         frame, fly_over = self.airframe, self.scenario.flight.fly_over
         rules = frame.autopilot.route_rules
         laid = lay_route(self.placed(mission), frame.airspeed, fly_over, frame.limits, rules)
         return with_end_courses(laid, self.scenario, frame.limits)
 
     def part(self, mission: Mission, route: Route) -> FlightSetup:
-        """Make a setup of a part of the route, whose legs and corners are judged; nothing is flown."""
+        """Return a setup for judging the legs and corners of a part of the route; nothing is flown."""
         frame = self.airframe
         return FlightSetup(
             scenario=self.scenario,

@@ -1,4 +1,4 @@
-"""Folder of the file that the command named: the files that the page may open, and nothing outside."""
+"""List the files that the page may open, which are in the folder of the file that the command named."""
 
 from pathlib import Path
 
@@ -7,13 +7,13 @@ from planfly.studio.settings import PARAMETER_FILES
 from planfly.studio.view_model import Json
 from world.errors import MissionError
 
-# Greatest number of files that are listed.
+# Maximum number of files that are listed.
 _MAX_FILES = 200
 _READABLE_SUFFIXES = (*DROPPED, *PARAMETER_FILES)
 
 
 def folder_json(folder: Path | None) -> Json:
-    """List the missions, plans, logs and parameters of a folder, without links that lead out of it.
+    """List the missions, plans, logs and parameter files of a folder, without links that lead out of the folder.
 
     >>> folder_json(Path("no such folder"))["files"]
     []
@@ -32,7 +32,7 @@ def folder_json(folder: Path | None) -> Json:
 
 
 def shown_path(path: Path) -> str:
-    """Return a path as people write it, in full, with ~ for their home.
+    """Return the full path as users write it, with ~ for their home folder.
 
     >>> shown_path(Path.home() / "missions"), shown_path(Path("/srv"))
     ('~/missions', '/srv')
@@ -42,7 +42,7 @@ def shown_path(path: Path) -> str:
 
 
 def file_inside(folder: Path | None, name: str) -> Path:
-    """Return a file by its path in the folder.  Raises MissionError if it is outside or not openable.
+    """Return a file by its path in the folder.  Raises MissionError if the file is outside or of another type.
 
     >>> file_inside(Path("/tmp"), "../etc/passwd")
     Traceback (most recent call last):

@@ -1,8 +1,8 @@
-"""Access control: only pages that the studio served, on this machine, at the printed address.
+"""Accept only requests of pages that the studio served, on this machine, at the printed address.
 
-A page of any site may send requests to 127.0.0.1, and a site may point its own host name there.  Browsers state both,
-as Origin and as Host, and the source of a request as Sec-Fetch-Site; no page can change these headers.  The guard
-precedes all of the application, websockets included.
+A page of any site may send requests to 127.0.0.1, and a site may point its own host name to this address.  Browsers
+send the site as Origin, the host name as Host, and the source of a request as Sec-Fetch-Site; no page can change these
+headers.  The guard precedes the whole application, including websockets.
 """
 
 from collections.abc import Awaitable, Callable, Iterable, MutableMapping
@@ -19,9 +19,9 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' blob: data:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-# Headers that announce a body.
+# Headers that announce the body of a request.
 _BODIES = (b"content-length", b"transfer-encoding")
-# Headers of every answer, refusals included.
+# Headers of every answer, including refusals.
 HEADERS = (
     (b"content-security-policy", POLICY.encode()),
     (b"x-content-type-options", b"nosniff"),
@@ -34,7 +34,7 @@ HEADERS = (
 
 
 def refusal(scope: Scope, port: int) -> tuple[int, str]:
-    """Return status and text of a refusal; (0, "") if the request is accepted.
+    """Return the status and the text of a refusal, or (0, "") if the request is accepted.
 
     >>> asked = {"type": "http", "method": "GET", "path": "/", "headers": [(b"host", b"evil.test:80")]}
     >>> refusal(asked, 80)
@@ -59,7 +59,7 @@ def refusal(scope: Scope, port: int) -> tuple[int, str]:
 
 
 def _is_page_visit(scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
-    """Return True for a visit of the page itself, which holds nothing before a token is given."""
+    """Return True for a visit of the page itself, which shows nothing before a token is given."""
     found = dict(headers)
     is_document = found.get(b"sec-fetch-mode") == "navigate" and found.get(b"sec-fetch-dest") == "document"
     return scope["path"] == "/" and is_document
@@ -69,7 +69,7 @@ class Guard:
     """ASGI application that refuses requests, or forwards them and adds the headers."""
 
     def __init__(self, app: App, port: int) -> None:
-        """Guard an application.  port: the port that it listens on."""
+        """Guard an application that listens on `port`."""
         self._app, self._port = app, port
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -91,7 +91,7 @@ class Guard:
         if status:
             text = words.encode()
             plain = [(b"content-type", b"text/plain; charset=utf-8"), (b"content-length", str(len(text)).encode())]
-            # The rest of a refused request is not read.
+            # Close the connection, because the rest of a refused request is not read.
             plain.append((b"connection", b"close"))
             await answer({"type": "http.response.start", "status": status, "headers": plain})
             await answer({"type": "http.response.body", "body": text})

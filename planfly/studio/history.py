@@ -1,10 +1,10 @@
-"""History of edits of a mission, for undo and redo."""
+"""Record the edits of a mission, for undo and redo."""
 
 from dataclasses import dataclass, field
 
 from flight.mission.items import Mission
 
-# Greatest number of steps that are kept; the first mission always is.
+# Maximum number of steps that are kept; the first mission is always kept.
 MAX_STEPS = 1_000
 
 
@@ -12,7 +12,8 @@ MAX_STEPS = 1_000
 class History:
     """Missions, each made from the previous one.
 
-    first: the mission as opened.  steps: the result of each edit, with its description.
+    first: the mission as opened.
+    steps: the result of each edit, with its description.
     at: number of steps that are in effect.
 
     >>> history = History(Mission(None, ()))
@@ -27,21 +28,21 @@ class History:
 
     @property
     def mission(self) -> Mission:
-        """The mission at the present step."""
+        """Mission at the current step."""
         return self.steps[self.at - 1][0] if self.at else self.first
 
     @property
     def undo_text(self) -> str:
-        """Text of the next undo; "" for nothing."""
+        """Text of the next undo; "" if there is nothing to undo."""
         return self.steps[self.at - 1][1] if self.at else ""
 
     @property
     def redo_text(self) -> str:
-        """Text of the next redo; "" for nothing."""
+        """Text of the next redo; "" if there is nothing to redo."""
         return self.steps[self.at][1] if self.at < len(self.steps) else ""
 
     def add(self, mission: Mission, text: str) -> None:
-        """Record an edit and drop undone ones.  The oldest steps are dropped if there are too many."""
+        """Record an edit, and drop undone edits; if there are too many steps, drop the oldest."""
         self.steps = [*self.steps[: self.at], (mission, text)][-MAX_STEPS:]
         self.at = len(self.steps)
 

@@ -1,7 +1,7 @@
-"""Geometric verdict on the legs and corners near a moved item, identical to the whole verdict.
+"""Judge the geometry of the legs and corners near a moved item, with the same result as for the whole route.
 
 The judged part of the route covers everything that a move can change, with the threats and zones that it enters.
-Requirements of the whole flight, such as energy, stall and bounds, wait for the whole verdict.
+Requirements on the whole flight, such as energy, stall and bounds, are left to the whole verdict.
 """
 
 from collections.abc import Iterator
@@ -20,14 +20,14 @@ from planfly.studio.edit_context import EditContext
 from planfly.studio.moved_route import moved_route
 from world.geometry import leg_runs
 
-# Distance along the legs within which a move can change the verdict, m.  As much again is judged around it and left
-# out, because the end of the part is not the end of the route.
+# Distance along the legs within which a move can change the verdict, m.  The route is judged for twice this distance,
+# and the outer half is discarded, because the end of the part is not the end of the route.
 REACH = 450.0
-# Least number of legs within which a move can change the verdict.
+# Minimum number of legs within which a move can change the verdict.
 LEGS = 4
-# Greatest number of times that a route may pass an item; beyond it the whole route is judged.
+# Maximum number of times that a route may pass an item; if it passes more often, the whole route is judged.
 _MAX_PASSES = 6
-# Distance between the places appended beyond the end of a part, m.
+# Length of the legs appended beyond the end of a part, m.
 _APPENDED_LEG_LENGTH_M = 3_000.0
 
 
@@ -36,8 +36,8 @@ class Window:
     """Judged legs and corners of a route.
 
     first, last: waypoints of the route between which legs and corners are judged, both included.
-    begin: the waypoint of the whole route at which the part begins.
-    requirements, findings: results for the part, whose numbers begin at ``begin``.
+    begin: the waypoint of the whole route at which the part starts.
+    requirements, findings: results for the part, whose numbers start at ``begin``.
     """
 
     first: int
@@ -50,10 +50,13 @@ class Window:
 def judge_windows(
     desk: EditContext, mission: Mission, index: int, before: FlightSetup | None = None
 ) -> tuple[Route, tuple[Window, ...]]:
-    """Judge windows around an item, or the whole route if that is as quick or necessary.
+    """Judge windows around an item, or the whole route if this is necessary or no slower.
 
-    Returns the route and the windows.  index: item in the mission's list.  before: setup before the move, if known.
-    Raises MissionError for a mission that cannot be laid out.
+    Returns the route and the windows.
+
+    index: index of the item in the mission's list.
+    before: setup before the move, if known.
+    Raises MissionError for a mission without a valid route.
     """
     route = None
     if before is not None:
@@ -76,16 +79,17 @@ def judge_windows(
 
 
 def _may_survey(desk: EditContext, mission: Mission, route: Route) -> bool:
-    """Return True if there may be surveys, whose lines are found from the whole route."""
+    """Return True if the mission may contain surveys, whose lines are found from the whole route."""
     return desk.scenario.limits.surveys == "lines" or bool(camera_spacing(mission, route).any())
 
 
 def _with_extreme_legs(desk: EditContext, route: Route, part: Route, *, ahead: bool) -> tuple[Route, int]:
-    """Append the fastest legs of the whole route to a part of it; return how many precede the part, too.
+    """Add the fastest legs of the whole route to a part; return the extended part and the number of legs before it.
 
-    The time of a change of slope is computed for a whole route from its highest airspeeds and its strongest wind: legs
-    with these values, straight on beyond the end that is not the end of the route, include them in the part.
-    ahead: true to put them before the part, whose end is the end of the route.
+    The duration of a change of slope is computed from the highest airspeeds and the strongest wind of a whole route.
+    Legs with these values are therefore added straight on beyond that end of the part that is not an end of the route.
+
+    ahead: True to put the legs before the part, whose end is the end of the route.
     """
     up, wind = route.waypoints[:, 2], desk.scenario.wind
     middle = 0.5 * (up[1:] + up[:-1])
@@ -101,8 +105,8 @@ def _with_extreme_legs(desk: EditContext, route: Route, part: Route, *, ahead: b
         direction = np.array([0.0, 1.0])
     steps = _APPENDED_LEG_LENGTH_M * np.arange(1.0, count + 1.0)[:, None] * direction / float(np.hypot(*direction))
     points = np.column_stack([part.waypoints[end, :2] + steps, heights])
-    # The first appended leg keeps the airspeed at the end of the part; each pair of altitudes has its leg's airspeed
-    # between.
+    # The first appended leg keeps the airspeed at the end of the part.  Each further leg has the airspeed for the pair
+    # of altitudes at its ends.
     onward = np.concatenate([part.airspeed[end : end + 1 or None], speeds])
     order = slice(None, None, -1) if ahead else slice(None)
 
@@ -137,10 +141,7 @@ def _judge_window(setup: FlightSetup, first: int, last: int, begin: int) -> Wind
 
 
 def _is_within(item: Finding, first: int, last: int) -> bool:
-    """Return True for findings on legs or corners between two waypoints, or on violated threats or zones.
-
-    Corners at both ends are included.
-    """
+    """Return True for a finding on a leg or corner from `first` to `last`, or on a violated threat or zone."""
     place = item.place
     if item.ok is False and place.kind in ("missile", "exclusion", "inclusion"):
         return True
@@ -150,9 +151,9 @@ def _is_within(item: Finding, first: int, last: int) -> bool:
 
 
 def _affected_spans(route: Route, seq: int) -> list[tuple[int, int]] | None:
-    """Return first and last waypoints that a move of an item may change, merged; None for the whole route.
+    """Return the spans of waypoints that a move of an item may change, as (first, last), or None for the whole route.
 
-    Landing sequences and returns depend on the whole route.
+    Overlapping spans are merged.  Landing sequences and returns depend on the whole route.
     """
     own = np.flatnonzero(route.items == seq)
     if not len(own) or route.return_from >= 0 or route.straight_to >= 0:
@@ -168,13 +169,13 @@ def _affected_spans(route: Route, seq: int) -> list[tuple[int, int]] | None:
 
 
 def _consecutive_runs(own: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Yield first and last number of each consecutive run."""
+    """Yield the first and the last number of each run of consecutive numbers."""
     for run in np.split(own, np.flatnonzero(np.diff(own) > 1) + 1):
         yield int(run[0]), int(run[-1])
 
 
 def _grown_span(route: Route, first: int, last: int) -> tuple[int, int]:
-    """Extend a span by at least `REACH` and `LEGS` on either side, without cutting a loiter."""
+    """Return a span extended by at least `REACH` and `LEGS` on both sides, without cutting a loiter."""
     along = np.concatenate([[0.0], np.cumsum(leg_runs(route.waypoints))])
     begin = min(first - LEGS, int(np.searchsorted(along, along[first] - REACH, side="right")) - 1)
     end = max(last + LEGS, int(np.searchsorted(along, along[last] + REACH)))

@@ -1,4 +1,4 @@
-"""Requests to the studio's two processes, and their results: flights, plans, returns, campaigns."""
+"""Send flights, plans, returns and campaigns to the studio's two processes, and handle their results."""
 
 import pickle
 import time
@@ -28,7 +28,7 @@ LONG = "long"
 
 @dataclass
 class _ActiveWork:
-    """Work under way. rev: revision of its sheet."""
+    """Work in progress.  rev: revision of the mission that it is done for."""
 
     number: int
     name: str
@@ -38,9 +38,10 @@ class _ActiveWork:
 
 @dataclass
 class Jobs:
-    """Both processes, their tasks under way, and the newest flight.
+    """Both processes, their tasks in progress, and the newest flight.
 
-    on_answer: called with the name of the process from its own thread.  pack: as for `Pilot`.
+    on_answer: called with the name of the process and its answer, from its own thread.
+    pack: see `Pilot`.
     """
 
     on_answer: Callable[[str, Answer], None]
@@ -54,7 +55,7 @@ class Jobs:
     _at_once: bool = False
 
     def start(self, session: Session) -> None:
-        """Fly the opened mission, or plan it if it is a scenario without a path."""
+        """Fly the opened mission, or plan a path if a scenario without a path was opened."""
         if session.document.to_plan and not session.is_changed:
             self._at_once = True
             self._send_work(
@@ -83,12 +84,12 @@ class Jobs:
         }
 
     def shown(self) -> list[Json]:
-        """Return the messages about the tasks for a new page."""
+        """Return the messages for a new page about results and tasks in progress."""
         under_way = [{"kind": "working", "job": one.name, "rev": one.rev} for one in self._asked.values()]
         return [*([self._flown] if self._flown is not None else []), *self._others, *under_way]
 
     def forget(self) -> None:
-        """Drop all results, because another mission was opened."""
+        """Cancel all tasks and drop all results, because another mission was opened."""
         self.stop()
         self._flown = self._figures = None
         self._others = []
@@ -97,19 +98,19 @@ class Jobs:
     # Requests.
 
     def fly(self, session: Session) -> None:
-        """Fly the present mission; a flight under way is cancelled."""
+        """Fly the current mission; a flight in progress is cancelled."""
         if session.document.to_plan and not session.is_changed:
             return
         self._send_work(PILOT, "fly", "planfly.studio.worker_tasks.fly", (session.desk, session.mission), session.rev)
 
     def plan(self, message: messages.Plan, session: Session) -> None:
-        """Plan one or several paths.  Raises PlanflyError for places between which nothing is planned."""
+        """Plan one or several paths.  Raises PlanflyError for places between which no path can be planned."""
         asked = self._plan_request(message, session)
         self._at_once = False
         self._send_work(LONG, "plan", "planfly.studio.worker_tasks.plan", asked, session.rev)
 
     def ask(self, kind: str, session: Session) -> None:
-        """Fly, or begin a long task."""
+        """Fly, or start a long task."""
         if kind == "fly":
             self.fly(session)
             return
@@ -118,7 +119,7 @@ class Jobs:
         )
 
     def stop(self) -> None:
-        """Cancel all tasks under way."""
+        """Cancel all tasks in progress."""
         for name, pilot in self._pilots.items():
             if name in self._asked:
                 pilot.cancel()
@@ -159,7 +160,7 @@ class Jobs:
     # Answers.
 
     def answered(self, pilot: str, answer: Answer, session: Session) -> list[Json]:
-        """Return the messages to the pages for an answer; nothing if a newer task was requested."""
+        """Return the messages to the pages for an answer; empty if a newer task was requested."""
         asked = self._asked.get(pilot)
         if asked is None or asked.number != answer.number:
             return []
@@ -195,7 +196,7 @@ class Jobs:
         return found
 
     def take_initial_plan(self, session: Session) -> bool:
-        """Return True once, when the initial path that the studio planned by itself has arrived."""
+        """Return True once, when the path that the studio planned at its start has arrived."""
         come = self._at_once and bool(session.plans[0])
         if come:
             self._at_once = False
@@ -203,7 +204,7 @@ class Jobs:
 
 
 def ways_json(ways: Sequence[FrontPlan]) -> list[Json]:
-    """Describe planned paths to choose from, with the quantities in which each is the best."""
+    """Return page data of the planned paths to choose from, with the quantities in which each path is the best."""
     figures = {
         "shortest": [one.length for one in ways],
         "least seen by radars": [one.exposure for one in ways],
@@ -211,7 +212,7 @@ def ways_json(ways: Sequence[FrontPlan]) -> list[Json]:
         "quickest": [one.time for one in ways],
         "least energy": [one.energy for one in ways],
     }
-    # Quantities that are equal for all, or not known, do not help to choose.
+    # Quantities that are equal for all paths, or unknown, do not help to choose.
     differing = {name: values for name, values in figures.items() if max(values) > min(values)}
     return [
         _path_json(one) | {"best": [name for name, values in differing.items() if values[k] == min(values)]}
@@ -220,7 +221,7 @@ def ways_json(ways: Sequence[FrontPlan]) -> list[Json]:
 
 
 def _path_json(one: FrontPlan) -> Json:
-    """Return length (m), radar exposure (s), least height (m), time (s) and energy (Wh) of a path."""
+    """Return length (m), radar exposure (s), minimum height (m), time (s) and energy (Wh) of a path."""
     plan, (length, exposure, clearance, seconds, energy) = (
         one.plan,
         rounded([one.length, one.exposure, one.clearance, one.time, one.energy / 3600.0]),

@@ -1,4 +1,4 @@
-"""Longer tasks of the studio's second process: returns along the route, and campaigns of flights."""
+"""Judge returns along the route, and fly campaigns, in the studio's second process."""
 
 from collections import Counter
 from pathlib import Path
@@ -17,11 +17,11 @@ from planfly.workflow.pipeline import fly_and_judge
 from world.errors import MissionError
 from world.extras import need_extra
 
-# Greatest number of returns that are judged along the route.
+# Maximum number of returns that are judged along the route.
 _MAX_RETURNS = 240
-# Greatest number of ranges of the route that are named.
+# Maximum number of ranges of the route that are named.
 _MAX_RANGES = 6
-# Flights of a campaign.
+# Number of flights in a campaign.
 FLIGHTS = 24
 
 

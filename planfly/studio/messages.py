@@ -1,18 +1,18 @@
-"""Messages from the page to the server, strict and bounded; only `Open` has a path, in the folder.
+"""Define the messages from the page to the server, which are strict and bounded.
 
-Each is one JSON object whose ``kind`` names its type.  An invalid value is answered with a fault; anything else closes
-the connection.
+Each message is one JSON object whose ``kind`` names its type.  Only `Open` and `Settings` name files, in the served
+folder.  An invalid value is answered with a fault; text that is not a message closes the connection.
 """
 
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-# Largest message, characters.
+# Maximum length of a message, characters.
 MAX_MESSAGE = 256 * 1024
-# Largest message with a dropped file, which is sent as text.
+# Maximum length of a message with a dropped file, which is sent as text, characters.
 MAX_DROPPED_MESSAGE = 24 * 2**20
-# Largest first message, whose sender is not known yet.
+# Maximum length of the first message, whose sender is still unknown, characters.
 MAX_FIRST = 1024
 
 
@@ -209,7 +209,7 @@ def read_message(text: str | bytes) -> Message:
 
 
 def fault_of(error: ValidationError) -> str:
-    """Describe the error in a message of a known kind in a line; "" for anything that is no message.
+    """Describe the error in a message of a known kind in a line; return "" for a text that is not such a message.
 
     >>> try:
     ...     read_message('{"kind": "raise", "rev": 1, "by": 1e9}')

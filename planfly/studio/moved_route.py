@@ -1,6 +1,6 @@
-"""Route of a mission after a few waypoints were moved: the previous route with rows replaced.
+"""Update the route of a mission after a few waypoints were moved, by replacing rows of the previous route.
 
-Laying out all items of a long mission takes longer than judging the legs around one of them.
+Laying out all items of a long mission takes longer than judging the legs around one item.
 """
 
 import math
@@ -17,23 +17,25 @@ from world.frames import to_map
 from world.scenario import Scenario
 from world.scenario_tables import MAP_EXTENT
 
-# A drag changes at most this number of items.
+# Maximum number of items that a drag changes.
 _MAX_MOVED_ITEMS = 8
-# Successive waypoints that are nearer than this may be merged, or offset from each other, m.
+# Distance between successive waypoints below which they may be merged, or offset from each other, m.
 _MERGE_DISTANCE_M = 2.0
-# Tolerance between a place computed alone and among others, m: the last digits of a sine differ.
+# Tolerance between a place computed alone and in an array, m, because the last digits of a sine differ.
 _PLACE_TOLERANCE_M = 1e-6
-# Commands by which places of a mission do not correspond to one row each.
+# Commands because of which a place of a mission may not correspond to exactly one row of the route.
 _IRREGULAR_COMMANDS = frozenset(
     {Command.DO_JUMP, Command.DO_JUMP_TAG, Command.DO_SET_HOME, Command.CONDITION_GATE, Command.NAV_RETURN_TO_LAUNCH}
 )
 
 
 def moved_route(route: Route, before: Mission, now: Mission, scenario: Scenario, frame: Airframe) -> Route | None:
-    """Return the route after a few waypoints were moved; None if it has to be laid out again.
+    """Return the route after a few waypoints were moved, or None if it has to be laid out again.
 
-    route: of the previous mission.  It is laid out again wherever a move may change more than the row of the waypoint:
-    next to loiters, merged places and kept altitudes, and with jumps, gates, returns, landings and courses at the ends.
+    It has to be laid out again if a move may change more than the row of the waypoint.  This is so next to loiters,
+    merged places and kept altitudes, and with jumps, gates, returns, landings and courses at the ends.
+
+    route: route of the previous mission.
     """
     if len(before.items) != len(now.items):
         return None
@@ -72,7 +74,7 @@ def _is_move_of_waypoint(old: MissionItem, new: MissionItem) -> bool:
 
 
 def _is_plain(route: Route, mission: Mission, scenario: Scenario) -> bool:
-    """Return True if each place of a mission is one stop of its route, with an independent altitude."""
+    """Return True if each place of a mission is one stop of its route, with an altitude independent of other places."""
     if route.return_from >= 0 or route.straight_to >= 0 or math.isfinite(route.landing_ground):
         return False
     if scenario.start_course is not None or scenario.destination_course is not None:
@@ -85,7 +87,7 @@ def _is_plain(route: Route, mission: Mission, scenario: Scenario) -> bool:
 
 
 def _map_place(item: MissionItem, mission: Mission, scenario: Scenario) -> tuple[float, float, float] | None:
-    """Return east, north and altitude of a waypoint, m; None if it depends on others or is off any map."""
+    """Return east, north and altitude of a waypoint, m, or None if it depends on other items or is off the map."""
     x, y = to_map(scenario.origin, [item.lat_deg], [item.lon_deg])
     east, north, home, up = float(x[0]), float(y[0]), mission.home, math.nan
     if item.frame in AMSL:
@@ -99,5 +101,5 @@ def _map_place(item: MissionItem, mission: Mission, scenario: Scenario) -> tuple
 
 
 def _is_near(points: Floats, row: int) -> bool:
-    """Return True if a waypoint is near enough to the one before that both may be merged."""
+    """Return True if a waypoint is so near to the previous one that both may be merged."""
     return math.dist(points[row - 1, :2], points[row, :2]) < _MERGE_DISTANCE_M

@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from planfly.studio.server import Server
 
 HOST = "127.0.0.1"
-# Used if it is free and no port is given, so that a page finds its studio again; otherwise any port.
+# Default port, so that an open page finds a restarted studio; if it is taken, any free port is used.
 USUAL_PORT = 8790
-# Interval between two checks whether to stop, s.
+# Interval between two calls of `stop`, s.
 _POLL_INTERVAL_S = 0.1
-# Time after which open requests are given up at the end, s.
+# Time to complete open requests at the end, s.
 _GRACE_S = 2
 
 
-def _never() -> bool:
+def _never_stop() -> bool:
     return False
 
 
@@ -45,19 +45,22 @@ def open_studio(
     port: int | None = None,
     browser: bool = True,
     keep: str | Path = "runs/studio",
-    stop: Callable[[], bool] = _never,
+    stop: Callable[[], bool] = _never_stop,
     on_message: Callable[[str], None] = print,
     **options: Unpack[MissionOptions],
 ) -> None:
     """Serve a page on which a mission is dragged, judged and flown; needs ``planfly[studio]``.
 
-    what: a scenario, by name or file, whose path is planned; or a plan, a mission or a log, as of `planfly.judge`.
-    options: as of `planfly.fly`; the page changes most of them.  seed: of planner and turbulence.
-    port: where it listens; None for 8790, or any free one where that is taken.
-    browser: whether the page is opened.  keep: the folder in which what was done is kept for the next start.
-    stop: asked all the time.  on_message: called with the page's address, which holds the key to it.
+    what: a scenario, by name or file, in which a path is planned; or a plan, a mission or a log, see `planfly.judge`.
+    options: see `planfly.fly`; the page can change most of them.
+    seed: seed of planner and turbulence.
+    port: port of the server; None for 8790, or any free port if 8790 is taken.
+    browser: True opens the page in the browser.
+    keep: the folder of autosaves, which the next start restores.
+    stop: polled continuously.
+    on_message: called with the page's address, which contains the access token.
 
-    A script must call it under ``if __name__ == "__main__":``, because the processes that fly import the script.
+    A script must call this function under ``if __name__ == "__main__":``, because flight processes import the script.
     Raises a `planfly.PlanflyError` for bad input.
     """
     check_arguments(seed=options["seed"], port=port)
@@ -78,13 +81,13 @@ def open_studio(
         path = session.document.path
         server = Server(session, token, kept, None if path is None else path.parent)
         address = f"http://{HOST}:{listener.getsockname()[1]}/#t={token}"
-        with _opened_page(address) if browser else contextlib.nullcontext():
+        with _open_page(address) if browser else contextlib.nullcontext():
             on_message(f"studio  {address}")
             asyncio.run(_serve(server, listener, stop))
 
 
 def _stem(target: str) -> str:
-    """Return a file name for an opened target; equal names in different folders give different names.
+    """Return a file name stem for an opened target; files with equal names in different folders get different stems.
 
     >>> _stem("jacksboro")
     'jacksboro'
@@ -96,7 +99,7 @@ def _stem(target: str) -> str:
 
 
 def _listen(port: int | None) -> socket.socket:
-    """Open the socket that pages connect to.  Raises PlanflyError for a port that is taken."""
+    """Return the socket to which pages connect.  Raises PlanflyError for a port that is taken."""
     for one in (USUAL_PORT, 0) if port is None else (port,):
         try:
             return socket.create_server((HOST, one))
@@ -106,8 +109,8 @@ def _listen(port: int | None) -> socket.socket:
 
 
 @contextlib.contextmanager
-def _opened_page(address: str) -> Iterator[None]:
-    """Open an address in the browser without showing it in a list of processes."""
+def _open_page(address: str) -> Iterator[None]:
+    """Open an address in the browser by a temporary file, so that no list of processes shows its token."""
     with temporary_folder("planfly-studio-") as folder:
         file = folder / "studio.html"
         file.touch(0o600)
@@ -123,7 +126,7 @@ def _opened_page(address: str) -> Iterator[None]:
 
 
 async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], bool]) -> None:
-    """Serve until asked to stop."""
+    """Serve until `stop` returns True."""
     import uvicorn
 
     from planfly.studio.app import make_app

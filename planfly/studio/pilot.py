@@ -1,4 +1,4 @@
-"""Worker process of the studio: it does the newest task, which cancels the previous one.
+"""Run the studio's worker process, which does the newest task and cancels the previous one.
 
 A task is a function with an argument that can be pickled; it reports progress regularly, and is cancelled at a report.
 The process is spawned, never forked, because the server has threads.  A process that dies is started again.
@@ -17,9 +17,9 @@ from typing import Any
 
 from world.errors import PlanflyError
 
-# Time for a cancelled task or its process to end, s: kernels may have to be compiled meanwhile.
+# Maximum time for a cancelled task or its process to end, s; kernels may have to be compiled in this time.
 PATIENCE = 60.0
-# Callback with done, total and a remark.
+# Function called with the amount done, the total amount and a remark.
 Advance = Callable[[float, float, str], None]
 
 
@@ -27,8 +27,8 @@ Advance = Callable[[float, float, str], None]
 class Work:
     """Work to be done.
 
-    number: increasing number, which the answers carry.
-    function: its dotted name; it takes a payload and a progress callback, and raises `Cancelled`.
+    number: increasing number, which the answers repeat.
+    function: dotted name of a function that takes a payload and a progress callback, and raises `Cancelled`.
     """
 
     number: int
@@ -40,8 +40,8 @@ class Work:
 class Answer:
     """Answer to a task.
 
-    kind: "progress" with (done, total, remark), "done" with the result of the function, "cancelled" with nothing,
-    "fault" with a line for people.
+    kind: "progress" with (done, total, remark), "done" with the result of the function, "cancelled" with None, or
+    "fault" with a line for the user.
     """
 
     number: int
@@ -49,7 +49,7 @@ class Answer:
     value: Any = None
 
 
-# Internal errors of planfly: the studio reports them in a line and keeps the mission as it was.
+# Internal errors of planfly, which the studio reports in a line without changing the mission.
 INTERNAL = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError, RuntimeError, OSError)
 
 
@@ -63,9 +63,9 @@ class Cancelled(Exception):
 
 
 class Pilot:
-    """Worker process, as seen by the server.  Its methods may be called from any thread, and never block.
+    """Interface of the server to a worker process.  Its methods may be called from any thread, and never block.
 
-    Tasks are sent from a thread, only the newest one: a process that does not read blocks no caller.
+    A thread sends the newest task, so that a process that does not read its pipe blocks no caller.
     """
 
     def __init__(
@@ -77,15 +77,16 @@ class Pilot:
     ) -> None:
         """Prepare a worker; nothing is started before `ask`.
 
-        on_answer: called from its own thread.  patience: time for a cancelled task to end, s.  pack: pickles a task,
-        called from the sending thread; objects that another thread may change meanwhile have to be pickled in that
-        thread.
+        on_answer: called from its own thread.
+        patience: maximum time for a cancelled task to end, s.
+        pack: pickles a task, called from the sending thread; it must pickle objects that another thread may change in
+        that thread.
         """
         self._name, self._on_answer, self._patience, self._pack = name, on_answer, patience, pack
         self._changed = threading.Condition(threading.RLock())
         self._process: multiprocessing.process.BaseProcess | None = None
         self._pipe: Connection | None = None
-        # The newest task, and whether it was sent; numbers of tasks that were sent and not answered.
+        # Newest task, True if it was sent, and the numbers of tasks that were sent but not answered.
         self._wanted: Work | None = None
         self._sent, self._closed = True, False
         self._unanswered: list[int] = []
@@ -103,11 +104,11 @@ class Pilot:
             self._ensure_process()
 
     def ask(self, work: Work) -> None:
-        """Do a task; any task under way is cancelled."""
+        """Do a task, and cancel any task in progress."""
         self._set_wanted(work)
 
     def cancel(self) -> None:
-        """Cancel the work under way."""
+        """Cancel the task in progress."""
         self._set_wanted(None)
 
     def _set_wanted(self, work: Work | None) -> None:
@@ -154,17 +155,17 @@ class Pilot:
                 data = b"" if pipe is None else self._pack(work)
             except OSError as error:
                 # Too many open files, or too many processes.
-                self._give_up(work, f"the process for this cannot be started: {error.strerror}: ask again")
+                self._fail_unsent(work, f"the process for this cannot be started: {error.strerror}: ask again")
                 continue
             except (CancelledError, *INTERNAL) as error:
-                self._give_up(work, internal_text(error))
+                self._fail_unsent(work, internal_text(error))
                 continue
             if pipe is None:
                 continue
             try:
                 pipe.send_bytes(data)
             except (OSError, TypeError, ValueError):
-                # The process has ended: a new one does the task.
+                # The process has ended, so a new process does the task.
                 with self._changed:
                     if self._pipe is pipe:
                         self._pipe = self._process = None
@@ -172,8 +173,8 @@ class Pilot:
                         self._sent = False
                         self._unanswered = [one for one in self._unanswered if one != work.number]
 
-    def _give_up(self, work: Work | None, fault: str) -> None:
-        """Answer a task that was not sent with a fault."""
+    def _fail_unsent(self, work: Work | None, fault: str) -> None:
+        """Answer `work`, which could not be sent, with `fault`."""
         with self._changed:
             if work is None or self._closed:
                 return
@@ -182,7 +183,7 @@ class Pilot:
         self._on_answer(Answer(work.number, "fault", fault))
 
     def _kill_if_stuck(self, pipe: Connection, number: int) -> None:
-        """Kill a process that still does a cancelled task; a new process does the newest task."""
+        """Kill a process that is still doing a cancelled task; a new process then does the newest task."""
         with self._changed:
             self._watch = None
             if self._closed or self._pipe is not pipe or number not in self._unanswered:
@@ -197,7 +198,7 @@ class Pilot:
             self._on_answer(Answer(one, "cancelled"))
 
     def _drop_unwanted(self) -> list[int]:
-        """Return the tasks that a lost process had and that are not wanted any more."""
+        """Clear the unanswered tasks of a lost process, and return those other than the newest task."""
         left = [one for one in self._unanswered if self._wanted is None or one != self._wanted.number]
         self._unanswered = []
         return left

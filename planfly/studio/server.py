@@ -1,4 +1,4 @@
-"""Server of the studio: pages on websockets, a session, a judging thread, and two worker processes.
+"""Serve the studio, with pages on websockets, one session, a judging thread and two worker processes.
 
 Drags are judged one at a time, the newest first.  Edits are applied in order, and every page is sent the result.
 """
@@ -39,19 +39,19 @@ from world.files import read_small_file, utf8_text
 
 Given = TypeVar("Given")
 
-# Greatest number of pages.
+# Maximum number of pages.
 MAX_PAGES = 4
-# Timeout of a page for its token, s.
+# Maximum time until a page sends its token, s.
 PATIENCE = 5.0
 # Interval between two autosaves, s.
 KEEPING = 3.0
-# Pause after each message of a page, s: a page that floods the server with messages leaves time to the others.
+# Pause after each message of a page, s, so that a page that floods the server leaves time for other pages.
 MESSAGE_PAUSE_S = 0.002
-# Greatest number of frames that wait for a slow page.
+# Maximum number of frames that wait for a slow page.
 _MAX_WAITING_FRAMES = 64
-# Pause for an answer to leave before the next place is judged, s.
+# Pause in which an answer is sent before the next place of a drag is judged, s.
 _SEND_PAUSE_S = 0.001
-# Interval between two checks whether another page has gone, s.
+# Interval at which the server checks for a page that has gone, s.
 _PLACE_CHECK_INTERVAL_S = 0.05
 # Code that closes a websocket without a token.
 NO_TOKEN = 4403
@@ -81,7 +81,7 @@ class Page:
         try:
             self.frames.put_nowait(frame)
         except asyncio.QueueFull:
-            # A page that has missed a frame shows a wrong state: it has to reconnect.
+            # A page that has missed a frame shows a wrong state and has to reconnect.
             self.full.set()
 
 
@@ -97,14 +97,14 @@ class Server:
         self._drawing = ThreadPoolExecutor(1, "studio-draw")
         self._order = asyncio.Lock()
         self._grounds: dict[tuple[int, bool], tuple[bytes, ...]] = {}
-        self.jobs = Jobs(self._answered_elsewhere, self._packed)
+        self.jobs = Jobs(self._forward_answer, self._pack_work)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._take_task: asyncio.Future[None] | None = None
         self._autosave_error = ""
         self.welcomed = threading.Event()
 
     # ------------------------------------------------------------------
-    # Begin and end.
+    # Start and end.
 
     async def run(self) -> None:
         """Autosave until the server ends."""
@@ -116,7 +116,7 @@ class Server:
 
     async def _keep(self) -> None:
         if self._kept is not None and (self.session.has_news or self.session.kept_rev):
-            # On a full disk the studio goes on without autosave, and reports that once.
+            # On a full disk the studio goes on without autosave, and reports the error once.
             try:
                 await self._run_judging(lambda: self.session.keep(self._kept or Path()))
             except (OSError, PlanflyError) as error:
@@ -127,7 +127,7 @@ class Server:
                 self._autosave_error = ""
 
     async def close(self) -> None:
-        """End the processes and autosave."""
+        """Autosave, and end the processes."""
         await self._keep()
         self.jobs.close()
         self._judging.shutdown(wait=False, cancel_futures=True)
@@ -136,8 +136,8 @@ class Server:
     async def _run_judging(self, work: Callable[[], Given]) -> Given:
         return await asyncio.get_running_loop().run_in_executor(self._judging, work)
 
-    def _packed(self, work: Work | None) -> bytes:
-        """Pickle a task in the judging thread: judging fills caches of the objects meanwhile."""
+    def _pack_work(self, work: Work | None) -> bytes:
+        """Pickle a task in the judging thread, because judging fills caches of the pickled objects."""
         return self._judging.submit(pickle.dumps, work).result()
 
     # ------------------------------------------------------------------
@@ -152,7 +152,7 @@ class Server:
         self._pages.add(page)
         self.welcomed.set()
         tasks = [asyncio.create_task(self._write(page)), asyncio.create_task(self._preview(page))]
-        hearing, full = asyncio.create_task(self._converse(page)), asyncio.create_task(page.full.wait())
+        hearing, full = asyncio.create_task(self._handle_page(page)), asyncio.create_task(page.full.wait())
         try:
             await asyncio.wait((hearing, full), return_when=asyncio.FIRST_COMPLETED)
             if full.done():
@@ -171,21 +171,21 @@ class Server:
                 task.cancel()
             await asyncio.gather(*tasks, hearing, full, return_exceptions=True)
 
-    async def _converse(self, page: Page) -> None:
+    async def _handle_page(self, page: Page) -> None:
         await self._show_all(page)
         while True:
-            await self._hear(page, await _text(page.socket))
+            await self._handle_message(page, await _receive_text(page.socket))
             await asyncio.sleep(MESSAGE_PAUSE_S)
 
-    async def _has_place(self) -> None:
+    async def _wait_for_free_place(self) -> None:
         while len(self._pages) >= MAX_PAGES:
             await asyncio.sleep(_PLACE_CHECK_INTERVAL_S)
 
     async def _welcome(self, socket: WebSocket) -> Page | None:
-        """Return the page, if its first message has the token."""
+        """Return the page if its first message has the token; otherwise close the websocket and return None."""
         code = NO_TOKEN
         with contextlib.suppress(ValueError, asyncio.TimeoutError, WebSocketDisconnect):
-            text = await asyncio.wait_for(_text(socket), PATIENCE)
+            text = await asyncio.wait_for(_receive_text(socket), PATIENCE)
             if len(text) > messages.MAX_FIRST:
                 raise ValueError("a first message that is too long")
             first = read_message(text)
@@ -195,8 +195,8 @@ class Server:
             if given and isinstance(first, messages.Hello):
                 socket.scope.get(WELCOME, lambda: None)()
                 code = TOO_MANY
-                # A page that has gone occupies its place until that is noticed, which takes time on a busy machine.
-                await asyncio.wait_for(self._has_place(), PATIENCE)
+                # A page that has gone counts until the server notices it, which takes time on a busy machine.
+                await asyncio.wait_for(self._wait_for_free_place(), PATIENCE)
                 return Page(socket, first.dark)
         with contextlib.suppress(RuntimeError):
             await socket.close(code)
@@ -227,7 +227,7 @@ class Server:
             except INTERNAL as error:
                 found = {"fault": internal_text(error)}
             page.send({"kind": "preview", "rev": asked.rev, "n": asked.n, "k": asked.k, **found})
-            # Let the answer leave before the next is judged, which keeps the interpreter busy.
+            # Let the answer be sent before the next place is judged, which keeps the interpreter busy.
             await asyncio.sleep(_SEND_PAUSE_S)
 
     async def _show_all(self, page: Page) -> None:
@@ -239,7 +239,7 @@ class Server:
         await self._show_ground(page)
 
     async def _show_ground(self, page: Page) -> None:
-        """Send the ground of a world once, in light or dark."""
+        """Send the terrain of the current world to a page, once for each world and for light or dark."""
         terrain, world = self.session.desk.scenario.terrain, self.session.world_shown()
         key = (hash(json.dumps(world["shown"])), page.dark)
         if terrain is None or page.seen == key:
@@ -254,7 +254,7 @@ class Server:
                 head = {"east": east, "north": north, "rows": grid.heights.shape[0], "columns": grid.heights.shape[1]}
                 picture = ground_picture(terrain, tuple(east), tuple(north), dark=page.dark)
                 heights = np.ascontiguousarray(grid.heights, dtype="<f4").tobytes()
-                return _frame("H", head, heights), _frame("G", {"east": east, "north": north}, picture)
+                return _make_frame("H", head, heights), _make_frame("G", {"east": east, "north": north}, picture)
 
             self._grounds[key] = await asyncio.get_running_loop().run_in_executor(self._drawing, draw)
         for frame in self._grounds[key]:
@@ -263,8 +263,8 @@ class Server:
     # ------------------------------------------------------------------
     # Messages of a page.
 
-    async def _hear(self, page: Page, text: str) -> None:
-        """Act on a message.  Raises ValueError for one that is not understood."""
+    async def _handle_message(self, page: Page, text: str) -> None:
+        """Act on a message.  Raises ValueError for a message that is not understood."""
         try:
             message = read_message(text)
         except ValidationError as error:
@@ -282,7 +282,7 @@ class Server:
             await self._show_ground(page)
             return
         try:
-            await self._do(page, message)
+            await self._dispatch(page, message)
         except StaleEdit:
             page.send({"kind": "stale"})
             page.send(self.session.sheet())
@@ -291,7 +291,7 @@ class Server:
         except INTERNAL as error:
             page.send({"kind": "fault", "text": internal_text(error)})
 
-    async def _do(self, page: Page, message: messages.Message) -> None:
+    async def _dispatch(self, page: Page, message: messages.Message) -> None:
         session = self.session
         match message:
             case messages.Ask(kind="stop"):
@@ -318,7 +318,7 @@ class Server:
         session = self.session
         async with self._order:
             rev, world = session.rev, session.world_rev
-            await self._run_judging(lambda: self._changed(message))
+            await self._run_judging(lambda: self._apply_change(message))
             if session.rev == rev:
                 return
             shown = await self._run_judging(session.sheet)
@@ -330,7 +330,7 @@ class Server:
             for page in list(self._pages):
                 await self._show_ground(page)
 
-    def _changed(self, message: messages.Message) -> None:
+    def _apply_change(self, message: messages.Message) -> None:
         session = self.session
         match message:
             case messages.Move() | messages.Insert() | messages.Delete() | messages.Raise() | messages.Apply():
@@ -345,9 +345,9 @@ class Server:
             case messages.Choose():
                 session.replace_plan(message)
             case messages.Open() if message.data is None and message.name.lower().endswith(PARAMETER_FILES):
-                session.change_settings(self._parameters(message.name))
+                session.change_settings(self._read_parameter_file(message.name))
             case messages.Open():
-                opened = self._opened(message)
+                opened = self._open_file(message)
                 if self._kept is not None and session.has_news:
                     # An error here is reported at the next regular autosave.
                     with contextlib.suppress(OSError, PlanflyError):
@@ -357,7 +357,7 @@ class Server:
                     session.restore(session.kept_file(self._kept))
                 self.jobs.forget()
 
-    def _opened(self, message: messages.Open) -> Any:
+    def _open_file(self, message: messages.Open) -> Any:
         if message.data is None:
             return open_document(str(file_inside(self._folder, message.name)), self.session.options)
         try:
@@ -366,7 +366,7 @@ class Server:
             raise MissionError(f"{message.name[:60]}: its bytes did not come whole", field="data") from error
         return open_dropped(message.name, data, self.session.options)
 
-    def _parameters(self, name: str) -> messages.Settings:
+    def _read_parameter_file(self, name: str) -> messages.Settings:
         """Return the settings in a parameter file of the folder."""
         path = file_inside(self._folder, name)
         data = read_small_file(path, messages.MAX_MESSAGE, "parameter", PlanflyError)
@@ -376,21 +376,21 @@ class Server:
     # ------------------------------------------------------------------
     # Answers of the processes.
 
-    def _answered_elsewhere(self, pilot: str, answer: Answer) -> None:
+    def _forward_answer(self, pilot: str, answer: Answer) -> None:
         """Forward an answer from the thread of a process's pipe to the event loop."""
         if self._loop is not None and not self._loop.is_closed():
             with contextlib.suppress(RuntimeError):
-                self._loop.call_soon_threadsafe(self._answered, pilot, answer)
+                self._loop.call_soon_threadsafe(self._handle_answer, pilot, answer)
 
-    def _answered(self, pilot: str, answer: Answer) -> None:
+    def _handle_answer(self, pilot: str, answer: Answer) -> None:
         for message in self.jobs.answered(pilot, answer, self.session):
             self._broadcast(message)
         if self.jobs.take_initial_plan(self.session):
             chosen = messages.Choose(kind="choose", rev=self.session.rev, which=0)
-            self._take_task = asyncio.ensure_future(self._take(chosen))
+            self._take_task = asyncio.ensure_future(self._take_initial_plan(chosen))
 
-    async def _take(self, chosen: messages.Choose) -> None:
-        """Take the path that was planned when the studio began, unless the mission was edited meanwhile."""
+    async def _take_initial_plan(self, chosen: messages.Choose) -> None:
+        """Use the path that was planned at the start of the studio, unless the mission was edited in the meantime."""
         try:
             await self._change(chosen)
         except StaleEdit:
@@ -411,8 +411,8 @@ class Server:
             page.send(message)
 
 
-async def _text(socket: WebSocket) -> str:
-    """Return the next text message.  Raises ValueError for a binary one, and WebSocketDisconnect."""
+async def _receive_text(socket: WebSocket) -> str:
+    """Return the next text message.  Raises ValueError for a binary message, and WebSocketDisconnect at the end."""
     received = await socket.receive()
     if received["type"] == "websocket.disconnect":
         raise WebSocketDisconnect(received.get("code", 1000))
@@ -422,7 +422,7 @@ async def _text(socket: WebSocket) -> str:
     return str(text)
 
 
-def _frame(kind: str, head: Json, body: bytes) -> bytes:
-    """Make a binary frame: its kind, the length of its head, the head as JSON, and the bytes."""
+def _make_frame(kind: str, head: Json, body: bytes) -> bytes:
+    """Return a binary frame of its kind, the length of its head, the head as JSON, and the body."""
     text = json.dumps(head).encode()
     return kind.encode() + struct.pack("<I", len(text)) + text + body

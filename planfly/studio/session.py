@@ -1,7 +1,7 @@
-"""Session of the mission under edit, shared by all pages: open, edit, judge, save, and autosave.
+"""Open, edit, judge, save and autosave the edited mission, which all pages share.
 
 The session does not know connections or processes, which belong to `planfly.studio.server`.  Each change increases the
-revision; an edit of an older revision is refused, so that no page changes what another page does not show.
+revision; an edit of an older revision is refused, so that no page edits a mission that it does not show.
 """
 
 import json
@@ -34,24 +34,30 @@ from world.frames import to_geo
 Edit = Move | Insert | Delete | Raise | Apply
 # Document, context and history of edits.
 _OpenedState = tuple[Document, EditContext, History]
-# Greatest number of earlier documents that are kept for undo.
+# Maximum number of earlier documents that are kept for undo.
 _MAX_LEFT_DOCUMENTS = 8
 
 
 class StaleEdit(Exception):
-    """Edit of a sheet that another edit has changed since."""
+    """Raised for an edit of an older revision of the mission."""
 
 
 @dataclass(slots=True)
 class Session:
-    """One mission under edit.
+    """One edited mission.
 
-    document: the document as opened.  desk: its editing context.  history: its edits.
-    rev: increases with every change.  judged: the present mission with its verdict.
+    document: the document as opened.
+    desk: editing context of the document.
+    history: edits of the mission.
+    rev: revision, which increases with every change.
+    judged: the current mission with its verdict.
     plans: planned paths to choose from, with the items that they would replace.
-    world_rev: increases with every change of the world.  document_rev: increases with every other document.
-    named: file named on the command line, the only one that is overwritten.  written: the mission as saved last.
-    left: earlier documents, as they were left; undone: documents whose opening was undone.
+    world_rev: revision of the world, which increases with every change of it.
+    document_rev: number that increases with every opened document.
+    named: file named on the command line, the only file that is overwritten.
+    written: the mission as last saved.
+    left: earlier documents, as they were left.
+    undone: documents whose opening was undone.
     """
 
     document: Document
@@ -73,7 +79,7 @@ class Session:
 
     @classmethod
     def of(cls, document: Document, options: MissionOptions) -> "Session":
-        """Return a session that begins with what was opened."""
+        """Return a session that starts with an opened document."""
         desk = EditContext.of(document.setup, options.get("terrain"), read_named_fences(options.get("fence") or ()))
         judged = desk.judge(document.setup.mission)
         history = History(document.setup.mission)
@@ -81,7 +87,7 @@ class Session:
         return cls(document, options, desk, history, judged, named=named)
 
     def open(self, document: Document) -> None:
-        """Open another document; an undo before its first edit brings back the previous one."""
+        """Open another document; an undo before its first edit restores the previous document."""
         named = document.path is not None and document.path.resolve() == self.named
         made = Session.of(document if named else replace(document, path=None), self.options)
         self.left, self.undone = [*self.left, self._state()][-_MAX_LEFT_DOCUMENTS:], []
@@ -91,7 +97,7 @@ class Session:
         return self.document, self.desk, self.history
 
     def _restore_state(self, place: _OpenedState) -> None:
-        """Show a document as it was left; nothing is changed if it cannot be judged."""
+        """Restore a document as it was left; if it cannot be judged, nothing is changed."""
         _, desk, history = place
         judged = desk.judge(history.mission)
         self.document, self.desk, self.history = place
@@ -105,34 +111,34 @@ class Session:
 
     @property
     def undo_text(self) -> str:
-        """Text of the next undo, which may undo opening a document; "" for nothing."""
+        """Text of the next undo, which may be the opening of a document; "" if there is nothing to undo."""
         return self.history.undo_text or (f"open {self.document.name}" if self.left else "")
 
     @property
     def redo_text(self) -> str:
-        """Text of the next redo; "" for nothing."""
+        """Text of the next redo; "" if there is nothing to redo."""
         return self.history.redo_text or (f"open {self.undone[-1][0].name}" if self.undone else "")
 
     @property
     def mission(self) -> Mission:
-        """The present mission."""
+        """Current mission."""
         return self.history.mission
 
     @property
     def is_changed(self) -> bool:
-        """True if the mission differs from the opened one."""
+        """True if the mission differs from the opened mission."""
         return self.mission is not self.history.first
 
     @property
     def is_unsaved(self) -> bool:
-        """True if the mission differs from the opened one and from the one saved last."""
+        """True if the mission differs from the opened mission and from the mission saved last."""
         return self.is_changed and self.mission is not self.written
 
     # ------------------------------------------------------------------
     # Edits.
 
     def edit(self, message: Edit) -> None:
-        """Apply an edit.  Raises StaleEdit, or MissionError for an invalid mission, and changes nothing then."""
+        """Apply an edit.  Raises StaleEdit, or MissionError for an invalid mission; then nothing is changed."""
         if message.rev != self.rev:
             raise StaleEdit
         mission, text = self._edited_mission(message)
@@ -140,7 +146,7 @@ class Session:
         self._add_to_history(mission, text)
 
     def step(self, kind: str) -> None:
-        """Undo, redo, or revert to the opened mission; do nothing if there is nothing to undo."""
+        """Undo, redo, or revert to the opened mission, if there is anything to undo, redo or revert."""
         if kind == "revert":
             if self.is_changed:
                 self._show(self.history.first)
@@ -166,7 +172,7 @@ class Session:
             raise
 
     def preview(self, message: Drag) -> Json:
-        """Judge a drag without changing the mission: windows around the item, or the whole mission on request."""
+        """Judge windows around a dragged item, or the whole mission on request, without changing the mission."""
         if message.rev != self.rev:
             raise StaleEdit
         mission = self._moved_mission(message.k, message.east, message.north, message.up)
@@ -176,7 +182,7 @@ class Session:
         return {"sheet": sheet_json(self.desk, judged)}
 
     def replace_plan(self, message: Choose) -> None:
-        """Replace all of the mission, or the items between two, by a planned path.  Raises StaleEdit."""
+        """Replace the whole mission, or the items between two items, by a planned path.  Raises StaleEdit."""
         if message.rev != self.rev:
             raise StaleEdit
         plans, between = self.plans
@@ -191,9 +197,9 @@ class Session:
         self._add_to_history(mission, "plan a part")
 
     def _show(self, mission: Mission, desk: EditContext | None = None) -> None:
-        """Judge a mission and show it; nothing is changed if that fails.
+        """Judge a mission, make it the current one, and drop earlier planned paths; change nothing if it is invalid.
 
-        desk: the context to judge it with, None for the present one.  Earlier planned paths are dropped.
+        desk: the editing context to judge the mission with, None for the current one.
         """
         desk = (self.desk if desk is None else desk).around(mission)
         judged = desk.judge(mission)
@@ -204,7 +210,7 @@ class Session:
         self.rev += 1
 
     def _show_plan(self, plan: Plan) -> None:
-        """Replace the mission by a new plan; its certificate applies until the mission is edited."""
+        """Replace the mission by a new plan, whose certificate applies until the mission is edited."""
         mission = planned_mission(plan, self.desk.airframe)
         self._show(mission, self.desk.of_plan(plan, mission))
         self._add_to_history(mission, f"plan with seed {plan.seed}")
@@ -228,7 +234,7 @@ class Session:
                 return self._with_suggestion(message)
 
     def _items_to_raise(self, ks: list[int] | None) -> tuple[int, ...]:
-        """Return the items to raise: the given ones, or all, without landings unless there are only landings."""
+        """Return the given items, or all, without landings unless there are only landings."""
         asked = edits.places(self.mission) if ks is None else tuple(ks)
         flying = tuple(k for k in asked if edits.checked_place(self.mission, k).command not in LANDINGS)
         return flying or asked
@@ -244,7 +250,10 @@ class Session:
         return mission if mission is self.mission else self.desk.retuned(mission, k)
 
     def _with_inserted(self, message: Insert) -> tuple[Mission, str]:
-        """Insert a waypoint after another, half way to the altitude of the next if both have the same frame."""
+        """Return the mission with a waypoint inserted, and the text of the edit.
+
+        Its altitude is the mean of the altitudes before and after it if both have the same frame.
+        """
         mission, own = self.mission, edits.places(self.mission)
         before = edits.checked_place(mission, message.after)
         height, at = None, own.index(message.after)
@@ -284,7 +293,7 @@ class Session:
         return mission, f"apply a suggestion of {item.rule}"
 
     def _with_part_replaced(self, plan: Plan, first: int, last: int) -> Mission:
-        """Replace the items between two by the waypoints of a planned path."""
+        """Return the mission with the items between two items replaced by the waypoints of a planned path."""
         mission = self.mission
         for k in [k for k in edits.places(mission) if first < k < last][::-1]:
             mission = edits.deleted(mission, k)
@@ -301,7 +310,7 @@ class Session:
         return mission
 
     def place_of(self, k: int) -> tuple[float, float, float]:
-        """Return east, north and altitude AMSL of an item, m.  Raises MissionError if the item is no place."""
+        """Return east, north and altitude AMSL of an item, m.  Raises MissionError if the item is not a place."""
         edits.checked_place(self.mission, k)
         east, north, up = self.desk.points(self.mission)[edits.places(self.mission).index(k)].tolist()
         return east, north, up
@@ -310,7 +319,7 @@ class Session:
     # The world.
 
     def change_settings(self, asked: Settings) -> None:
-        """Change the settings of the flight.  Raises PlanflyError for a value that no scenario may have."""
+        """Change the settings of the flight.  Raises PlanflyError for a value that is not allowed in a scenario."""
         scenario = changed_world(self.desk.scenario, asked)
         desk = self.desk.flown_as(scenario, changed_parameters(self.desk.parameters, scenario, asked))
         mission = self.mission
@@ -319,14 +328,14 @@ class Session:
         self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
 
     def settings_json(self) -> Json:
-        """Return the present settings."""
+        """Return the current settings as page data."""
         return settings_json(self.desk.scenario, self.desk.airframe, self.desk.parameters)
 
     # ------------------------------------------------------------------
     # Page data, and files.
 
     def sheet(self) -> Json:
-        """Return the present mission with its verdict as page data."""
+        """Return the current mission with its verdict as page data."""
         return {
             "kind": "sheet",
             "rev": self.rev,
@@ -352,7 +361,7 @@ class Session:
         }
 
     def save(self, form: str) -> Saved:
-        """Return the mission as a file.  Raises PlanflyError."""
+        """Return the mission as a file.  Raises PlanflyError if the format cannot store it."""
         saved = save_document(self.document, self.desk, self.judged, form)
         if form != "kml":
             self.written = self.mission
@@ -376,15 +385,15 @@ class Session:
 
     @property
     def has_news(self) -> bool:
-        """True if anything is to be kept: the mission, or how it is flown, differs from what was opened."""
+        """True if the mission or its settings differ from those opened, and should be autosaved."""
         return self.is_changed or self.desk.scenario is not self.document.setup.scenario
 
     def kept_file(self, file: Path) -> Path:
-        """Autosave path: the given file for the first document, a sibling for documents opened later."""
+        """Return the autosave path, which is `file` for the first document, and a sibling for later documents."""
         return kept_beside(file, self.history.first) if self.left else file
 
     def keep(self, file: Path) -> None:
-        """Write the autosave file, if anything was changed since the last time."""
+        """Write the autosave file if anything has changed since the last autosave."""
         if self.kept_rev == self.rev:
             return
         file = self.kept_file(file)
@@ -396,10 +405,10 @@ class Session:
         self.kept_rev = self.rev
 
     def restore(self, file: Path) -> bool:
-        """Restore the autosave of the same document, its mission as an edit; return True if there was one.
+        """Restore the autosave of this document, with its mission as an edit; return True if there was one.
 
-        An autosave of another document is ignored.  An autosave that cannot be read is named in `unreadable`, and is
-        neither restored nor written over.
+        An autosave of another document is ignored.  An autosave that cannot be read is added to `unreadable`, and is
+        neither restored nor overwritten.
         """
         before = self.desk, self.judged, self.plans
         try:
@@ -418,6 +427,6 @@ class Session:
 
 
 def open_session(target: str, options: MissionOptions, kept: Path | None = None) -> tuple[Session, bool]:
-    """Open what a command names; also return True if earlier edits were taken up.  Raises PlanflyError."""
+    """Open a target of the command, and also return True if earlier edits were restored.  Raises PlanflyError."""
     session = Session.of(open_document(target, options), options)
     return session, kept is not None and session.restore(kept)

@@ -1,6 +1,6 @@
-"""Settings of the flight: aircraft, autopilot with parameters, weather and limits.
+"""Change the aircraft, the autopilot and its parameters, the weather and the limits of a flight.
 
-Values are checked by the same code as in scenarios and parameter files, and refused with the same texts.
+Values are checked by the same code as in scenarios and parameter files, and refused with the same messages.
 """
 
 from dataclasses import dataclass, field, replace
@@ -20,7 +20,7 @@ from world.scenario import Scenario, from_spec, with_flight
 
 # Suffixes of parameter files.
 PARAMETER_FILES = (".parm", ".param", ".params")
-# Greatest number of unused names of a file that are listed.
+# Maximum number of unused names of a file that are listed.
 _MAX_LISTED_NAMES = 8
 
 
@@ -28,8 +28,9 @@ _MAX_LISTED_NAMES = 8
 class SetParameters:
     """Parameters of the autopilot that were set in the studio.
 
-    values: by the names and in the units of the autopilot.
-    file: name of the file that was read last, or ""; unused: its names that the control law does not use.
+    values: values by the names and in the units of the autopilot.
+    file: name of the file that was read last, or "".
+    unused: names in this file that the simulated autopilot does not use.
     """
 
     values: dict[str, float] = field(default_factory=dict)
@@ -41,7 +42,7 @@ class SetParameters:
         return parameters_text(self.values, title)
 
     def airframe(self, scenario: Scenario) -> Airframe:
-        """Load the airframe of a scenario with these parameters, and name their source.  Raises PlanflyError."""
+        """Return the airframe of a scenario with these parameters and their source.  Raises PlanflyError."""
         made = load_airframe(scenario, self.values)
         stored = made.autopilot.store()
         if not self.values or stored.parameters is None:
@@ -51,7 +52,7 @@ class SetParameters:
 
 
 def changed_world(scenario: Scenario, asked: Settings) -> Scenario:
-    """Return a scenario with other settings.  Raises PlanflyError for an invalid value."""
+    """Return a scenario with the requested settings.  Raises PlanflyError for an invalid value."""
     wind = None
     if asked.wind_speed is not None or asked.wind_from is not None:
         speed = scenario.wind.speed if asked.wind_speed is None else asked.wind_speed
@@ -82,8 +83,8 @@ def changed_world(scenario: Scenario, asked: Settings) -> Scenario:
 def changed_parameters(old: SetParameters, scenario: Scenario, asked: Settings) -> SetParameters:
     """Return the parameters after a change of settings, for the autopilot of a scenario.
 
-    Another autopilot has other parameters: none is kept.  A file replaces all, a single parameter only itself.
-    Raises PlanflyError for a name that the control law does not have, and for a value that is not allowed.
+    If the autopilot changes, no parameter is kept.  A file replaces all parameters, a single parameter only itself.
+    Raises PlanflyError for a name that the simulated autopilot does not have, and for a value that is not allowed.
     """
     if asked.autopilot is not None:
         old = SetParameters()
@@ -94,7 +95,7 @@ def changed_parameters(old: SetParameters, scenario: Scenario, asked: Settings) 
     if asked.parameter is not None:
         found = read_parameters(scenario, asked.parameter, "parameter")
         if found.unused:
-            name, known = found.unused[0], [one.name for one in _law_parameters(scenario).values]
+            name, known = found.unused[0], [one.name for one in _autopilot_parameters(scenario).values]
             allowed = f"a parameter of the simulated autopilot is expected{did_you_mean(name, known)}"
             raise PlanflyError(f"parameter: {name}: {allowed}", field="parameter", value=name, allowed=allowed)
         made = SetParameters(values | found.values, made.file, made.unused)
@@ -102,22 +103,22 @@ def changed_parameters(old: SetParameters, scenario: Scenario, asked: Settings) 
 
 
 def read_parameters(scenario: Scenario, text: str, name: str) -> SetParameters:
-    """Read autopilot parameters from a file's text.  Raises PlanflyError, with the file's name."""
-    asked = _law_parameters(scenario).by_origin("file")
+    """Read autopilot parameters from the text of a file.  Raises PlanflyError, which names the file."""
+    asked = _autopilot_parameters(scenario).by_origin("file")
     with temporary_folder("planfly-studio-") as folder:
         file = folder / "set.parm"
         file.write_text(text, encoding="utf-8")
         try:
-            made = _law_parameters(with_flight(scenario, params=str(file)))
+            made = _autopilot_parameters(with_flight(scenario, params=str(file)))
         except PlanflyError as error:
             raise PlanflyError(str(error).replace(str(file), name), file=name) from None
     stated = made.by_origin("file")
-    # Parameters that the scenario itself sets, and the text does not, belong to the scenario.
+    # Leave out parameters that only the scenario sets, because they belong to the scenario.
     own = {one: value for one, value in stated.items() if one not in asked or one in parse_parameters(text, name)}
     return SetParameters(own, name, made.unused)
 
 
-def _law_parameters(scenario: Scenario) -> Parameters:
+def _autopilot_parameters(scenario: Scenario) -> Parameters:
     """Return the autopilot parameters of a scenario.  Raises PlanflyError if its autopilot has none."""
     made = load_autopilot(scenario, find_airframe(scenario)[0])
     if made.parameters is None:
@@ -126,7 +127,7 @@ def _law_parameters(scenario: Scenario) -> Parameters:
 
 
 def settings_json(scenario: Scenario, frame: Airframe, own: SetParameters) -> dict[str, Any]:
-    """Return the present settings for a page."""
+    """Return the current settings as page data."""
     limits, parameters = scenario.to_json().get("limits", {}), frame.autopilot.parameters
     more = f" and {len(own.unused) - _MAX_LISTED_NAMES} more" if len(own.unused) > _MAX_LISTED_NAMES else ""
     return {

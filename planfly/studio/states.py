@@ -13,7 +13,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.violated_legs import violated_legs
 from logs.verdict.rule_words import RULE_WORDS
 
-# For a rule whose margin has no scale, such as turns, near is the last tenth before the limit.
+# Fraction of the limit that is near the limit, for a rule whose margin has no scale, such as turns.
 _NEAR_FRACTION = 0.1
 _ORDER = {"fail": 0, "open": 1, "near": 2, "ok": 3}
 
@@ -22,7 +22,7 @@ class State(NamedTuple):
     """State of a place.
 
     closeness: margin as a multiple of a noticeable difference; below 1 is near the limit, below 0 beyond it.
-    text: the finding in a few words, for the pointer.
+    text: the finding in a few words, shown at the pointer.
     """
 
     state: str
@@ -33,8 +33,9 @@ class State(NamedTuple):
 class PlaceStates(NamedTuple):
     """States by the numbers of the route; places without findings have none.
 
-    legs, corners: by leg and by waypoint.
-    threats, zones: the failed ones, by their numbers.
+    legs: states by leg.
+    corners: states by waypoint.
+    threats, zones: numbers of the failed threats and zones.
     """
 
     legs: dict[int, State]
@@ -44,9 +45,9 @@ class PlaceStates(NamedTuple):
 
 
 def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *, shift: int = 0) -> PlaceStates:
-    """Return the states of all places; failed threats, zones and bounds colour the legs that violate them.
+    """Return the states of all places; a failed threat, zone or bound also sets the state of the legs that violate it.
 
-    shift: added to the numbers of legs and corners of a part of a route.
+    shift: number added to the legs and corners of a part of a route.
     """
     legs: dict[int, State] = {}
     corners: dict[int, State] = {}
@@ -77,9 +78,9 @@ def _set_worse_state(states: dict[int, State], numbers: Iterable[int], state: St
 
 
 def state_of(item: Finding, *, unjudged: bool = False) -> State | None:
-    """Return the state that one finding gives its place, or None for a finding without influence.
+    """Return the state of a place according to one finding, or None for a finding that does not affect it.
 
-    unjudged: true if the verdict is withheld because of this finding.
+    unjudged: True if the verdict is withheld because of this finding.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import Place
@@ -90,16 +91,16 @@ def state_of(item: Finding, *, unjudged: bool = False) -> State | None:
     State(state='near', closeness=0.7, text='slope 13.5° (≤ 14.2°)')
     """
     if item.ok is None:
-        return State("open", 0.0, f"{_word(item)}: {item.brief or item.reason}") if unjudged else None
+        return State("open", 0.0, f"{_rule_name(item)}: {item.brief or item.reason}") if unjudged else None
     if item.ok is False:
-        return State("fail", -math.inf if item.margin is None else item.margin, f"{_word(item)}: {item.brief}")
+        return State("fail", -math.inf if item.margin is None else item.margin, f"{_rule_name(item)}: {item.brief}")
     if item.margin is None or item.planned is None:
         return None
     closeness = _closeness(item)
     return State("near" if closeness < 1.0 else "ok", closeness, _value_text(item))
 
 
-def _word(item: Finding) -> str:
+def _rule_name(item: Finding) -> str:
     return RULE_WORDS[item.rule].word
 
 

@@ -1,4 +1,4 @@
-"""Data that the page draws: the world, the mission with its states, and its profile; lengths in m."""
+"""Make the data that the page draws, which are the world, the mission with its states, and its profile, in m."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -32,23 +32,23 @@ from world.threats import Threats
 
 Json = dict[str, Any]
 
-# Samples of the profile.
+# Number of samples of the profile.
 _PROFILE_SAMPLES = 500
-# Greatest number of findings that are listed.
+# Maximum number of findings that are listed.
 _MAX_LISTED_FINDINGS = 60
-# Greatest number of zones and threats that are cut for the profile.
+# Maximum number of zones and threats whose cross-sections the profile shows.
 _MAX_CUTS = 120
 _OK_STATE = State("ok")
 # Ratio of the drawn ground to the area, along each side.
 _GROUND_RATIO = 1.2
-# Least ratio of the width of the drawn ground to the longer side of the area.
+# Minimum ratio of the width of the drawn ground to the longer side of the area.
 _MIN_WIDTH_RATIO = 1.5
-# Least ratio of the height of the drawn ground to the longer side of the area.
+# Minimum ratio of the height of the drawn ground to the longer side of the area.
 _MIN_HEIGHT_RATIO = 0.9
 
 
 def rounded(values: Any, digits: int = 1) -> Any:
-    """Return an array as lists of rounded numbers; numbers that are not finite become null."""
+    """Return an array as lists of rounded numbers; numbers that are not finite become None."""
     array = np.round(np.asarray(values, dtype=np.float64), digits)
     if np.isfinite(array).all():
         return array.tolist()
@@ -56,11 +56,11 @@ def rounded(values: Any, digits: int = 1) -> Any:
 
 
 # ----------------------------------------------------------------------
-# The world.
+# Data of the world.
 
 
 def world_json(desk: EditContext, setup: FlightSetup) -> Json:
-    """Describe the world of a mission: area, threats, zones, ends, limits."""
+    """Return page data of the world of a mission, with its area, threats, zones, ends and limits."""
     scenario, mission = desk.scenario, setup.mission
     extent = scenario.bounds if scenario.external else map_extent(scenario, desk.points(mission), [])
     return {
@@ -80,7 +80,7 @@ def world_json(desk: EditContext, setup: FlightSetup) -> Json:
 
 
 def _with_surroundings(extent: Floats) -> Floats:
-    """Extend a range, (2, 2) m, so that a window of another shape is filled with ground."""
+    """Return a map extent widened so that ground fills a window of another shape.  extent: (2, 2), m."""
     middle, size = extent.mean(axis=1), np.diff(extent, axis=1)[:, 0]
     longest = float(size.max())
     half = 0.5 * np.maximum(_GROUND_RATIO * size, np.array([_MIN_WIDTH_RATIO * longest, _MIN_HEIGHT_RATIO * longest]))
@@ -102,7 +102,7 @@ def _threats_json(threats: Threats) -> list[Json]:
 
 
 def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> list[Json]:
-    """Describe the scenario's zones, then the zones of the mission's own fence, as findings number them."""
+    """Return page data of the scenario's zones, then of the mission's fence zones, in the order that findings use."""
     zones = airspace_of(setup).zones if mission.fences else scenario.zones
     return [
         {
@@ -115,7 +115,7 @@ def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> lis
 
 
 # ----------------------------------------------------------------------
-# The mission.
+# Data of the mission.
 
 
 def sheet_json(desk: EditContext, judged: JudgedMission) -> Json:
@@ -126,7 +126,7 @@ def sheet_json(desk: EditContext, judged: JudgedMission) -> Json:
     return {
         "items": items_json(desk, judged.mission),
         **route_json(judged.mission, setup.route, 0, setup.route.legs),
-        "path": _legs_of(path.points, path.legs, 0, setup.route.legs),
+        "path": _leg_paths(path.points, path.legs, 0, setup.route.legs),
         "states": states_json(states, 0, setup.route.legs),
         "violated": {"threats": sorted(states.threats), "zones": sorted(states.zones)},
         "verdict": verdict_json(verdict),
@@ -140,11 +140,11 @@ def sheet_json(desk: EditContext, judged: JudgedMission) -> Json:
 
 
 def window_json(mission: Mission, route: Route, windows: Sequence[Window]) -> Json:
-    """Describe the legs and corners that were judged near a moved item."""
-    return {"total_legs": route.legs, "windows": [_window(mission, route, one) for one in windows]}
+    """Return page data of the legs and corners that were judged near a moved item."""
+    return {"total_legs": route.legs, "windows": [_window_json(mission, route, one) for one in windows]}
 
 
-def _window(mission: Mission, route: Route, window: Window) -> Json:
+def _window_json(mission: Mission, route: Route, window: Window) -> Json:
     first, last = window.first, window.last
     path = window.requirements.path
     states = place_states(window.requirements, window.findings, shift=window.begin)
@@ -152,13 +152,13 @@ def _window(mission: Mission, route: Route, window: Window) -> Json:
         "first": first,
         "last": last,
         **route_json(mission, route, first, last),
-        "path": _legs_of(path.points, path.legs + window.begin, first, last),
+        "path": _leg_paths(path.points, path.legs + window.begin, first, last),
         "states": states_json(states, first, last),
     }
 
 
 def items_json(desk: EditContext, mission: Mission) -> list[Json]:
-    """Describe the items that can be moved: their places, and how the mission states them."""
+    """Return page data of the items that can be moved, with their places on the map and in the mission."""
     points, flown = desk.points(mission), desk.flown(mission)
     found = []
     for k, (east, north, up) in zip(places(mission), points.tolist(), strict=True):
@@ -180,37 +180,37 @@ def items_json(desk: EditContext, mission: Mission) -> list[Json]:
 
 
 def route_json(mission: Mission, route: Route, first: int, last: int) -> Json:
-    """Describe the waypoints of a route from first to last, with the index of each item, -1 for none."""
+    """Return page data of the waypoints of a route from first to last, each with the index of its item, or -1."""
     numbers = {item.seq: k for k, item in enumerate(mission.items)}
     items = [numbers.get(seq, -1) for seq in route.items[first : last + 1].tolist()]
     return {"route": rounded(route.waypoints[first : last + 1]), "of": items}
 
 
-def _legs_of(points: Floats, legs: NDArray[np.int64], first: int, last: int) -> list[list[float]]:
-    """Return the path of each leg as east, north, up, east, north, up, ..."""
+def _leg_paths(points: Floats, legs: NDArray[np.int64], first: int, last: int) -> list[list[float]]:
+    """Return the path of each leg as a flat list of east, north, up, east, north, up, ..., m."""
     edges = np.searchsorted(legs, np.arange(first, last + 1))
     flat = np.round(points, 1)
     return [flat[begin : end + 1].ravel().tolist() for begin, end in pairwise(edges.tolist())]
 
 
 def states_json(states: PlaceStates, first: int, last: int) -> Json:
-    """Return states of legs and corners as rows of state and words, in order."""
+    """Return the states of legs and corners in order, each as a pair of state and text."""
     return {
-        "legs": [_state(states.legs.get(k, _OK_STATE)) for k in range(first, last)],
-        "corners": [_state(states.corners.get(k, _OK_STATE)) for k in range(first, last + 1)],
+        "legs": [_state_pair(states.legs.get(k, _OK_STATE)) for k in range(first, last)],
+        "corners": [_state_pair(states.corners.get(k, _OK_STATE)) for k in range(first, last + 1)],
     }
 
 
-def _state(state: State) -> list[str]:
+def _state_pair(state: State) -> list[str]:
     return [state.state, state.text]
 
 
 # ----------------------------------------------------------------------
-# The verdict.
+# Data of the verdict.
 
 
 def verdict_json(verdict: Verdict) -> Json:
-    """Return the answer and its lines."""
+    """Return page data of the verdict's answer and its lines."""
     shown = verdict.present()
     return {
         "state": shown.state,
@@ -223,11 +223,11 @@ def verdict_json(verdict: Verdict) -> Json:
 
 
 def findings_json(verdict: Verdict) -> list[Json]:
-    """List the findings that failed or are left open, then the finding closest to its limit of each rule."""
-    return [_finding(number, item) for number, item in verdict.present().worth_listing(_MAX_LISTED_FINDINGS)]
+    """List page data of failed and undecided findings, then of each rule's finding closest to its limit."""
+    return [_finding_json(number, item) for number, item in verdict.present().worth_listing(_MAX_LISTED_FINDINGS)]
 
 
-def _finding(number: int, item: Finding) -> Json:
+def _finding_json(number: int, item: Finding) -> Json:
     return {
         "number": number,
         "rule": RULE_WORDS[item.rule].title,
@@ -241,11 +241,11 @@ def _finding(number: int, item: Finding) -> Json:
 
 
 # ----------------------------------------------------------------------
-# The profile.
+# Data of the profile.
 
 
 def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
-    """Return the ground under the route, distances of its waypoints, and threats and zones over it."""
+    """Return page data of the terrain below the route, its waypoints' distances, and the threats and zones above."""
     route = setup.route.waypoints
     at = route_distance(route)
     distance, points = route_samples(route, max(float(at[-1]) / _PROFILE_SAMPLES, 1.0))

@@ -1,6 +1,6 @@
-"""Tasks of the studio's processes: fly a mission, plan a path.
+"""Fly a mission or plan a path in the studio's worker processes.
 
-Arguments are pickled, results are data.  Returns and campaigns, which take longer, are in
+Arguments are pickled, and results are plain data.  Returns and campaigns, which take longer, are in
 `planfly.studio.long_worker_tasks`.
 """
 
@@ -29,16 +29,16 @@ from planner.search.plan_front import FrontPlan
 from world.arrays import Floats
 from world.scenario import Scenario, from_spec
 
-# Longest search for one path, s: a user waits for it.
+# Maximum duration of a search for one path, for which a user waits, s.
 SECONDS = 25.0
-# Longest search for several paths, s.
+# Maximum duration of a search for several paths, s.
 SECONDS_FOR_SEVERAL = 60.0
-# Greatest number of rows of a flown track that the page draws.
+# Maximum number of rows of a flown track that the page draws.
 _MAX_DRAWN_ROWS = 1_500
 
 
 def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Fly a mission with the control law of its autopilot, and judge the flight."""
+    """Fly a mission with its simulated autopilot, judge the flight, and return the results as page data."""
     desk, mission = payload
     setup = desk.setup(mission)
     flown = fly_and_judge(setup, desk.airframe, None, advance, reference="never")
@@ -60,7 +60,7 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
 def _track_json(route: Floats, track: Track, leg_ends: Sequence[float]) -> dict[str, Any]:
     """Return a flown track for the map, and its progress along the route for the profile.
 
-    leg_ends: when each leg but the last ended, according to the verdict; the record of the guidance is not relied on.
+    leg_ends: time at which each leg but the last ended, by the verdict, s; these times replace the guidance's record.
     """
     if not len(track):
         return {"track": [], "along": []}
@@ -72,16 +72,17 @@ def _track_json(route: Floats, track: Track, leg_ends: Sequence[float]) -> dict[
 
 
 # ----------------------------------------------------------------------
-# Planning.
+# Plan paths.
 
 
 @dataclass(frozen=True, slots=True)
 class PlanAsked:
     """Request to plan between two places in the world of a scenario.
 
-    ends: (2, 3) m; None for the ends of the scenario.  algorithm: None for the default.
-    ways: greatest number of paths; of several, none is better than another in length, exposure, clearance and energy at
-    once.
+    ends: start and destination, (2, 3), m; None for the ends of the scenario.
+    algorithm: name of the algorithm; None for the default.
+    ways: maximum number of paths; if there are several, no path is better than another in all of length, exposure,
+    clearance and energy.
     """
 
     scenario: Scenario
@@ -93,7 +94,7 @@ class PlanAsked:
 
 
 def plan(asked: PlanAsked, advance: Advance) -> list[FrontPlan]:
-    """Plan a path, or several, the shortest first; if none is safe, return the best one."""
+    """Plan one or several paths, the shortest first; if no path is safe, return the best one."""
     scenario = asked.scenario if asked.ends is None else between(asked.scenario, *asked.ends)
     seconds = SECONDS if asked.ways == 1 else SECONDS_FOR_SEVERAL
     airframe, seed, stop = asked.airframe, asked.seed, partial(_stop_reason, time.monotonic() + seconds)
@@ -103,19 +104,19 @@ def plan(asked: PlanAsked, advance: Advance) -> list[FrontPlan]:
         front = make_pareto_plans(scenario, airframe, seed, asked.ways, advance, stop=stop, onward=onward)
         return list(front.plans) or [front.default]
     made = make_plan(scenario, airframe, seed, asked.algorithm, advance, stop=stop, onward=onward)
-    # A single path needs no comparison: quantities that take longer to compute are left out.
+    # A single path needs no comparison, so quantities that take longer to compute are left out.
     length = float(np.linalg.norm(np.diff(made.waypoints, axis=0), axis=1).sum())
     clearance = float(made.certificate.clearance) + scenario.limits.min_clearance_m
     return [FrontPlan(made, length, math.nan, clearance, math.nan, math.nan)]
 
 
 def _stop_reason(deadline: float) -> str:
-    """Return the reason to end a search, "" to go on."""
+    """Return the reason to end a search, or "" to go on."""
     return "budget" if time.monotonic() > deadline else ""
 
 
 def between(scenario: Scenario, start: tuple[float, ...], destination: tuple[float, ...]) -> Scenario:
-    """Return a scenario with other ends, (3,) m each, in the air and without courses."""
+    """Return a scenario with other ends in the air, without courses.  start, destination: (3,), m."""
     spec = scenario.to_json()
     for key, (east, north, up) in (("start", start), ("destination", destination)):
         spec[key] = {"east_m": east, "north_m": north, "amsl_m": up}

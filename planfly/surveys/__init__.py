@@ -1,1 +1,1 @@
-"""Answers about surveys: remedies and text."""
+"""Find remedies for surveys, and describe surveys in text."""

@@ -1,4 +1,4 @@
-"""Remedies for surveys whose photo lines cannot be flown; each is flown before it is suggested."""
+"""Find remedies for surveys with photo lines that cannot be flown; each remedy is flown before it is suggested."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -27,11 +27,11 @@ RemedyKind = Literal["side", "turn-around", "every", "course", "parameter", "air
 
 # Turn-arounds that are tried, m.
 TURN_AROUNDS = (25.0, 50.0, 75.0, 100.0, 125.0, 150.0, 175.0, 200.0, 250.0, 300.0, 350.0, 400.0)
-# Interleave strides that are tried: fly every n-th line first.
+# Interleave strides n that are tried, with which every n-th line is flown first.
 INTERLEAVE_STRIDES = (2, 3, 4)
 # Fractions of the airspeed that are tried.
 AIRSPEED_FACTORS = (0.95, 0.9, 0.85, 0.8, 0.7)
-# Least airspeed that is tried, as a ratio to the minimum airspeed of the aircraft.
+# Minimum airspeed that is tried, as a ratio to the minimum airspeed of the aircraft.
 _MIN_AIRSPEED_RATIO = 1.1
 
 
@@ -93,7 +93,7 @@ class TriedRemedies:
 def survey_remedies(
     setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None] = lambda _: None
 ) -> TriedRemedies:
-    """Find single changes that let all photo lines be flown; of each kind, the smallest one.
+    """Find single changes with which all photo lines can be flown, and return the smallest change of each kind.
 
     If no single change is enough, try turn-arounds with a parameter of the autopilot half way to its farthest value, or
     with a lower airspeed: at most four flights for each of about five changes.
@@ -120,7 +120,7 @@ def survey_remedies(
 
 
 def _worst_margins(verdict: Verdict) -> dict[str, float]:
-    """Return the least margin of each rule that fails; -inf if a failure has no margin."""
+    """Return the minimum margin of each rule that fails; -inf if a failure has no margin."""
     worst: dict[str, float] = {}
     for item in verdict.findings:
         if item.ok is False:
@@ -130,13 +130,13 @@ def _worst_margins(verdict: Verdict) -> dict[str, float]:
 
 
 def _count_usable(verdict: Verdict) -> tuple[int, int]:
-    """Count the photo lines that a verdict finds usable, and all photo lines."""
+    """Return the number of photo lines that a verdict finds usable, and the number of all photo lines."""
     lines = [item.ok for item in verdict.findings if item.rule == "survey" and not item.check]
     return sum(ok is True for ok in lines), len(lines)
 
 
 def _all_lines_usable(verdict: Verdict) -> bool:
-    """Return True if all lines can be used and their photos overlap."""
+    """Return True if all photo lines are usable and their photos overlap."""
     usable, lines = _count_usable(verdict)
     return 0 < lines == usable and not any(item.rule == "survey" and item.ok is False for item in verdict.findings)
 
@@ -169,13 +169,13 @@ class _Trials:
     # One flight.
 
     def _changed_setup(self, mission: Mission, airframe: Airframe) -> FlightSetup:
-        """Make the setup of a changed mission; as in the original mission, vertical legs are accepted."""
+        """Return the setup of a changed mission; vertical legs are accepted, as in the original mission."""
         scenario = self._setup.scenario
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
         return make_setup(scenario, airframe, mission, self._setup.seed, placed=placed)
 
     def _fly(self, mission: Mission, airframe: Airframe, what: str) -> _FlownMission | None:
-        """Fly a mission; return None if it cannot be laid out."""
+        """Fly a mission; return None if it has no valid route."""
         what = self._changed + what
         self._on_trial(what)
         try:
@@ -190,9 +190,9 @@ class _Trials:
         return trial.flown, mission, trial.setup.path.length
 
     def _fly_layout(self, layout: SurveyLayout, what: str) -> _FlownMission | None:
-        """Fly the surveys in another layout; None if that layout cannot be made."""
+        """Fly the surveys in another layout; return None if that layout cannot be made."""
         mission, setup = self._setup.mission, self._setup
-        # Start with the last survey: a changed survey may be detected as two, which shifts the numbers of later ones.
+        # Start with the last survey, because a changed survey may be detected as two, which renumbers later surveys.
         for number in reversed(self._numbers):
             survey = surveys_of(setup)[number]
             made = with_layout(mission, setup.route, survey, layout, self._setup.scenario.origin)
@@ -206,7 +206,7 @@ class _Trials:
         return self._fly(mission, self._airframe, what)
 
     def _passes(self, flown: _FlownMission | None) -> TypeGuard[_FlownMission]:
-        """Return True if all lines can be used, and no rule fails that passed before or gets noticeably worse."""
+        """Return True if all lines are usable, no other rule fails than before, and no failure is noticeably worse."""
         return (
             flown is not None
             and _all_lines_usable(flown[0])
@@ -220,18 +220,18 @@ class _Trials:
     # The remedies, one change each.
 
     def turn_around(self) -> SurveyRemedy | None:
-        """Find the shortest turn-around that passes, among those longer than the present one."""
+        """Find the shortest turn-around that passes, among those longer than the current one."""
         return self._shortest_turn_around(1, [one for one in TURN_AROUNDS if one > self._now + 1.0], 0.0)
 
     def side(self) -> SurveyRemedy | None:
-        """Try the lines from the other side, which turns into the wind instead of with it."""
+        """Try to fly the lines from the other side, so that turns are into the wind."""
         if self._setup.scenario.wind.speed <= 0.0:
             return None
         flown = self._fly_layout(SurveyLayout(self._now, backwards=True), "the lines from the other side")
         return SurveyRemedy("side", "", 0.0, 1.0, "", *flown, self._now) if self._passes(flown) else None
 
     def every(self, at_most: float) -> SurveyRemedy | None:
-        """Find the least interleave stride that passes, with turn-arounds shorter than `at_most` (m).
+        """Find the smallest interleave stride that passes, with turn-arounds shorter than `at_most`, m.
 
         The lead-in to the first line is `at_most`, the turn-around that passes without interleaving.
         """
@@ -242,7 +242,7 @@ class _Trials:
         return next((one for one in found if one is not None), None)
 
     def _shortest_turn_around(self, every: int, tried: Sequence[float], lead_in: float) -> SurveyRemedy | None:
-        """Bisect rising turn-arounds (m) for the shortest that makes all lines usable, if it passes.
+        """Bisect increasing turn-arounds, m, for the shortest that makes all lines usable; return it if it passes.
 
         A turn-around with which the flight runs out of energy before its end is too long.
         """
@@ -279,7 +279,7 @@ class _Trials:
         return min(found, key=lambda one: one.length, default=None)
 
     def parameter(self) -> SurveyRemedy | None:
-        """Find the parameter of the autopilot of which another value passes."""
+        """Find an autopilot parameter with which another value passes."""
         passed: list[_FlownMission] = []
 
         def passes(law: Autopilot) -> bool:
@@ -295,7 +295,7 @@ class _Trials:
         return SurveyRemedy("parameter", found.name, found.current, found.passing, found.unit, *passed[-1])
 
     def airspeed(self) -> SurveyRemedy | None:
-        """Find the fastest slower airspeed that passes, for a mission that sets none itself."""
+        """Find the highest reduced airspeed that passes, for a mission that sets no airspeed itself."""
         for speed, airframe in self._slower_airspeeds():
             flown = self._fly(self._setup.mission, airframe, f"{speed:g} m/s")
             if self._passes(flown):
@@ -356,7 +356,7 @@ class _Trials:
         return replace(found, kind="airspeed", current=min(map(_set_airspeed, slow)), value=own, unit="m/s")
 
     def _slower_airspeeds(self) -> Iterator[tuple[float, Airframe]]:
-        """Yield slower airspeeds, m/s, and aircraft, the fastest first; nothing if the mission sets one."""
+        """Yield reduced airspeeds, m/s, and airframes, the fastest first; nothing if the mission sets an airspeed."""
         if any(item.command == Command.DO_CHANGE_SPEED for item in self._setup.mission.items):
             return
         slowest = _MIN_AIRSPEED_RATIO * self._airframe.aircraft.airspeed_min
@@ -368,7 +368,7 @@ class _Trials:
 
 
 def nth(count: int) -> str:
-    """Return the ordinal of a number, in words.
+    """Return the ordinal of a number as a word.
 
     >>> nth(2), nth(5)
     ('second', '5th')
@@ -377,12 +377,12 @@ def nth(count: int) -> str:
 
 
 def _set_airspeed(item: MissionItem) -> float:
-    """Return the airspeed set by an item, m/s; 0 for other items, NaN or negative if it sets none."""
+    """Return the airspeed that an item sets, m/s; 0 for other items, NaN or negative if the item sets no airspeed."""
     return item.params[1] if item.command == Command.DO_CHANGE_SPEED else 0.0
 
 
 def _other_courses(course: float, wind: float) -> Iterator[float]:
-    """Yield courses along and across the wind more than 15 degrees from the present course."""
+    """Yield the courses along and across the wind that differ by more than 15 degrees from the current course."""
     for other in (wind, wind + 0.5 * math.pi):
         if abs(math.sin(other - course)) > math.sin(math.radians(15.0)):
             yield other

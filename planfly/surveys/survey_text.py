@@ -1,4 +1,4 @@
-"""Text on the photo lines of a survey and on remedies for them."""
+"""Describe the photo lines of a survey, and remedies for them."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, nth
 
 
 def usable(measure: LineMeasure | None) -> bool:
-    """Return True if enough of a line can be used.
+    """Return True if enough of a photo line is usable.
 
     >>> usable(None)
     False
@@ -20,7 +20,7 @@ def usable(measure: LineMeasure | None) -> bool:
 
 
 def lines_headline(measures: list[LineMeasure | None]) -> str:
-    """Count the lines that can be used, and name the worst.
+    """Return a line with the number of usable photo lines and the worst line.
 
     >>> lines_headline([None, None])
     '0 of 2 photo lines can be used; line 1 is the worst: not flown'
@@ -36,7 +36,7 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
 
 
 def line_text(number: int, measure: LineMeasure | None) -> str:
-    """Describe one line: its length, its usable share, and the faults of the rest."""
+    """Describe the length of one photo line, its usable share, and why the rest is not usable."""
     if measure is None:
         return f"line {number:<3} not flown"
     said = f"line {number:<3} {measure.length:6.0f} m  {100.0 * measure.good:5.1f} % can be used"
@@ -52,7 +52,7 @@ def survey_text(survey: Survey) -> str:
 
 
 def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
-    """Describe the overlap of photos along the lines and across them, or say that it is not known.
+    """Describe the overlap of photos along and across the lines, or state that it is unknown.
 
     >>> overlap_lines(None)
     ('overlap not judged: the camera is not known (--camera)',)
@@ -68,7 +68,7 @@ def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
 
 
 def kept_overlap(measure: OverlapMeasure | None) -> bool:
-    """Return True if photos overlap as required, as far as that is known.
+    """Return True if the photos overlap as required; an unknown overlap passes.
 
     >>> kept_overlap(None)
     True
@@ -80,7 +80,7 @@ def kept_overlap(measure: OverlapMeasure | None) -> bool:
 
 
 def needed_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
-    """Describe from where on lines can be used, which shows the turn-arounds that would be needed."""
+    """Describe the places from which lines are usable, which shows the turn-arounds that would be needed."""
     some = [one for one in lines if one is not None and one.good > 0.0]
     if not some:
         return (
@@ -92,12 +92,12 @@ def needed_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
 
 
 def near_miss_text(near: NearMiss) -> str:
-    """Describe the best trial that did not pass, and why it did not."""
+    """Describe the best trial that did not pass, and the reason why it did not."""
     return f"{near.what}: {near.usable} of {near.lines} photo lines can be used; {near.verdict.headline}"
 
 
 def remedy_text(remedy: SurveyRemedy, length: float) -> str:
-    """Describe a remedy and the path length that it costs.  length: of the present route, m."""
+    """Describe a remedy and the path length that it costs.  length: length of the current route, m."""
     match remedy.kind:
         case "side":
             change = "the lines from the other side"

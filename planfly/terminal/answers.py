@@ -103,7 +103,7 @@ def aircraft_entry(one: Aircraft, detail: AircraftDetail | None) -> AircraftEntr
 
 
 def aircraft_detail(numbers: AircraftNumbers) -> AircraftDetail:
-    """Return the computed facts, in the units of the answer."""
+    """Return the facts computed for an aircraft, in the units of the answer."""
     slow, fast = numbers.envelope.level_speeds(0.0)
     trims = [
         TrimEntry(
@@ -132,7 +132,7 @@ def aircraft_detail(numbers: AircraftNumbers) -> AircraftDetail:
 
 
 # ----------------------------------------------------------------------
-# Answers of ``planfly campaign`` and ``planfly winds``: also the content of summary.json and winds.json.
+# Answers of ``planfly campaign`` and ``planfly winds``, which are also the content of summary.json and winds.json.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

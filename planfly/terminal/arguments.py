@@ -1,4 +1,4 @@
-"""Arguments of the command line as values, and their completion by a shell."""
+"""Convert arguments of the command line to values, and complete them for a shell."""
 
 import argparse
 import contextlib
@@ -11,11 +11,11 @@ from logs.importers.open_log import SUFFIXES
 from planfly.arguments import CAMERA, CHOICES, RANGES, is_camera, is_place, is_wind
 
 # ----------------------------------------------------------------------
-# Conversion of command line texts to values, within the ranges of the keywords of the API.
+# Convert command line texts to values within the ranges of the API's keywords.
 
 
 def number(keyword: str) -> Callable[[str], Any]:
-    """Return a converter from text to a number in the range of a keyword of the API.
+    """Return a function that parses a number in the range of a keyword of the API.
 
     >>> number("seed")("3"), number("max_hours")("1.5")
     (3, 1.5)
@@ -37,7 +37,7 @@ def number(keyword: str) -> Callable[[str], Any]:
 
 
 def wind(text: str) -> tuple[float, float]:
-    """Convert SPEED,FROM of a steady wind: m/s and degrees."""
+    """Parse SPEED,FROM of a steady wind, m/s and degrees from north."""
     try:
         speed, source = (float(part) for part in text.split(","))
     except ValueError:
@@ -50,7 +50,7 @@ def wind(text: str) -> tuple[float, float]:
 
 
 def camera(text: str) -> tuple[float, ...]:
-    """Convert WxH,FOCAL or WxH,FOCAL,FRONT,SIDE: mm of sensor and focal length, and percent of overlap.
+    """Parse WxH,FOCAL or WxH,FOCAL,FRONT,SIDE, with sensor size and focal length in mm, and overlaps in percent.
 
     >>> camera("23.5x15.6,16")
     (23.5, 15.6, 16.0)
@@ -66,7 +66,7 @@ def camera(text: str) -> tuple[float, ...]:
 
 
 def place(text: str) -> tuple[float, float]:
-    """Convert LAT,LON: degrees."""
+    """Parse LAT,LON of a place, degrees."""
     try:
         lat, lon = (float(part) for part in text.split(","))
     except ValueError:
@@ -79,7 +79,7 @@ def place(text: str) -> tuple[float, float]:
 
 
 def area(text: str) -> tuple[float, ...]:
-    """Convert S,W,N,E: degrees; the API checks that they are an area."""
+    """Parse S,W,N,E, the edges of an area, degrees; the API checks that they form an area."""
     try:
         edges = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -90,7 +90,7 @@ def area(text: str) -> tuple[float, ...]:
 
 
 def autopilots(text: str) -> list[str]:
-    """Convert names of autopilots separated by commas."""
+    """Parse names of autopilots separated by commas."""
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in CHOICES["autopilot"]:
@@ -99,14 +99,14 @@ def autopilots(text: str) -> list[str]:
 
 
 def time_or_stations(text: str) -> float | str:
-    """Convert a time of the flight, or the addresses of ground stations: an address has a colon."""
+    """Parse a time of the flight, s, or return the addresses of ground stations, which contain a colon, unchanged."""
     if ":" in text:
         return text
     return number("end")(text)
 
 
 def budget(text: str) -> tuple[int | None, float | None]:
-    """Convert a number of evaluations, or of seconds if the text ends in s."""
+    """Parse a number of evaluations, or a number of seconds if the text ends in s; return (evaluations, seconds)."""
     try:
         if text.endswith("s"):
             return None, number("seconds")(text[:-1])
@@ -118,7 +118,7 @@ def budget(text: str) -> tuple[int | None, float | None]:
 
 
 def threat(text: str) -> tuple[float, float, float, float]:
-    """Convert EAST,NORTH,KILL,DETECTION of a pop-up threat, m."""
+    """Parse EAST,NORTH,KILL,DETECTION, position and radii of a pop-up threat, m."""
     try:
         east, north, kill, detection = (float(part) for part in text.split(","))
     except ValueError:
@@ -131,7 +131,7 @@ def threat(text: str) -> tuple[float, float, float, float]:
 
 
 def problems(text: str) -> tuple[int, ...]:
-    """Convert numbers of threats, each one of the four of the paper."""
+    """Parse numbers of threats separated by commas; only the four numbers of the paper are allowed."""
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})
     if not all(part.isdecimal() for part in parts) or not set(numbers) <= set(CHOICES["problems"]):
@@ -140,15 +140,15 @@ def problems(text: str) -> tuple[int, ...]:
 
 
 # ----------------------------------------------------------------------
-# Completion of arguments by a shell; `argcomplete` asks for it, in a process that then ends.
+# Complete arguments for a shell.  `argcomplete` requests completions in a process that then ends.
 
-# Function that proposes values for the beginning of a word.
+# Function that proposes values for a word that has been typed in part.
 Completer = Callable[..., Iterable[str]]
-# Environment variable that the script of a shell sets to ask for completions.
+# Environment variable that the script of a shell sets to request completions.
 ASKS_COMPLETION = "_ARGCOMPLETE"
 # Supported shells.
 SHELLS = ("bash", "zsh", "fish")
-# Root of the embedded files; importing their modules instead would load NumPy.
+# Root folder of the embedded files.  It is computed because importing their modules would load NumPy.
 _ROOT = Path(__file__).parents[2]
 # Suffixes of plans and mission files.
 MISSIONS = ("json", "waypoints", "plan", "txt")
@@ -157,7 +157,7 @@ IMPORTED_LOGS = ("BIN", "log", *(suffix[1:] for suffix in SUFFIXES))
 
 
 def completed(action: argparse.Action, completer: Completer) -> argparse.Action:
-    """Return an argument after attaching the completer for its values."""
+    """Attach a completer for its values to an argument, and return the argument."""
     # argcomplete reads this attribute.
     action.completer = completer  # type: ignore[attr-defined]
     return action
@@ -175,7 +175,7 @@ def files(*suffixes: str) -> Completer:
 
 
 def scenario_words(prefix: str, **_about: object) -> list[str]:
-    """Return the names of embedded scenarios, and scenario files.
+    """Return the names of embedded scenarios, and the scenario files, that start with `prefix`.
 
     >>> scenario_words("jack")
     ['jacksboro', 'jacksboro-air', 'jacksboro-field']
@@ -185,7 +185,7 @@ def scenario_words(prefix: str, **_about: object) -> list[str]:
 
 
 def aircraft_words(prefix: str, **_about: object) -> list[str]:
-    """Return the names of embedded aircraft, and folders.
+    """Return the names of embedded aircraft, and the folders, that start with `prefix`.
 
     >>> aircraft_words("aero")
     ['aerosonde']
@@ -195,19 +195,19 @@ def aircraft_words(prefix: str, **_about: object) -> list[str]:
 
 
 def mission_or_scenario_words(prefix: str, **about: object) -> list[str]:
-    """Return scenarios, plans and missions."""
+    """Return the scenarios, plans and missions that start with `prefix`."""
     return [*scenario_words(prefix, **about), *files(*MISSIONS)(prefix)]
 
 
 def answer_shell(parser: argparse.ArgumentParser) -> None:
-    """Print the completions that a shell has asked for, and end the process."""
+    """If a shell has requested completions, print them and end the process."""
     import argcomplete
 
     argcomplete.autocomplete(parser, always_complete_options="long")
 
 
 def shell_script(shell: str) -> str:
-    """Return the script that lets a shell ask planfly for completions.  shell: one of `SHELLS`."""
+    """Return the script with which a shell requests completions from planfly.  shell: one of `SHELLS`."""
     from argcomplete.shell_integration import shellcode
 
     return shellcode(["planfly"], shell=shell)

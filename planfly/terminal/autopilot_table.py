@@ -1,4 +1,4 @@
-"""Table of the verdicts on one mission flown by several autopilots, a column for each."""
+"""Print the verdicts on one mission flown by several autopilots in a table with one column for each."""
 
 from collections.abc import Mapping
 
@@ -13,9 +13,9 @@ _GAP = "  "
 
 
 def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
-    """Return the table by rule, then the first lines of the verdict on each autopilot.
+    """Return the table with a row for each rule, then the first lines of the verdict on each autopilot.
 
-    verdicts: by the name of the autopilot, in the order of the columns.
+    verdicts: verdict by the name of the autopilot, in the order of the columns.
 
     >>> flies = Verdict((), flyable=True, complete=True, lines=("flyable",), level="flown")
     >>> fails = Verdict((), flyable=False, complete=True, lines=("not flyable: speed", "NAV_ACC_RAD 10"), level="flown")
@@ -26,12 +26,12 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
     ardupilot: flyable
     px4: not flyable: speed; NAV_ACC_RAD 10
     """
-    rows = [("", *verdicts), ("verdict", *(_answer(verdict) for verdict in verdicts.values()))]
+    rows = [("", *verdicts), ("verdict", *(_answer_text(verdict) for verdict in verdicts.values()))]
     by_rule = [{rule.words.name: rule for rule in verdict.present().rules} for verdict in verdicts.values()]
     for words in RULE_WORDS.values():
         found = [rules.get(words.name) for rules in by_rule]
         if any(found):
-            rows.append((words.title, *map(_state, found)))
+            rows.append((words.title, *map(_rule_summary, found)))
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = []
     for title, *cells in rows:
@@ -39,7 +39,7 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
         lines.append(f"  {title:<{widths[0]}}{_GAP}{_GAP.join(padded)}".rstrip())
     for name, verdict in verdicts.items():
         first, *rest = verdict.lines or ("",)
-        # If another value of a parameter passes, the second line names it.
+        # If another parameter value passes, the second line of the verdict names that value.
         more = f"; {rest[0]}" if rest and not verdict.flyable else ""
         lines.append(f"{name}: " + coloured(first, STATE_STYLES[verdict.state]) + more)
         if verdict.conditions is not None:
@@ -48,14 +48,14 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
     return lines
 
 
-def _answer(verdict: Verdict) -> str:
+def _answer_text(verdict: Verdict) -> str:
     if verdict.undecided:
         return verdict.answer
     return "flyable" if verdict.flyable else "not flyable"
 
 
-def _state(rule: RuleFindings | None) -> str:
-    """Return the number of findings of a rule that failed, or that pass."""
+def _rule_summary(rule: RuleFindings | None) -> str:
+    """Return the number of findings of a rule that failed, or the number of passing findings if none failed."""
     if rule is None or not rule.judged:
         return "not judged" if rule else ""
     return f"{len(rule.failed)} of {rule.judged} failed" if rule.failed else f"{rule.judged} ok"

@@ -1,4 +1,4 @@
-"""Parser that reports bad usage in one line, suggests the intended option, and groups its help."""
+"""Parse the command line, report bad usage in one line, suggest the intended option, and group the help."""
 
 import argparse
 import os
@@ -12,20 +12,23 @@ from world.errors import PlanflyError
 from world.files import did_you_mean
 
 # ----------------------------------------------------------------------
-# Colour for terminals: off if the stream is not a terminal, with NO_COLOR and with TERM=dumb; on with FORCE_COLOR.
+# Colour text for terminals.  Colour is off if the stream is not a terminal, with NO_COLOR and with TERM=dumb, and it is
+# on with FORCE_COLOR.
 
 # Meaning of a colour.
 Style = Literal["good", "bad", "warning", "hint"]
 # Colours of ECMA-48, "select graphic rendition": green, red, yellow and cyan.
 _STYLES: dict[Style, int] = {"good": 32, "bad": 31, "warning": 33, "hint": 36}
-# Regular expression of the sequences that begin and end a colour.
+# Regular expression of the escape sequences that start and end a colour.
 COLOUR_SEQUENCE = rf"\x1b\[(?:0|{'|'.join(map(str, _STYLES.values()))})m"
-# Style of an answer by its state: what was not judged is amber, not red.
+# Style of an answer by its state; an undecided answer is amber, not red.
 STATE_STYLES: dict[str, Style] = {"ok": "good", "open": "warning", "fail": "bad"}
 
 
 def wants_colour(stream: TextIO) -> bool:
-    """Return True if a stream is shown in colour; NO_COLOR overrides FORCE_COLOR; empty ones are ignored.
+    """Return True if a stream is shown in colour.
+
+    NO_COLOR overrides FORCE_COLOR; empty environment variables are ignored.
 
     >>> import io
     >>> wants_colour(io.StringIO())
@@ -39,7 +42,9 @@ def wants_colour(stream: TextIO) -> bool:
 
 
 def coloured(text: str, style: Style, stream: TextIO | None = None) -> str:
-    """Return a text in a style if the stream is shown in colour; the stream is standard output if None.
+    """Return a text in a style if the stream is shown in colour, otherwise unchanged.
+
+    stream: None for standard output.
 
     >>> coloured("flyable", "good")
     'flyable'
@@ -49,14 +54,14 @@ def coloured(text: str, style: Style, stream: TextIO | None = None) -> str:
     return f"\x1b[{_STYLES[style]}m{text}\x1b[0m"
 
 
-# Heading of a paragraph in a help.
+# Heading of a paragraph in a help text.
 _HEADING = re.compile(r"^(\S[^\n]*:)(?=$| planfly)", re.MULTILINE)
-# Option anywhere in a help.
+# Option anywhere in a help text.
 _NAMED = re.compile(r"(?<![\w/-])--?[a-z][a-z-]*")
 
 
 def coloured_help(text: str) -> str:
-    r"""Return a help with colours for a terminal; its text stays the same.
+    r"""Return a help text with colours for a terminal; the text itself is not changed.
 
     >>> coloured_help("usage: planfly fly [--at TIME]").split("\x1b")
     ['', '[33musage:', '[0m planfly fly [', '[36m--at', '[0m TIME]']
@@ -71,14 +76,14 @@ _OPTION = re.compile(r"--[a-z][a-z-]*")
 
 
 class OptionTaker(Protocol):
-    """Parser, or group of its options."""
+    """Parser, or group of a parser's options."""
 
     def add_argument(self, *names: str, **settings: Any) -> argparse.Action:
         """Add an option."""
 
 
 class CommandParser(argparse.ArgumentParser):
-    """Parser of one command, or of the whole command line."""
+    """Parser for one command, or for the whole command line."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
@@ -87,12 +92,12 @@ class CommandParser(argparse.ArgumentParser):
         self.more: Callable[[], str] = str
 
     def error(self, message: str) -> NoReturn:
-        """Print one line, as for all other bad input, and exit."""
+        """Print the message in one line, like for all other bad input, and exit."""
         line = f"{self.prog}: {message} (see {self.prog} --help)"
         self.exit(BAD_INPUT, coloured(line, "bad", sys.stderr) + "\n")
 
     def format_help(self) -> str:
-        """Return the help, with the text that is made only when it is printed."""
+        """Return the help text, with the paragraph `more`, which is made only when the help is printed."""
         epilog, more = self.epilog, self.more()
         if more:
             self.epilog = (epilog or "").replace(EXIT_CODES, f"{more}\n\n{EXIT_CODES}")
@@ -101,7 +106,7 @@ class CommandParser(argparse.ArgumentParser):
         return coloured_help(text) if wants_colour(sys.stdout) else text
 
     def group(self, title: str, description: str | None = None) -> OptionTaker:
-        """Return a group of options shown together in the help, under a title."""
+        """Add a group of options, which the help shows under a title, and return it."""
         return self.add_argument_group(title, description)
 
     def alias(self, keyword: str, option: str) -> None:
@@ -109,7 +114,7 @@ class CommandParser(argparse.ArgumentParser):
         self._aliases[keyword] = option
 
     def keywords(self) -> dict[str, str]:
-        """Return the option for each keyword of the API."""
+        """Return the options by the API's keywords."""
         named = {action.dest: action.option_strings[-1] for action in self._actions if action.option_strings}
         return named | self._aliases
 
@@ -119,7 +124,7 @@ class CommandParser(argparse.ArgumentParser):
 
 
 class LineParser(CommandParser):
-    """Parser of the whole command line.  commands: the parsers of its commands, by name."""
+    """Parser for the whole command line.  commands: the parsers for its commands, by name."""
 
     def __init__(self, version: str, description: str, example: str) -> None:
         super().__init__(
@@ -131,7 +136,7 @@ class LineParser(CommandParser):
         self.commands: dict[str, CommandParser] = {}
         self._sections: dict[str, argparse._ArgumentGroup] = {}
         self._section = ""
-        # prog is given, because argparse would format a help to determine it.
+        # Without `prog`, argparse would format a help text to determine the name of the program.
         self._parsers = self.add_subparsers(
             dest="command",
             metavar="COMMAND",
@@ -139,18 +144,20 @@ class LineParser(CommandParser):
             parser_class=CommandParser,
             prog="planfly",
         )
-        # The commands are shown in sections instead.
+        # Remove argparse's list of commands, because the help shows them in sections.
         self._positionals._group_actions.clear()
 
     def section(self, title: str) -> None:
-        """List the commands added from here on below a title."""
+        """Start a section of the help under a title, for the commands added next."""
         self._section = title
 
     def command(self, name: str, summary: str, *examples: str, extra: str = "", more: str = "") -> CommandParser:
-        """Add the parser of a command.
+        """Add the parser for a command, and return it.
 
-        summary: one sentence on the command.  examples: lines of its help.  extra: the extra that it needs, or "".
-        more: further sentences of its own help.
+        summary: one sentence on the command.
+        examples: example command lines in its help.
+        extra: the extra of planfly that the command needs, or "".
+        more: further sentences of its help.
         """
         needs = f"  It needs the extra planfly[{extra}]." if extra else ""
         shown = f"\n{' ' * len('example: ')}".join(examples)
@@ -192,7 +199,7 @@ _NEGATIVES = re.compile(r"-\.?\d[^=]*")
 
 
 def _with_negatives(words: list[str]) -> list[str]:
-    """Return a command line with negative numbers joined to the option before them: --from=-33.9,18.4."""
+    """Return a command line with each negative number joined to the option before it, as in --from=-33.9,18.4."""
     joined: list[str] = []
     for word in words:
         if _NEGATIVES.fullmatch(word) and joined and _OPTION.fullmatch(joined[-1]):
@@ -203,14 +210,14 @@ def _with_negatives(words: list[str]) -> list[str]:
 
 
 # ----------------------------------------------------------------------
-# Errors of the API name its keywords; on the command line they name the matching options.
+# Replace the API's keywords in errors by the matching options of the command line.
 
 # Keyword in the text of an error: `keyword` or keyword=True.
 _KEYWORD = re.compile(r"`(\w+)`|\b(\w+)=True\b")
 
 
 def error_text(error: PlanflyError, parser: CommandParser) -> str:
-    """Return the line of an error, with keywords of the API replaced by the options of a command.
+    """Return the text of an error, with keywords of the API replaced by the options of a command.
 
     >>> parser = CommandParser(prog="planfly replay")
     >>> _ = parser.add_argument("--from", dest="start")
@@ -221,7 +228,7 @@ def error_text(error: PlanflyError, parser: CommandParser) -> str:
     'a.gif: exists; --overwrite replaces it'
     """
     options, text = parser.keywords(), str(error)
-    # An error in a change made by a keyword has the keyword as its file; a real file may have the same name.
+    # An error in a scenario that a keyword changed has the keyword as its file.  A real file may have the same name.
     of_keyword = error.file in options and bool(error.field)
     begin = f"{error.file}: " if error.file and not of_keyword else ""
     head = error.file if of_keyword else error.argument

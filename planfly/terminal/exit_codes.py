@@ -1,11 +1,11 @@
-"""Exit codes and their meaning."""
+"""Define the exit codes and their meaning."""
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from planfly import Verdict
 
-# Text on the exit codes for the help.
+# Help text on the exit codes.
 EXIT_CODES = """\
 exit codes: 0 flyable, or flown as planned
             1 internal or system error
@@ -19,12 +19,12 @@ FAULT = 1
 BAD_INPUT = 2
 LOSS = 3
 NOT_FLYABLE = 4
-# Interrupted by Ctrl-C, in the convention of shells for signals: 128 plus the number of the signal.
+# Interrupted by Ctrl-C.  By the convention of shells, this is 128 plus the number of the signal.
 INTERRUPTED = 130
 
 
 def verdict_code(verdict: "Verdict") -> int:
-    """Return the exit code of a verdict: flyable, not flyable, or not judged in full."""
+    """Return the exit code for a verdict that is flyable, not flyable, or not judged in full."""
     if verdict.undecided:
         return LOSS
     return FLYABLE if verdict.flyable else NOT_FLYABLE

@@ -1,4 +1,4 @@
-"""Options shared by several commands, in the groups of their help, and the call of the API with them.
+"""Add options that several commands share, and call the API with them.
 
 The destination of an option is the matching keyword of the API, so that `call` passes it without further code.
 """
@@ -29,9 +29,10 @@ Returned = TypeVar("Returned")
 
 
 def call(function: Callable[..., Returned], args: argparse.Namespace, **more: Any) -> Returned:
-    """Call a function of the API with the options that match its keywords.
+    """Call a function of the API with the options that match its keywords, and return its result.
 
-    Options that were not given (None) leave the keyword at its default.  more: keywords that override the options.
+    Options that were not given (None) leave the keyword at its default.
+    more: keywords that override the options.
 
     >>> call(lambda *, seed=1, out="here": (seed, out), argparse.Namespace(seed=3, out=None, json=None))
     (3, 'here')
@@ -42,7 +43,7 @@ def call(function: Callable[..., Returned], args: argparse.Namespace, **more: An
 
 
 # ----------------------------------------------------------------------
-# Output files, and amount of printed text.
+# Options for output files, and for the amount of printed text.
 
 
 def result_options(
@@ -50,7 +51,9 @@ def result_options(
 ) -> None:
     """Add the options for output files and for the amount of printed text.
 
-    out: help of --out, "" for a command without it.  what: its placeholder.  junit: True if its answer is a verdict.
+    out: help text of --out, or "" for a command without this option.
+    what: placeholder for the value of --out.
+    junit: True if the answer of the command is a verdict.
     """
     group = parser.group("results")
     if out:
@@ -65,7 +68,7 @@ def result_options(
 
 
 def json_option(group: OptionTaker, command: str) -> None:
-    """Add the options for the answer as data, and for no printed text."""
+    """Add the options for an answer as JSON, and for no printed text."""
     group.add_argument(
         "--json",
         metavar="FILE",
@@ -78,11 +81,11 @@ def json_option(group: OptionTaker, command: str) -> None:
 
 
 # ----------------------------------------------------------------------
-# World of a flight, its aircraft and its autopilot.
+# Options for the world of a flight, its aircraft and its autopilot.
 
 
 def world_options(parser: CommandParser) -> OptionTaker:
-    """Add the options for the world that a mission is judged in, and return their group."""
+    """Add the options for the world in which a mission is judged, and return their group."""
     group = parser.group("where it flies")
     completed(
         group.add_argument(
@@ -198,12 +201,12 @@ def steering_options(parser: CommandParser) -> OptionTaker:
 
 
 def program_option(group: OptionTaker, does: str) -> None:
-    """Add the option for the program of an autopilot."""
+    """Add the option for the program of an autopilot.  does: help text."""
     group.add_argument("--sitl", metavar="PATH", help=does)
 
 
 def flight_options(parser: CommandParser) -> None:
-    """Add the options of a flight: aircraft, weather, autopilot, and its limits."""
+    """Add the options for a flight's aircraft, weather, autopilot and limits."""
     flown_by_options(parser)
     group = steering_options(parser)
     program_option(
@@ -277,7 +280,7 @@ def scenario_argument(parser: CommandParser, **settings: object) -> None:
 
 
 # ----------------------------------------------------------------------
-# Commands that talk to ground stations: their links, and how they are stopped.
+# Options for the links of commands that talk to ground stations, and the end of these commands.
 
 
 def own_link_options(parser: CommandParser, *, bind: str) -> None:
@@ -294,7 +297,7 @@ def own_link_options(parser: CommandParser, *, bind: str) -> None:
 
 @contextlib.contextmanager
 def stop_signals() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns True after SIGINT or SIGTERM, so that logs can be closed properly."""
+    """Yield a function that returns True after SIGINT or SIGTERM, which then do not interrupt the closing of logs."""
     asked = False
 
     def ask(_number: int, _frame: FrameType | None) -> None:
@@ -310,5 +313,5 @@ def stop_signals() -> Iterator[Callable[[], bool]]:
 
 
 def print_at_once(text: str) -> None:
-    """Print and flush a line of a long-running command."""
+    """Print a line of a long-running command, and flush the stream."""
     print(text, flush=True)

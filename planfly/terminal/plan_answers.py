@@ -100,7 +100,7 @@ def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
 
 
 def fewer_line(front: "Front") -> str:
-    """Return the reason why a front has fewer plans than requested."""
+    """Return a line with the reason why a front has fewer plans than requested."""
     from planner.search.plan_front import NOTICED, NOTICED_CLEARANCE, NOTICED_EXPOSURE
 
     share, seen, height = f"{NOTICED:.1%}", f"{NOTICED_EXPOSURE:.0%}", f"{NOTICED_CLEARANCE:g} m"
@@ -112,7 +112,7 @@ def fewer_line(front: "Front") -> str:
 
 
 def front_lines(front: "Front", folder: Path) -> list[str]:
-    """Return the lines of a front for the terminal: one for each plan, and the written files."""
+    """Return the lines of a front for the terminal, one for each plan, and then the written files."""
     from logs.verdict.conditions import autopilot_line, condition_lines
     from planfly.api.fronts import PICTURES
     from planfly.api.planning import conditions_of_plan

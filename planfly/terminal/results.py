@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 
 def print_verdict(verdict: "Verdict", notes: Iterable[str]) -> None:
-    """Print a verdict: the summary, the failed rules, then the finding closest to the limit of each rule."""
-    # Imported here: --help prints no verdict.
+    """Print the summary of a verdict, its failed rules, and then each rule's finding closest to its limit."""
+    # Imported here because --help does not need it.
     from planfly.terminal.verdict_lines import verdict_lines
 
     print("\n".join(verdict_lines(verdict, notes)))
@@ -32,7 +32,7 @@ def print_warnings(warnings: Iterable[str]) -> None:
 
 
 def warn_of_loss(log: "FlightLog") -> None:
-    """Print the loss of an incomplete log on standard error."""
+    """Print a warning on standard error that names the part missing from an incomplete log."""
     from planfly.flight_logs import loss_text
 
     print_warnings([loss_text(log)])

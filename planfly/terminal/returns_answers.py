@@ -238,8 +238,8 @@ def program_entry(found: ReturnsFound) -> ByProgram | None:
             at_s=round(one.law.time, 2),
             east_m=round(one.law.start[0], 1),
             north_m=round(one.law.start[1], 1),
-            law=_measured(one.law),
-            program=None if one.flown is None else _measured(one.flown),
+            law=_measured_return(one.law),
+            program=None if one.flown is None else _measured_return(one.flown),
             agrees=one.agrees,
             worse=one.worse,
             reason=one.reason,
@@ -250,13 +250,16 @@ def program_entry(found: ReturnsFound) -> ByProgram | None:
     return ByProgram(version=found.by_program.program, returns=entries)
 
 
-def _measured(one: ReturnFlown) -> MeasuredReturn:
+def _measured_return(one: ReturnFlown) -> MeasuredReturn:
     return MeasuredReturn(
-        kind=one.kind, target=one.target.name, clearance_m=_tenths(one.clearance), outside_m=_tenths(one.outside)
+        kind=one.kind,
+        target=one.target.name,
+        clearance_m=_round_to_tenths(one.clearance),
+        outside_m=_round_to_tenths(one.outside),
     )
 
 
-def _tenths(value: float) -> float | None:
+def _round_to_tenths(value: float) -> float | None:
     """Return a number rounded to tenths, or None if it is not finite."""
     return round(value, 1) if math.isfinite(value) else None
 
@@ -275,13 +278,13 @@ def glides_entry(found: ReturnsFound) -> GlidesEntry:
                 reach=one.reach,
                 site=group.site if group.site >= 0 else None,
                 least_at_s=round(one.time, 2),
-                left_m=_tenths(glides.spare(one)),
-                flat_east_m=_tenths(one.flat_at[0]),
-                flat_north_m=_tenths(one.flat_at[1]),
+                left_m=_round_to_tenths(glides.spare(one)),
+                flat_east_m=_round_to_tenths(one.flat_at[0]),
+                flat_north_m=_round_to_tenths(one.flat_at[1]),
                 own=one.own.end,
                 own_target=one.own.target.name,
-                own_over_m=_tenths(one.own.over),
-                own_short_m=_tenths(one.own.short),
+                own_over_m=_round_to_tenths(one.own.over),
+                own_short_m=_round_to_tenths(one.own.short),
                 text=glide_range_text(group, glides),
             )
         )
@@ -290,7 +293,7 @@ def glides_entry(found: ReturnsFound) -> GlidesEntry:
         not_judged=glides.not_judged,
         airspeed_mps=glides.airspeed,
         margin_m=MARGIN,
-        cell_m=_tenths(glides.cell),
+        cell_m=_round_to_tenths(glides.cell),
         sites=[
             GlideSiteEntry(kind=one.kind, number=one.number, east_m=round(one.east, 1), north_m=round(one.north, 1))
             for one in glides.sites
@@ -307,7 +310,7 @@ def glides_entry(found: ReturnsFound) -> GlidesEntry:
 
 def return_entry(found: ReturnsFound, group: ReturnRange) -> ReturnEntry:
     """Return the entry of a range of returns."""
-    one, scenario, number = group.worst, found.setup.scenario, _tenths
+    one, scenario, number = group.worst, found.setup.scenario, _round_to_tenths
 
     return ReturnEntry(
         first_s=round(group.first, 2),

@@ -1,4 +1,4 @@
-"""End a command on SIGINT or SIGTERM: in an orderly manner if it reacts in time, otherwise by force."""
+"""End a command on SIGINT or SIGTERM, in an orderly manner if it reacts in time, otherwise by force."""
 
 import contextlib
 import functools
@@ -17,10 +17,9 @@ from world.interruption import Interrupted, interrupt, remove_unfinished
 
 # Signals that end a command.
 ENDING = (signal.SIGINT, signal.SIGTERM)
-# Time from a signal to the forced end of the process if its command has not ended by itself, s, without the time that
-# the command waited for a processor.
+# Time from a signal until the process is ended by force, s, not counting the time that it waited for a processor.
 GRACE = 0.7
-# Longest time from a signal to the forced end of the process, with the time waited for a processor, s.
+# Maximum time from a signal until the process is ended by force, including the time waited for a processor, s.
 _MAX_GRACE_S = 10.0
 # Time for which the removal of files is retried, s.
 _REMOVAL_TIMEOUT_S = 0.5
@@ -32,13 +31,14 @@ _COMPILERS = ("numba", "llvmlite")
 
 @contextlib.contextmanager
 def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
-    """Raise `Interrupted` for SIGINT and SIGTERM, and end the process by force after another ``grace`` s.
+    """Raise `Interrupted` for SIGINT and SIGTERM, and end the process by force ``grace`` seconds after a signal.
 
-    Compiled code and compilers can keep Python's signal handlers waiting, and a wait for others can be long: a thread
-    then kills this process's children, removes its unfinished files and ends it with exit code 128 and the signal's
-    number.  It keeps watching after this block until the process has ended: use it for a program's outermost block.
+    Compiled code and compilers can delay Python's signal handlers, and waits for other processes can be long.  A thread
+    therefore kills this process's children, removes its unfinished files and ends it with exit code 128 plus the number
+    of the signal.  The thread keeps watching after this block until the process has ended, so use this block as the
+    outermost block of a program.
 
-    Yields the list that holds the number of a signal once it has arrived.
+    Yields a list to which the number of a signal is added when it arrives.
     """
     read, write = _signal_pipe()
     heard: list[int] = []
@@ -57,7 +57,7 @@ def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
         interrupt(number)
 
     def hear_again(lost: "sys.UnraisableHookArgs") -> None:
-        # The exception was raised in a callback of a library, which dropped it: raise the signal again a little later.
+        # The exception was raised in a callback of a library, which dropped it.  Raise the signal again a little later.
         nonlocal ended
         if isinstance(lost.exc_value, Interrupted):
             ended = False
@@ -65,9 +65,9 @@ def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
         else:
             sys.__unraisablehook__(lost)
 
-    watcher = threading.Thread(target=_watch, args=(read, heard, grace), name="signals", daemon=True)
+    watcher = threading.Thread(target=_end_process_after_signal, args=(read, heard, grace), name="signals", daemon=True)
     watcher.start()
-    # The C code of Python writes the number of the signal to the pipe at once, whatever the main thread does.
+    # Python's C code writes the number of the signal to the pipe at once, whatever the main thread is doing.
     signal.set_wakeup_fd(write, warn_on_full_buffer=False)
     for number in ENDING:
         signal.signal(number, hear)
@@ -75,15 +75,15 @@ def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
     try:
         yield heard
     finally:
-        # From here on a signal would only interrupt the end of the program.
+        # From now on, a signal would only interrupt the end of the program.
         ended = True
 
 
 def _called_by_compiled_code(frame: FrameType | None) -> bool:
-    """Return True if Numba runs here: it compiles, reads a cached kernel, or boxes a kernel's results.
+    """Return True if Numba is in the call stack, compiling, reading a cached kernel or boxing a kernel's results.
 
-    If an exception interrupts one of these, compiled code continues with a null pointer, and the process crashes.  A
-    result that is a named tuple is made by a module named after its class.
+    If an exception interrupts Numba, compiled code continues with a null pointer, and the process crashes.  A result
+    that is a named tuple is made by a module named after its class.
     """
     while frame is not None:
         module = str(frame.f_globals.get("__name__"))
@@ -94,12 +94,12 @@ def _called_by_compiled_code(frame: FrameType | None) -> bool:
 
 
 def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
-    """Return a function that reads signal numbers, and the non-blocking handle that Python writes them to."""
+    """Return a function that reads signal numbers, and the non-blocking handle to which Python writes them."""
     if hasattr(os, "set_blocking"):
         read, write = os.pipe()
         os.set_blocking(write, False)
         return functools.partial(os.read, read), write
-    # On Windows before Python 3.12 pipes always block; sockets need not.
+    # On Windows before Python 3.12 pipes always block, but sockets need not block.
     import socket
 
     receiver, sender = socket.socketpair()
@@ -107,22 +107,22 @@ def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
     return receiver.recv, sender.detach()
 
 
-def _watch(read: Callable[[int], bytes], heard: list[int], grace: float) -> None:
-    """Wait for the first signal, give the command its time to end, and end the process."""
+def _end_process_after_signal(read: Callable[[int], bytes], heard: list[int], grace: float) -> None:
+    """Wait for the first signal, append its number to `heard`, let the command end by itself, then end the process."""
     while (number := read(1)[0]) not in ENDING:
         pass
-    # The number is also added here, because a command may have its own handlers.
+    # Append the number here, too, because a command may have its own signal handlers.
     heard.append(number)
     begun, waited = time.monotonic(), _waited_for_processor()
     while (passed := time.monotonic() - begun) < _MAX_GRACE_S and passed - _waited_for_processor() + waited < grace:
         time.sleep(_RETRY_INTERVAL_S)
     with contextlib.suppress(OSError):
         os.write(2, b"planfly: interrupted\n")
-    _leave(128 + number)
+    _kill_children_and_exit(128 + number)
 
 
 def _waited_for_processor() -> float:
-    """Return the total time the main thread has waited for a processor, s; 0 on systems but Linux."""
+    """Return the total time for which the main thread has waited for a processor, s, or 0 if not on Linux."""
     try:
         return int(Path("/proc/self/schedstat").read_text(encoding="ascii").split()[1]) * 1e-9
     except (OSError, IndexError, ValueError):
@@ -134,11 +134,11 @@ def end_process(code: int) -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):
             stream.flush()
-    _leave(code)
+    _kill_children_and_exit(code)
 
 
-def _leave(code: int) -> NoReturn:
-    # Not imported here: without an earlier import there are no children, and an import could wait for another one.
+def _kill_children_and_exit(code: int) -> NoReturn:
+    # Do not import it: without an earlier import there are no children, and an import could wait for another import.
     multiprocessing = sys.modules.get("multiprocessing")
     until = time.monotonic() + _REMOVAL_TIMEOUT_S
     killed = set[int]()
@@ -146,7 +146,7 @@ def _leave(code: int) -> NoReturn:
         for child in multiprocessing.active_children() if multiprocessing is not None else ():
             child.kill()
             killed.add(child.pid)
-        # A killed child may still complete a file it was making, so its folder may be impossible to remove at first.
+        # A killed child may still complete a file that it was writing, so removing its folder may fail at first.
         if all([remove_unfinished(), *map(remove_temporary_folders, killed)]) or time.monotonic() > until:
             os._exit(code)
         time.sleep(_RETRY_INTERVAL_S)

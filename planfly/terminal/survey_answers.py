@@ -99,7 +99,7 @@ class SurveyAnswer:
 
 
 def photo_line_entry(setup: FlightSetup, line: PhotoLine, one: LineMeasure | None) -> PhotoLineEntry:
-    """Return the entry of a photo line."""
+    """Return the entry of a photo line, with the measures of the flown line, or None if it was not flown."""
     first, last = (int(setup.route.items[i]) for i in (line.first, line.last))
 
     def share(value: float | None) -> float | None:

@@ -1,4 +1,4 @@
-"""Answer of `planfly check` with ``--json``: `VerdictDocument`, or one for each of several autopilots."""
+"""Answer of `planfly check` with ``--json``, one `VerdictDocument`, or one for each of several autopilots."""
 
 from typing import Literal
 

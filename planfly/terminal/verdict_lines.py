@@ -1,4 +1,4 @@
-"""Lines of a verdict for a terminal."""
+"""Format a verdict as lines for a terminal."""
 
 from collections.abc import Iterable
 
@@ -8,32 +8,32 @@ from logs.verdict.rule_words import RULE_WORDS, rule_word
 from logs.verdict.verdict import Verdict
 from planfly.terminal.command_parser import STATE_STYLES, coloured
 
-# Number of failed findings of a rule that are named after the worst one.
+# Maximum number of failed findings of a rule that are listed after the worst finding.
 _LISTED = 6
-# Sources of a limit that are named after it; any other limit is a check of planfly's own.
+# Sources of a limit that are named after the limit; limits from other sources are planfly's own.
 _LIMIT_SOURCES = ("scenario", "near the field", "aircraft", "autopilot", "mission")
 # Width of the column of rules, characters.
 _TITLES = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 
 
 def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
-    """Return the summary, the failures, the closest finding of each rule, and notes, in colour if wanted."""
+    """Return the summary, the failures, each rule's finding closest to its limit, and notes, coloured on a terminal."""
     shown = verdict.present()
     lines = [coloured(shown.headline, STATE_STYLES[shown.state]), *shown.details]
     for rule in shown.failed_rules:
         lines += _failed_lines(rule)
     lines += [f"  open    {rule_word(one.rule)} at {one.where}: {one.reason}" for one in shown.undecided[: 2 * _LISTED]]
-    # One flight decides all findings with the same suggestion.
+    # One flight would decide all findings with the same suggestion.
     deciding_flights = dict.fromkeys(one.suggestion for one in shown.undecided if one.suggestions)
     lines += [coloured("          would tell: ", "hint") + text for text in deciding_flights]
     for rule in shown.rules:
         count = f"{shown.zones:,} zones; " if rule.words.name == "fence" and shown.zones > 1 else ""
-        lines.append(f"  {rule.words.title:<{_TITLES}}{count}{_state(rule)}")
+        lines.append(f"  {rule.words.title:<{_TITLES}}{count}{_rule_summary(rule)}")
     return [*lines, *(f"  note    {note}" for note in notes)]
 
 
 def _failed_lines(rule: RuleFindings) -> list[str]:
-    """Describe the worst failed finding of a rule, with the suggested change, and name the other places."""
+    """Describe the worst failed finding of a rule with its suggested change, and list the other places."""
     worst, *others = rule.failed
     noun = rule.words.word
     where = f"{noun}, {len(rule.failed)} of {rule.judged}; the worst at" if others else f"{noun} at"
@@ -52,8 +52,8 @@ def _place_and_value(finding: Finding) -> str:
     return finding.where + (f" ({value})" if value else "")
 
 
-def _state(rule: RuleFindings) -> str:
-    """Count the findings of a rule that pass, and describe the finding closest to its limit."""
+def _rule_summary(rule: RuleFindings) -> str:
+    """Count the findings of a rule, and describe the finding closest to its limit."""
     if not rule.judged:
         return f"{'warning' if rule.words.warns else 'not judged'}: {rule.findings[0].reason}"
     closest, margin = rule.closest, rule.words.margin

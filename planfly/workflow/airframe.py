@@ -1,4 +1,4 @@
-"""Aircraft of a scenario and its limits, as a plan needs them, without simulation and logs."""
+"""Load a scenario's aircraft, limits and autopilot for planning, without simulation or logs."""
 
 import math
 from collections.abc import Mapping
@@ -23,10 +23,10 @@ from world.scenario import Scenario
 class Airframe:
     """Aircraft of a scenario, loaded once for planning, flying and judging.
 
-    aircraft: its entry in the catalog.
-    limits: of scenario and aircraft together; they hold the envelope.
+    aircraft: the aircraft's entry in the catalog.
+    limits: limits that scenario and aircraft set together, including the envelope.
     battery: energy carried, Wh.
-    autopilot: the autopilot that flies it, with its settings.
+    autopilot: the autopilot that flies the aircraft, with its settings.
     """
 
     aircraft: Aircraft
@@ -36,19 +36,19 @@ class Airframe:
 
     @property
     def airspeed(self) -> float:
-        """Airspeed until a mission sets another, m/s."""
+        """Initial cruise airspeed, until a mission sets another airspeed, m/s."""
         return self.limits.airspeed
 
     @property
     def max_bank(self) -> float:
-        """Steepest bank in turns, rad."""
+        """Maximum bank angle in turns, rad."""
         return self.limits.max_bank
 
 
 def laid_from_the_ground(plan: Plan, airframe: Airframe, flown: Plan | None = None) -> Plan:
     """Return a plan with the departure and approach that its scenario requires, if any.
 
-    flown: the plan being flown, whose departure stays.
+    flown: the plan being flown, whose departure is kept; None for a new plan.
 
     >>> import numpy as np
     >>> from planner.plan import Certificate
@@ -70,18 +70,18 @@ def laid_from_the_ground(plan: Plan, airframe: Airframe, flown: Plan | None = No
 
 
 def choose_seed(scenario: Scenario, seed: int | None) -> int:
-    """Return the requested seed, else the seed of the scenario, else 1."""
+    """Return the requested seed; if it is None, the scenario's seed, or 1 if the scenario has none."""
     if seed is not None:
         return seed
     return scenario.planner.seed if scenario.planner.seed is not None else 1
 
 
 def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = None) -> Airframe:
-    """Return the scenario's aircraft, its envelope, and the limits that both set.
+    """Load the scenario's aircraft, its envelope and autopilot, and the limits that scenario and aircraft set.
 
-    parameters: of its autopilot, by the autopilot's names and in its units, instead of the parameters in its file.
+    parameters: autopilot parameters that replace those of its file, by the autopilot's names and in its units.
     Raises ScenarioError for an unknown aircraft or autopilot, or a speed that the aircraft cannot fly, and
-    ParameterError for a bad file of an autopilot's parameters, or values that are not allowed.
+    ParameterError for an unreadable parameter file, or values that are not allowed.
 
     >>> from world.scenario import load_scenario
     >>> airframe = load_airframe(load_scenario("tight"))
@@ -92,7 +92,7 @@ def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = N
     aircraft, battery = find_airframe(scenario)
     autopilot = load_autopilot(scenario, aircraft)
     if parameters:
-        # Stored parameters of a log are checked like a file.
+        # Parameters stored in a log are checked like those of a file.
         autopilot = autopilot.restore(autopilot.with_parameters(**parameters).store())
     airspeed = cruise_airspeed(scenario, aircraft, autopilot)
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
@@ -101,7 +101,7 @@ def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = N
 
 
 def airframe_of(setup: FlightSetup) -> Airframe:
-    """Return the airframe that a setup was made with.  Raises FlightError if the aircraft is missing.
+    """Return the airframe that a setup was made with.  Raises FlightError if the catalog lacks the aircraft.
 
     >>> from logs.recording.example_log import example_log
     >>> airframe_of(example_log().setup).aircraft.name
@@ -117,7 +117,7 @@ def bank_limit(scenario: Scenario, autopilot: Autopilot) -> float:
 
 
 def with_tracking(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> Limits:
-    """Return limits with room for the tracking error of an autopilot in a scenario."""
+    """Return limits that allow for the tracking error of an autopilot in a scenario."""
     table = scenario.flight
     tracking = autopilot.tracking_error(
         limits.airspeed, table.steering.nav, fly_over=table.fly_over, turbulence=scenario.wind.turbulence
@@ -126,7 +126,7 @@ def with_tracking(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> L
 
 
 def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
-    """Return the aircraft of a scenario and its energy, Wh; raise ScenarioError for an unknown aircraft.
+    """Return the aircraft of a scenario and the energy it carries, Wh.  Raises ScenarioError for an unknown aircraft.
 
     >>> from world.scenario import load_scenario
     >>> find_airframe(load_scenario("tight"))[0].name
@@ -160,14 +160,14 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
 
 
 def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:
-    """Return an airframe with the limits and the bank of a scenario that otherwise has the same aircraft."""
+    """Return an airframe with the limits and the maximum bank of a tightened scenario for the same aircraft."""
     old = airframe.limits
     limits = make_limits(scenario, old.envelope, old.airspeed, bank_limit(scenario, airframe.autopilot))
     return replace(airframe, limits=replace(limits, tracking=old.tracking))
 
 
 def check_level_flight(aircraft: Aircraft, envelope: Envelope) -> None:
-    """Raise FlightError for an aircraft that holds level flight at no airspeed and no altitude of its envelope."""
+    """Raise FlightError if the aircraft cannot fly level at any airspeed and altitude of its envelope."""
     if not np.isfinite(envelope.level_speed_max - envelope.level_speed_min).any():
         amsl = f"{envelope.amsl[0]:.0f} to {envelope.amsl[-1]:.0f} m above sea level"
         message = f"{aircraft.name} holds no level flight at any airspeed, from {amsl}"

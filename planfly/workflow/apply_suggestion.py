@@ -1,7 +1,7 @@
-"""Application of a suggestion of a failed finding to the items of the mission.
+"""Apply a suggestion of a failed finding to the items of the mission.
 
-A suggestion states a change of the path; this module decides which items move for it: the fewest, by the least distance
-that the finding requires.  Suggestions about the aircraft, such as a larger battery, change no mission.
+A suggestion states a change of the path.  This module chooses the items to move, as few as possible and by the minimum
+distance that the finding requires.  Suggestions about the aircraft, such as a larger battery, change no mission.
 """
 
 import math
@@ -23,14 +23,14 @@ from world.geometry import leg_courses, signed_turns
 
 # Direction east and north of a change to a side.
 _SIDES = {"north": (0.0, 1.0), "east": (1.0, 0.0), "south": (0.0, -1.0), "west": (-1.0, 0.0)}
-# Steps in which a turn is made gentler, as fractions of the distance to the straight line.
+# Number of steps from a corner to the straight line in which a turn is made gentler.
 _TURN_STEPS = 40
 # Distance beyond a sphere's edge at which a step aims, m, as in the planner: the navigation error may be a third of it.
 _SPHERE_MARGIN_M = 15.0
 
 
 def can_apply(suggestion: Suggestion) -> bool:
-    """Return True if all of a suggestion is a change of the items of a mission.
+    """Return True if every change of a suggestion can be made by moving items of a mission.
 
     >>> from logs.verdict.places import FLIGHT, Place
     >>> can_apply((Change("length", Place("leg", 1), 300.0, 400.0, "m"),))
@@ -69,17 +69,17 @@ class _MovableMission:
         self.requirements, self.most, self.changed = judged.requirements, most, False
 
     def index_of(self, waypoint: int) -> int | None:
-        """Return the index in the mission's list of the item of a waypoint; None if there is none."""
+        """Return the index in the mission's list of the item of a waypoint, or None if no item has it."""
         seq = int(self.route.items[waypoint])
         own = [k for k in places(self.mission) if self.mission.items[k].seq == seq]
         return own[0] if own else None
 
     def points(self) -> Floats:
-        """Return the waypoints of the route, (w, 3) m, before the change."""
+        """Return the waypoints of the route before the change, (w, 3), m."""
         return np.asarray(self.route.waypoints)
 
     def shift(self, waypoints: Sequence[int], by: Floats) -> None:
-        """Move the items of waypoints, each once, by metres east, north and up; landings stay."""
+        """Move the items of waypoints, each once, but no landings.  by: east, north and up, m."""
         for index in dict.fromkeys(self.index_of(one) for one in waypoints):
             if index is None or self.mission.items[index].command in LANDINGS:
                 continue
@@ -91,7 +91,7 @@ class _MovableMission:
             self.mission, self.changed = self.context.retuned(self.mission, index), True
 
     def ends_of(self, legs: Sequence[int]) -> list[int]:
-        """Return the waypoints at the ends of legs; the ends of the route only if there are no others."""
+        """Return the waypoints at the ends of legs, without the ends of the route unless there are only these."""
         ends = sorted({end for leg in legs for end in (leg, leg + 1)})
         inner = [end for end in ends if 0 < end < self.route.legs]
         return inner or ends
@@ -104,7 +104,7 @@ def _leg_of_change(change: Change, route: Route) -> int:
 
 
 def _lengthen_leg(sheet: _MovableMission, change: Change, _item: Finding) -> None:
-    """Lengthen a leg: the rest of the route moves along its course, so that no other leg changes."""
+    """Lengthen a leg by moving the rest of the route along the leg's course, so that no other leg changes."""
     leg = _leg_of_change(change, sheet.route)
     course = float(leg_courses(sheet.points())[leg])
     grow = change.wanted - (change.current or 0.0)
@@ -113,7 +113,7 @@ def _lengthen_leg(sheet: _MovableMission, change: Change, _item: Finding) -> Non
 
 
 def _reduce_rise(sheet: _MovableMission, change: Change, _item: Finding) -> None:
-    """Reduce the climb or descent of a leg: an inner end moves, or both ends by half."""
+    """Reduce the climb or descent of a leg by moving both ends by half, or one end if the other ends the route."""
     leg, points = _leg_of_change(change, sheet.route), sheet.points()
     excess = float(points[leg + 1, 2] - points[leg, 2]) - change.wanted
     first, last = leg == 0, leg + 1 == sheet.route.legs
@@ -139,7 +139,7 @@ def _set_airspeed(sheet: _MovableMission, change: Change, _item: Finding) -> Non
 
 
 def _make_turn_gentler(sheet: _MovableMission, change: Change, _item: Finding) -> None:
-    """Make a turn gentler: the waypoint moves towards the line between its neighbours."""
+    """Make a turn gentler by moving the waypoint towards the line between its neighbours."""
     points, i = sheet.points(), change.place.index
     if i is None or not 0 < i < sheet.route.legs:
         return
@@ -158,7 +158,7 @@ def _make_turn_gentler(sheet: _MovableMission, change: Change, _item: Finding) -
 
 
 def _change_altitude(sheet: _MovableMission, change: Change, item: Finding) -> None:
-    """Raise or lower a leg, or the path at a zone, by a step."""
+    """Raise or lower a leg, or the legs that violate a zone, by a step."""
     up = change.wanted if change.what == "height" else -change.wanted
     legs = (
         [_leg_of_change(change, sheet.route)] if change.place.kind == "leg" else violated_legs(sheet.requirements, item)

@@ -1,4 +1,4 @@
-"""Flight log that survives an interruption: the file is complete up to that moment, or is removed."""
+"""Write a flight log that survives an interruption; the file is complete up to that moment, or is removed."""
 
 import contextlib
 import os
@@ -19,14 +19,15 @@ from world.geometry import leg_runs
 from world.interruption import uninterrupted
 
 # ----------------------------------------------------------------------
-# Limits on the duration of a simulated flight and on the size of its log, with a prediction of the duration.
+# Limit the duration of a simulated flight and the size of its log, and predict the duration.
 
 
 @dataclass(frozen=True, slots=True)
 class FlightLimits:
-    """Limits at which a flight is ended.
+    """Limits of simulated time and log size, at which a flight is ended.
 
-    hours: simulated time.  megabytes: size of its log, 10^6 bytes.
+    hours: maximum simulated time, h.
+    megabytes: maximum size of the log, 10^6 bytes.
 
     >>> FlightLimits(megabytes=20.0).log_full(20_000_001)
     'log limit: 20 MB are written; --max-log raises it'
@@ -36,18 +37,18 @@ class FlightLimits:
     megabytes: float = MAX_MEGABYTES
 
     def max_ticks(self, dt: float) -> int:
-        """Return the greatest number of guidance ticks of dt s."""
+        """Return the maximum number of guidance ticks of dt seconds each."""
         return round(3600.0 * self.hours / dt)
 
     def log_full(self, size: int) -> str:
-        """Return the reason to end a flight whose log has this size in bytes; "" if it may go on."""
+        """Return the reason to end a flight whose log has this size in bytes, or "" if the flight may continue."""
         if size <= 1e6 * self.megabytes:
             return ""
         return f"log limit: {self.megabytes:g} MB are written; --max-log raises it"
 
 
 def predicted_seconds(setup: FlightSetup) -> float:
-    """Return the time that the path of a setup takes at the airspeeds of its legs in still air, s.
+    """Predict the duration of a setup's flight in still air, at the airspeed of each leg, s.
 
     >>> from logs.recording.example_log import example_log
     >>> flown = example_log()
@@ -60,7 +61,7 @@ def predicted_seconds(setup: FlightSetup) -> float:
 
 
 def flight_text(setup: FlightSetup) -> str:
-    """Describe the flight ahead: its length and its predicted time."""
+    """Describe the length and the predicted duration of a flight."""
     seconds = predicted_seconds(setup)
     time = f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
     if seconds >= 2.0 * 3600.0:
@@ -69,19 +70,19 @@ def flight_text(setup: FlightSetup) -> str:
 
 
 def flight_kind(setup: FlightSetup) -> str:
-    """Return the autopilot as the kind of a flight: flights of one kind take a similar time per kilometre."""
+    """Return the kind of a flight, which names its autopilot; flights of one kind take a similar time per kilometre."""
     return f"flying by {setup.autopilot.name}"
 
 
-# Ending of a flight that was still under way.
+# Reason for the end of a flight that was interrupted.
 INTERRUPTED = "interrupted"
 
 
 class CrashSafeLog:
     """Context manager around `Recorder` that leaves a valid log wherever Ctrl-C interrupts the flight.
 
-    The log of an interrupted flight ends with the last row flown and holds no verdict, which `planfly check` gives; a
-    log without a row is removed.  An error leaves the log unfinished, as `Recorder` does.
+    The log of an interrupted flight ends with the last row flown and has no verdict; `planfly check` can judge it.  A
+    log without a row is removed.  After an error the log stays unfinished, as with `Recorder`.
 
     >>> import tempfile
     >>> from logs.recording.example_log import example_log
@@ -106,12 +107,12 @@ class CrashSafeLog:
         self._rows = 0
         self._is_open = False
         self._locks = contextlib.ExitStack()
-        # Do not remove a symbolic link, even if it leads nowhere.
+        # Do not remove a symbolic link, even if its target does not exist.
         existed = path.exists() or path.is_symlink()
         try:
             with uninterrupted(), self._errors_with_file_name():
                 path.touch()
-                # Take the lock before the file is emptied: a log held by another process stays as it is.
+                # Take the lock before the file is emptied, so that a log locked by another process is not changed.
                 self._locks.enter_context(hold(path))
                 self._recorder = Recorder(path, setup, every=every, batch=batch)
                 self._is_open = True
@@ -153,24 +154,24 @@ class CrashSafeLog:
 
     @property
     def size(self) -> int:
-        """Present size of the file, bytes."""
+        """Current size of the file, bytes."""
         return self._recorder.size
 
     def event(self, time: float, text: str, level: str) -> None:
-        """Record an event; arguments as for `Recorder.event`."""
+        """Record an event, with the arguments of `Recorder.event`."""
         self._recorder.event(time, text, level)
 
     def finish(
         self, ended: str, verdict: Verdict, reference: ReferenceFlights | None, returns: DrawnReturns | None = None
     ) -> None:
-        """Close the log of a flight that has been judged."""
+        """Write the results of a judged flight, and close the log."""
         with uninterrupted(), self._errors_with_file_name():
             self._recorder.finish(ended, verdict, reference, returns)
             self._is_open = False
 
     @contextlib.contextmanager
     def _errors_with_file_name(self) -> Iterator[None]:
-        """Add the file name to the error of a full disk."""
+        """Add the file name to an OSError without one, such as the error of a full disk."""
         try:
             yield
         except OSError as error:

@@ -1,4 +1,4 @@
-"""Folder of an aircraft made from a data sheet: model, metadata, gains, parameters, uncertainty."""
+"""Make an aircraft's folder from a data sheet: model, metadata, gains, parameters, uncertainty."""
 
 import math
 import re
@@ -41,9 +41,9 @@ from world.errors import FlightError
 from world.files import temporary_folder
 
 # ----------------------------------------------------------------------
-# A file of ArduPlane parameters contains measured values where it differs from the defaults of ArduPlane.
+# Values in an ArduPlane parameter file that differ from the defaults of ArduPlane are measured values.
 
-# Parameters that are used; speeds are equivalent airspeeds, and taken for the airspeeds of the sheet.
+# Parameters that are used.  Speeds are equivalent airspeeds, and are used as the airspeeds of the sheet.
 _USED_PARAMETERS = (
     *("AIRSPEED_CRUISE", "AIRSPEED_MIN", "AIRSPEED_MAX", "TRIM_THROTTLE"),
     *("TECS_CLMB_MAX", "TECS_SINK_MIN", "ROLL_LIMIT_DEG"),
@@ -53,7 +53,7 @@ _MIN_AIRSPEED_STALL_RATIO = 1.2
 
 
 def stated_parameters(file: Path) -> dict[str, float]:
-    """Return the parameters of a file that describe the aircraft, by present name, where not the default.
+    """Return the parameters of a file that describe the aircraft and differ from their defaults, by current name.
 
     Raises ParameterError for a file that cannot be read.
     """
@@ -97,13 +97,13 @@ def with_parameters(sheet: DataSheet, stated: Mapping[str, float]) -> DataSheet:
 
 
 # ----------------------------------------------------------------------
-# Data sheet from user input: degrees, inches, volts and ampere hours.
+# Make a data sheet from user input in degrees, inches, volts and ampere hours.
 
 # Length of an inch, m.
 _METERS_PER_INCH = 0.0254
-# Voltage and capacity of a battery, as in 14.8V,5Ah.
+# Voltage and capacity of a battery, such as 14.8V,5Ah.
 _BATTERY_PATTERN = re.compile(r"([0-9.]+)\s*V\s*,\s*([0-9.]+)\s*(Ah|Wh|mAh)", re.IGNORECASE)
-# Diameter and pitch of a propeller, inches, as in 12x6.
+# Diameter and pitch of a propeller in inches, such as 12x6.
 _PROPELLER_PATTERN = re.compile(r"([0-9.]+)\s*[xX]\s*([0-9.]+)")
 # Accepted battery voltages, V.
 _VOLTAGE_RANGE_V = (3.0, 60.0)
@@ -116,9 +116,9 @@ _DIAMETER_IN = (3.0, 40.0)
 def parse_sheet(
     numbers: Mapping[str, float | None], *, battery: str | None, prop: str | None, layout: str | None
 ) -> DataSheet:
-    """Make a sheet from options, angles in degrees.
+    """Make a data sheet from command-line options, with angles in degrees.
 
-    Raises FlightError, in one line, for input that cannot be read.
+    Raises FlightError with a one-line message for input that cannot be read.
 
     >>> sheet = parse_sheet({"mass": 2.1, "climb": 10.0}, battery="14.8V,5Ah", prop="12x6", layout="wing")
     >>> round(sheet.climb, 4), sheet.volts, round(sheet.energy / 3600.0), round(sheet.propeller[0], 4)
@@ -133,8 +133,8 @@ def parse_sheet(
             allowed = f"allowed {low:g}..{high:g} {unit}"
             raise FlightError.of_argument(name, value, allowed, shown=f"{value} {unit}")
         values[name] = value * factor
-    volts, energy = _read_battery(battery) if battery is not None else (0.0, 0.0)
-    propeller = _read_propeller(prop) if prop is not None else (0.0, 0.0)
+    volts, energy = _parse_battery(battery) if battery is not None else (0.0, 0.0)
+    propeller = _parse_propeller(prop) if prop is not None else (0.0, 0.0)
     kinds: dict[str, Layout] = {"tail": "tail", "wing": "wing", "vtail": "vtail"}
     if layout is not None and layout not in kinds:
         raise FlightError.of_argument("layout", layout, f"{', '.join(kinds)} is expected")
@@ -142,9 +142,9 @@ def parse_sheet(
     return DataSheet(**known, volts=volts, energy=energy, propeller=propeller, layout=kinds[layout or "tail"])
 
 
-def _read_battery(text: str) -> tuple[float, float]:
+def _parse_battery(text: str) -> tuple[float, float]:
     match = _BATTERY_PATTERN.fullmatch(text.strip())
-    volts, amount = (_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
+    volts, amount = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     unit = match[3].lower() if match else ""
     hours = amount if unit == "wh" else volts * amount * (0.001 if unit == "mah" else 1.0)
     if not (
@@ -158,9 +158,9 @@ def _read_battery(text: str) -> tuple[float, float]:
     return volts, 3600.0 * hours
 
 
-def _read_propeller(text: str) -> tuple[float, float]:
+def _parse_propeller(text: str) -> tuple[float, float]:
     match = _PROPELLER_PATTERN.fullmatch(text.strip())
-    diameter, pitch = (_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
+    diameter, pitch = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     if not (_DIAMETER_IN[0] <= diameter <= _DIAMETER_IN[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
         allowed = (
             f"inches of diameter and pitch are expected, such as 12x6: {_DIAMETER_IN[0]:g}..{_DIAMETER_IN[1]:g},"
@@ -170,7 +170,7 @@ def _read_propeller(text: str) -> tuple[float, float]:
     return diameter * _METERS_PER_INCH, pitch * _METERS_PER_INCH
 
 
-def _number(text: str) -> float:
+def _parse_number(text: str) -> float:
     try:
         return float(text)
     except ValueError:
@@ -178,9 +178,9 @@ def _number(text: str) -> float:
 
 
 # ----------------------------------------------------------------------
-# Uncertainty: standard deviations of the factors of the model.
+# Estimate the standard deviations of the model's factors.
 
-# Standard deviation of each guessed factor, as a fraction, with its reason.
+# Standard deviation of each guessed factor, as a fraction, and what the guess is based on.
 _SPREADS = {
     "zero-lift-drag": (0.25, "least drag from published aircraft of the class"),
     "induced-drag": (0.20, "span efficiency from published aircraft of the class"),
@@ -194,22 +194,23 @@ _SPREADS = {
     "roll-damping": (0.20, "roll damping from published aircraft of the class"),
     "aileron-power": (0.20, "ailerons from published aircraft of the class"),
 }
-# Standard deviation of a guessed steepest climb, rad.  Measured on three aircraft of known truth, a scaled model was
-# off by 4.8 degrees on average (docs/measured.md); of a normal distribution that is sqrt(2 / pi) = 0.8 of the
-# deviation.
+# Standard deviation of a guessed steepest climb, rad.  For three aircraft whose true values are known, a scaled model
+# was wrong by 4.8 degrees on average (docs/measured.md); the mean absolute error of a normal distribution is
+# sqrt(2 / pi) = 0.8 of the standard deviation.
 GUESSED_CLIMB = math.radians(6.0)
 # Standard deviation of a stated steepest climb, rad.
 STATED_CLIMB = math.radians(3.0)
-# Standard deviation of the zero-lift drag if a sink without power is stated, as a fraction.
+# Standard deviation of the zero-lift drag if the sheet states the power-off sink rate, as a fraction.
 STATED_DRAG = 0.15
 # Factors of the motor and the propeller.
 _PROPULSION = ("thrust", "motor-speed")
 
 
 def _uncertainty(made: SizedAircraft, aircraft: Aircraft, flown: "Performance", climb: float) -> Uncertainty:
-    """Return standard deviations that give the steepest climb at least the deviation `climb` (rad).
+    """Return standard deviations of the factors that give the steepest climb at least the deviation `climb`.
 
-    flown: performance of the aircraft as estimated.
+    flown: performance of the estimated aircraft.
+    climb: standard deviation of the steepest climb angle, rad.
     """
     middle = np.array([flown.climb.climb, flown.idle.climb, flown.fastest.airspeed])
     spreads = {name: sd for name, (sd, _) in _SPREADS.items()}
@@ -223,22 +224,22 @@ def _uncertainty(made: SizedAircraft, aircraft: Aircraft, flown: "Performance", 
     spreads |= {name: share * spreads[name] for name in _PROPULSION}
     descent = math.hypot(*(change for _, change, _ in moved.values()))
     faster = math.hypot(*(change * (share if name in _PROPULSION else 1.0) for name, (*_, change) in moved.items()))
-    # The sheet states level flight at cruise speed, which limits the deviation.
+    # The sheet states that the aircraft flies level at cruise speed; this limits the deviation of the top speed.
     faster = min(faster, max(0.0, flown.fastest.airspeed - aircraft.airspeed) / UNDECIDED)
     quantities = tuple(
         UncertainQuantity(f"ident/{name}", "factor", 1.0, sd, _SPREADS[name][1]) for name, sd in spreads.items()
     )
-    # The factors of motor and propeller are limited; the deviation of the climb does not shrink with them.
+    # The factors of motor and propeller are limited, but the deviation of the climb must not shrink with them.
     deviation = max(climb, math.hypot(other, share * driven))
     guessed = "energy" in made.guessed
     return Uncertainty("a data sheet", deviation, descent, quantities, POWER_SD, guessed, faster)
 
 
 def _effect_of_factor(aircraft: Aircraft, middle: Floats, name: str, sd: float) -> tuple[float, float, float]:
-    """Return the effect of one deviation of a factor on climb and descent, rad, and top speed, m/s.
+    """Return how one standard deviation of a factor changes climb and descent, rad, and top speed, m/s.
 
-    Climb and descent are the steepest at cruise speed.
-    middle: (3,) both path angles and the fastest level flight of the aircraft as estimated.
+    Climb and descent are the steepest path angles at cruise speed.
+    middle: climb angle, descent angle and maximum level airspeed of the estimated aircraft, (3,).
     """
     found = []
     for sign in (1.0, -1.0):
@@ -256,10 +257,13 @@ def _effect_of_factor(aircraft: Aircraft, middle: Floats, name: str, sd: float) 
 
 
 def change_of(more: Floats, less: Floats, middle: Floats) -> Floats:
-    """Return the change (n,) of path angles and speeds by a factor, from values with more and less of it.
+    """Return how a factor changes path angles and speeds, (n,).
 
-    A value is NaN if the aircraft does not trim: the change to the other value applies then, and the whole value if
-    both are NaN.  middle: (n,) as estimated.
+    A value is NaN if the aircraft cannot be trimmed.  Then the change to the other value applies; if both are NaN, the
+    estimated value itself applies.
+
+    more, less: values with the factor increased and decreased, (n,).
+    middle: estimated values, (n,).
 
     >>> more, less = np.array([0.3, math.nan, math.nan]), np.array([0.1, 0.05, math.nan])
     >>> change_of(more, less, np.array([0.2, 0.2, -0.2])).round(2).tolist()
@@ -272,19 +276,19 @@ def change_of(more: Floats, less: Floats, middle: Floats) -> Floats:
 
 
 # ----------------------------------------------------------------------
-# The folder.
+# Write the folder.
 
-# Least airspeed that guidance may use, as a ratio to the stall speed.
+# Minimum airspeed that guidance may use, as a ratio to the stall speed.
 MIN_SPEED = 1.12
-# Largest airspeed that guidance may use, as a ratio to the fastest level flight.
+# Maximum airspeed that guidance may use, as a ratio to the maximum level airspeed.
 MAX_SPEED = 0.95
-# Largest pitch angle of a new aircraft, degrees.
+# Maximum pitch angle of a new aircraft, degrees.
 _MAX_PITCH_DEG = 25.0
 
 
 @dataclass(frozen=True, slots=True)
 class Performance:
-    """Trims of the model at cruise speed and `AMSL`, and its slowest and fastest level flight."""
+    """Trim points of the model at altitude `AMSL`: at cruise speed, and in its slowest and fastest level flight."""
 
     level: Trim
     climb: Trim
@@ -330,20 +334,24 @@ def _require_numbers(sheet: DataSheet) -> None:
 
 
 def _make_files(made: SizedAircraft, name: str, place: Path, stated: Mapping[str, float]) -> dict[str, str]:
-    """Return the files of the folder, computed with a draft of it."""
+    """Return the text of each file of the folder, by file name.
+
+    place: temporary folder for a draft of the aircraft, which trims and gains are computed from.
+    """
     draft = place / name
     draft.mkdir()
     model = model_xml(name, made.numbers)
     (draft / f"{name}.xml").write_text(model, encoding="utf-8")
     sheet = made.sheet
-    (draft / f"{name}.toml").write_text(_metadata(made, sheet.stall, sheet.stall, sheet.top), encoding="utf-8")
+    (draft / f"{name}.toml").write_text(_metadata_text(made, sheet.stall, sheet.stall, sheet.top), encoding="utf-8")
     aircraft = read_aircraft(draft)
     flown = performance_of(Fdm(aircraft, tried=True), aircraft)
-    # The propeller carries a little at the stall; the stall speed of the sheet applies if the model could fly slower.
+    # At the stall the propeller carries part of the weight.  If the model could fly slower, the sheet's stall speed
+    # applies.
     slow = max(sheet.stall, math.ceil(10.0 * flown.slowest.airspeed * math.sqrt(SHEET_DENSITY / SEA_LEVEL)) / 10.0)
     least = min(max(slow, MIN_SPEED * slow), sheet.cruise)
     most = max(sheet.cruise, MAX_SPEED * flown.fastest.airspeed)
-    metadata = _metadata(made, slow, round(least, 1), math.floor(10.0 * most) / 10.0)
+    metadata = _metadata_text(made, slow, round(least, 1), math.floor(10.0 * most) / 10.0)
     (draft / f"{name}.toml").write_text(metadata, encoding="utf-8")
     aircraft = read_aircraft(draft)
     fdm = Fdm(aircraft, tried=True)
@@ -357,12 +365,12 @@ def _make_files(made: SizedAircraft, name: str, place: Path, stated: Mapping[str
         "ardupilot.toml": servo_text(aircraft, flown),
         "uncertainty.toml": uncertainty_text(known),
         DRAWS_FILE: draws_text(draw_quantities(known.quantities)),
-        "README.md": _readme(name, made, flown, known, stated),
+        "README.md": _readme_text(name, made, flown, known, stated),
     }
 
 
 def performance_of(fdm: Simulator, aircraft: Aircraft) -> Performance:
-    """Trim the aircraft in all its flight conditions.  Raises FlightError if one of them does not exist."""
+    """Trim the aircraft in all flight conditions of `Performance`.  Raises FlightError if one has no trim point."""
     cruise = aircraft.airspeed
     level = straight(fdm, cruise, AMSL)
     if level is None:
@@ -381,7 +389,7 @@ def performance_of(fdm: Simulator, aircraft: Aircraft) -> Performance:
     return Performance(level, **{name: trim for name, trim in found.items() if trim is not None})
 
 
-def _metadata(made: SizedAircraft, stall: float, least: float, most: float) -> str:
+def _metadata_text(made: SizedAircraft, stall: float, least: float, most: float) -> str:
     numbers, sheet = made.numbers, made.sheet
     elevator, aileron, rudder = (math.degrees(value) for value in numbers.throw)
     energy = (
@@ -417,11 +425,11 @@ motor_lag_s = {numbers.lag[1]:.6g}
 
 
 # ----------------------------------------------------------------------
-# ArduPlane parameters and servos.
+# Write ArduPlane parameters and servos.
 
 
 def arduplane_parameters(aircraft: Aircraft, flown: Performance, fdm: Fdm, stated: Mapping[str, float]) -> str:
-    """Return the text of ``ardupilot.parm``; parameters stated in a file stay as they are there."""
+    """Return the text of ``ardupilot.parm``; the values of `stated` replace computed values."""
     a, b = linearise(fdm, flown.level)
     cruise, bank = aircraft.airspeed, aircraft.max_bank
     p, q, elevator, aileron = 3, 4, 0, 1
@@ -467,7 +475,7 @@ def arduplane_parameters(aircraft: Aircraft, flown: Performance, fdm: Fdm, state
 
 
 def servo_text(aircraft: Aircraft, flown: Performance) -> str:
-    """Return the text of ``ardupilot.toml``: controls before any mixer, which is part of the model."""
+    """Return the text of ``ardupilot.toml``, the servo outputs of unmixed controls; the model contains the mixer."""
     elevator, aileron, rudder = (
         math.degrees(value) for value in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)
     )
@@ -500,9 +508,9 @@ value_deg = [{rudder:.1f}, 0.0, {-rudder:.1f}]
 
 
 # ----------------------------------------------------------------------
-# The README.
+# Write the README.
 
-# Rows of the table in the README.
+# Rows of the table in the README: field, title, unit, and the factor to this unit.
 _README_ROWS = (
     ("mass", "mass", "kg", 1.0),
     ("span", "wing span", "m", 1.0),
@@ -518,7 +526,9 @@ _README_ROWS = (
 )
 
 
-def _readme(name: str, made: SizedAircraft, flown: Performance, known: Uncertainty, stated: Mapping[str, float]) -> str:
+def _readme_text(
+    name: str, made: SizedAircraft, flown: Performance, known: Uncertainty, stated: Mapping[str, float]
+) -> str:
     sheet = made.sheet
     drive = "burns fuel; its mass stays the same" if sheet.fuelled else "is electric"
     climb, sink = math.degrees(flown.climb.climb), -math.degrees(flown.idle.climb)

@@ -1,4 +1,4 @@
-"""Take the autopilot of a flight from its files, or compare a named autopilot with them."""
+"""Choose the autopilot that a flight's files were written for, or check a named autopilot against the files."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -11,11 +11,11 @@ from world.scenario_tables import OWN_GUIDANCE
 
 
 def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> Scenario:
-    """Return the scenario flown by the autopilot that its parameter file or its mission was written for.
+    """Return the scenario with the autopilot that its parameter file or its mission was written for.
 
-    An autopilot named by the user stays, and so does planfly's own guidance; if no file names an autopilot, the
-    scenario stays as it is.  Raises ParameterError or MissionError for a file of another autopilot than the named one,
-    for two files of different autopilots, and for a parameter file with names of both.
+    An autopilot named by the user stays, and so does planfly's own guidance.  If no file names an autopilot, the
+    scenario is not changed.  Raises ParameterError or MissionError if a file was written for another autopilot than the
+    named one, if two files were written for different autopilots, and if a parameter file has names of both.
 
     >>> from world.scenario import load_scenario
     >>> made = with_file_autopilot(load_scenario("paper-07"), Mission(None, (), autopilot="px4", source="field.plan"))
@@ -29,12 +29,12 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
     stated = "" if mission is None else mission.autopilot
     named = table.autopilot is not None and table.autopilot_from is None
     if not named and table.params is not None and table.autopilot is None:
-        scenario = _of_parameters(scenario, table.params)
+        scenario = _with_parameter_file_autopilot(scenario, table.params)
         table = scenario.flight
     if mission is None or not stated:
         return scenario
     if table.autopilot is None:
-        return _taken(scenario, stated, mission.source)
+        return _set_autopilot(scenario, stated, mission.source)
     if stated != table.autopilot and table.autopilot in TITLES:
         if table.autopilot_from is None:
             raise MissionError.from_error(other_autopilot(mission.source, stated, _FIRMWARE[stated], table.autopilot))
@@ -45,21 +45,21 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
     return scenario
 
 
-# Autopilot as stated in a .plan.
+# Text by which a .plan file states its autopilot.
 _FIRMWARE = {ARDUPILOT: "firmwareType 3", PX4: "firmwareType 12"}
 
 
-def _of_parameters(scenario: Scenario, params: str) -> Scenario:
+def _with_parameter_file_autopilot(scenario: Scenario, params: str) -> Scenario:
     found = read_origin(Path(params))
     if found.mixed:
         allowed = "--autopilot names the autopilot that is to fly"
         message = f"{params}: {found.evidence}: {allowed}"
         raise ParameterError(message, file=params, field="autopilot", value=found.evidence, allowed=allowed)
-    return _taken(scenario, found.autopilot, params) if found.autopilot else scenario
+    return _set_autopilot(scenario, found.autopilot, params) if found.autopilot else scenario
 
 
-def _taken(scenario: Scenario, autopilot: str, file: str) -> Scenario:
-    """Return the scenario with an autopilot taken from a file; the default autopilot is also stated."""
+def _set_autopilot(scenario: Scenario, autopilot: str, file: str) -> Scenario:
+    """Return the scenario with an autopilot taken from `file`; the autopilot is stated even if it is the default."""
     params = scenario.flight.params
     made = with_flight(scenario, autopilot=autopilot, params=params)
     table = made.flight.model_copy(update={"autopilot_from": file})

@@ -1,4 +1,4 @@
-"""Import logs of other programs, judge them in their scenario, mission and wind, fly them again."""
+"""Import flight logs of other programs, judge each in its scenario, mission and wind, and fly its mission again."""
 
 import hashlib
 import math
@@ -43,7 +43,7 @@ from world.scenario_tables import FlightTable
 
 # Size of the blocks in which a file is hashed, bytes.
 _BLOCK = 2**20
-# Least number of items of a mission.
+# Minimum number of items of a mission.
 _MIN_ITEMS = 2
 
 
@@ -51,8 +51,10 @@ _MIN_ITEMS = 2
 class ImportedFlight:
     """Imported flight with its verdict.
 
-    setup: the setup, with its source.  track: rows of the flight.  events: messages of the vehicle.
-    ended: end of the flight according to the log.
+    setup: setup of the flight, with the log as its source.
+    track: rows of the flight.
+    events: messages of the vehicle.
+    ended: how the flight ended, according to the log.
     """
 
     setup: FlightSetup
@@ -63,48 +65,48 @@ class ImportedFlight:
 
     @property
     def lossy(self) -> bool:
-        """True if some of the log could not be read."""
+        """True if part of the log could not be read."""
         return self.setup.source is not None and self.setup.source.damage.lossy
 
     def __repr__(self) -> str:
         return f"<ImportedFlight {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
 
     def _repr_html_(self) -> str:
-        """Return how a notebook shows it."""
+        """Return the HTML that a notebook shows."""
         return self.verdict._repr_html_() + self.track._repr_html_()
 
 
 def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
-    """Read a log, place the flight in its world and judge it.
+    """Read a log, place the flight in its scenario and judge it.
 
-    Raises LogError for a file that is not the log of an aeroplane's flight, MissionError if no mission is known, and
-    for a plan that was not flown.
+    Raises LogError for a file that is not the log of an aeroplane's flight, and for a log without a mission if the
+    options name none.  Raises MissionError for a plan that was not flown.
     """
     plan, fences = options.get("plan"), read_named_fences(options.get("fence") or ())
     flight = make_flight(open_log(path), options.get("flight"))
-    mission, origin_of_mission, planned_in = _mission(path, flight, options)
+    mission, origin_of_mission, planned_in = _planned_mission(path, flight, options)
     mission = fences.on_mission(mission)
     plan_heights = plan is not None or flight.mission is None or flight.mission.with_heights
     if not plan_heights:
         mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
     _refuse_other_autopilot(path, mission, flight.raw.program)
-    scenario, placed = _world(mission, options, planned_in)
+    scenario, placed = _scenario_and_placed_mission(mission, options, planned_in)
     scenario, wind_source = _with_wind_of_log(fences.on_scenario(apply_options(scenario, options)), flight, options)
     named = (options.get("aircraft"), options.get("scenario"), planned_in)
     known = any(one is not None for one in named)
     logged = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
-    # A flight by an unknown autopilot is judged with the guidance of planfly: it shows the ability of the aircraft.
+    # A flight by an unknown autopilot is judged with planfly's guidance, which shows what the aircraft can fly.
     autopilot, refused = logged or (PlanflyGuidance(scenario.flight.steering.guidance), ())
-    setup = _setup(scenario, placed, mission, autopilot, flight)
+    setup = _flight_setup(scenario, placed, mission, autopilot, flight)
     heights = flight.heights
     if (datum := options.get("datum")) is not None and heights.datum == "unstated":
         heights = replace(heights, datum=datum)
     notes = (
-        *_edges(flight),
+        *_describe_gaps(flight),
         *_describe_other_flights(flight),
         *refused,
         *mission.warnings,
-        *_differing(flight, mission, options),
+        *_describe_mission_change(flight, mission, options),
     )
     source = ImportedLog(
         missing=None if plan is not None or flight.mission is None else flight.mission.missing,
@@ -131,12 +133,12 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     if plan is not None and (mismatch := plan_mismatch(setup, track)) is not None:
         raise MissionError(f"{path}: not flown by {plan}: {mismatch.text}", file=path)
     verdict = judge_flight(setup, track, "")
-    ended = "completed" if verdict.complete else _end_of(verdict)
-    return ImportedFlight(setup, track, _events(flight), verdict, ended)
+    ended = "completed" if verdict.complete else _completion_text(verdict)
+    return ImportedFlight(setup, track, _vehicle_events(flight), verdict, ended)
 
 
 def _refuse_other_autopilot(path: Path, mission: Mission, program: str) -> None:
-    """Raise MissionError for a plan written for another autopilot than the autopilot of the log."""
+    """Raise MissionError if the plan was written for another autopilot than that of the log."""
     flown = next((name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), "")
     if mission.autopilot and flown and mission.autopilot != flown:
         allowed = f"the flight of {path} is {program}'s: `plan` names the mission that was flown"
@@ -144,8 +146,11 @@ def _refuse_other_autopilot(path: Path, mission: Mission, program: str) -> None:
         raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
 
 
-def _mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
-    """Return the mission to be flown, its source, and the scenario that its plan was made in."""
+def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
+    """Return the planned mission, a description of its source, and the scenario of its plan, or None without a plan.
+
+    Raises LogError if neither the options nor the log contain the mission.
+    """
     if (named := options.get("plan")) is not None:
         plan_path, terrain = existing_mission(Path(named)), options.get("terrain")
         if plan_path.suffix.lower() != ".json":
@@ -165,14 +170,16 @@ def _mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mis
     return found.mission, f"{found.origin} of the log{when}, {len(found.mission.items)} items", None
 
 
-def _world(mission: Mission, options: LogOptions, planned_in: Scenario | None) -> tuple[Scenario, PlacedMission]:
-    """Return the scenario that a flight is judged in, and the mission placed in it."""
+def _scenario_and_placed_mission(
+    mission: Mission, options: LogOptions, planned_in: Scenario | None
+) -> tuple[Scenario, PlacedMission]:
+    """Return the scenario in which a flight is judged, and the mission placed in that scenario."""
     scenario, named = planned_in, options.get("scenario")
     terrain = None if options.get("terrain") is None else str(options["terrain"])
     if named is not None:
         scenario = load_scenario(str(named), terrain)
     if scenario is None:
-        # Vertical legs as ArduPlane flies them, so that the flight can be compared with a simulated one.
+        # The vertical legs are those that ArduPlane flies, so that the flight can be compared with a simulated flight.
         aircraft = flight_entries(options)["aircraft"]
         table = FlightTable() if aircraft is None else FlightTable(aircraft=str(aircraft))
         implied = implied_scenario(mission, terrain, table, vertical_legs=True)
@@ -181,7 +188,7 @@ def _world(mission: Mission, options: LogOptions, planned_in: Scenario | None) -
 
 
 def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOptions) -> tuple[Scenario, str]:
-    """Return the scenario in the mean wind of the flight, and a description of the source of that wind."""
+    """Return the scenario with the mean wind of the flight, and a description of the wind's source."""
     if options.get("wind") is not None:
         return scenario, "as given"
     found = mean_wind(flight)
@@ -192,7 +199,7 @@ def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOpti
     return blown, f"from {round(math.degrees(found.from_course)) % 360:03d}°, by {found.source} of the log"
 
 
-def _setup(
+def _flight_setup(
     scenario: Scenario,
     placed: PlacedMission,
     mission: Mission,
@@ -200,7 +207,7 @@ def _setup(
     flight: LoggedFlight,
 ) -> FlightSetup:
     aircraft, battery = find_airframe(scenario)
-    limits = _limits(scenario, autopilot, flight, aircraft.airspeed)
+    limits = _path_limits(scenario, autopilot, flight, aircraft.airspeed)
     return FlightSetup(
         scenario=scenario,
         mission=mission,
@@ -215,8 +222,11 @@ def _setup(
     )
 
 
-def _limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, usual: float) -> Limits:
-    """Return the limits at the airspeed stated by autopilot or scenario, or else at the flown airspeed."""
+def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, usual: float) -> Limits:
+    """Return the limits at the airspeed stated by autopilot or scenario; if neither states one, at the flown airspeed.
+
+    usual: airspeed of the aircraft, m/s, used if the log has no airspeed either.
+    """
     aircraft, _ = find_airframe(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
     airspeed, bank = scenario.flight.airspeed_mps or usual, math.radians(scenario.flight.max_bank_deg)
@@ -237,8 +247,8 @@ def _sha256(path: Path) -> str:
     return digest.hexdigest()
 
 
-def _edges(flight: LoggedFlight) -> tuple[str, ...]:
-    """Describe the parts of the flight missing in the log: before it, after it and between its rows."""
+def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
+    """Describe the parts of the flight that the log lacks, before its start, after its end and between its rows."""
     notes = []
     if flight.begins:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
@@ -251,15 +261,15 @@ def _edges(flight: LoggedFlight) -> tuple[str, ...]:
 
 
 def _describe_other_flights(flight: LoggedFlight) -> tuple[str, ...]:
-    """Describe the other flights that a log holds."""
+    """Describe the other flights that the log contains, in a tuple of one line; empty if there are none."""
     if flight.count == 1:
         return ()
     others = ", ".join(f"at {start:.0f} s ({along:.0f} s along its mission)" for start, along in flight.others)
     return (f"flight {flight.number} of {flight.count} is judged; the others began {others} (--flight N)",)
 
 
-def _differing(flight: LoggedFlight, mission: Mission, options: LogOptions) -> tuple[str, ...]:
-    """Describe the difference between the plan and the mission of the log."""
+def _describe_mission_change(flight: LoggedFlight, mission: Mission, options: LogOptions) -> tuple[str, ...]:
+    """Describe how the mission of the log differs from the plan, in a tuple of one line; empty if they agree."""
     if options.get("plan") is None or flight.mission is None:
         return ()
     own = flight.mission.mission.items
@@ -272,8 +282,8 @@ def _differing(flight: LoggedFlight, mission: Mission, options: LogOptions) -> t
     return (f"{len(changed)} items of the log's own mission lie elsewhere than the plan's, item {changed[0]} first",)
 
 
-def _events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
-    """Return the messages of the vehicle during the flight, and its modes."""
+def _vehicle_events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
+    """Return the vehicle's messages and mode changes during the flight, in order of time."""
     if not len(flight.time):
         return ()
     low, high = float(flight.time[0]), float(flight.time[-1])
@@ -288,7 +298,7 @@ def _events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
     return tuple(sorted(inside, key=lambda event: event.time))
 
 
-def _end_of(verdict: Verdict) -> str:
+def _completion_text(verdict: Verdict) -> str:
     found = next((item for item in verdict.findings if item.rule == "completion"), None)
     return "not judged" if found is None else found.brief
 
@@ -300,18 +310,21 @@ def _end_of(verdict: Verdict) -> str:
 def fly_again(
     setup: FlightSetup, track: Track, aircraft: str | None, turbulence: str | None, advance: Advance, most: int = 9
 ) -> tuple[Reflight, ...]:
-    """Fly the legs of every stretch again in the wind of the log, and compare the flights, longest first.
+    """Fly each stretch of followed legs again in the wind of the log, and return the comparisons, longest first.
 
-    setup: the setup, with its source.  aircraft: replaces the aircraft of the setup.
-    turbulence: replaces the turbulence of the scenario.
-    most: largest number of stretches, of which the longest are flown.
+    setup: setup of the imported flight, with its source.
+    aircraft: aircraft to fly instead of the setup's aircraft; None keeps that.
+    turbulence: turbulence to fly in instead of the scenario's; None keeps that.
+    most: maximum number of stretches; if there are more, the longest are flown.
 
-    Raises LogError for a flight that followed no part of its mission, and StartError if the model cannot begin.
+    Raises LogError for a flight that followed no part of its mission, and StartError if the model cannot start.
     """
-    return tuple(_one_again(setup, legs, aircraft, turbulence, advance) for legs in _stretches(setup, track)[:most])
+    return tuple(
+        _refly_stretch(setup, legs, aircraft, turbulence, advance) for legs in _followed_legs(setup, track)[:most]
+    )
 
 
-def _one_again(
+def _refly_stretch(
     setup: FlightSetup, legs: FlownLegs, aircraft: str | None, turbulence: str | None, advance: Advance
 ) -> Reflight:
     scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
@@ -342,7 +355,7 @@ def _one_again(
     return compare_with_model(own, legs, flown, ended, stands_in=stands_in)
 
 
-def _stretches(setup: FlightSetup, track: Track) -> list[FlownLegs]:
+def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
     source = setup.source
     stretches = () if source is None else source.stretches
     found = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]

@@ -1,4 +1,4 @@
-"""Make the plan of a scenario for its aircraft and autopilot, as every command makes it."""
+"""Make the plan of a scenario for its aircraft and autopilot, in the same way for every command."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,12 +18,12 @@ from planner.search.search_state import StopCondition
 from planner.search.shared_budget import Search, SharedBudget
 from world.scenario import Scenario
 
-# Function that takes the progress of a stage: done, total, a remark.
+# Function called with the progress of a stage: amount done, total amount, and a remark.
 Advance = Callable[[float, float, str], None]
 
 
 def planned_for(scenario: Scenario, airframe: Airframe) -> Conditions:
-    """Return the conditions that a plan of a scenario is made for."""
+    """Return the conditions for which a scenario is planned."""
     return conditions_of(scenario, airframe.aircraft.name, airframe.airspeed, airframe.autopilot)
 
 
@@ -38,18 +38,18 @@ def make_plan(
     flown: tuple[Plan, int] | None = None,
     onward: bool = False,
 ) -> Plan:
-    """Plan within the limits of scenario and aircraft, as far as they are known for certain.
+    """Plan a path within the certain part of the limits of scenario and aircraft.
 
     All commands use this function, so that they agree on which plan is safe.  If gusts make the autopilot orbit at
-    waypoints, the plan has as few such waypoints as possible (`planfly.planning.gust_orbits`); if gusts change the
-    altitude of the aircraft, the plan keeps a margin for it (`planfly.planning.gust_altitude_margin`).  The departure
-    and the approach are added; and if the autopilot loiters at the end of the mission, the certificate names the
+    waypoints, the plan has as few such waypoints as possible (`planfly.planning.gust_orbits`).  If gusts change the
+    altitude of the aircraft, the plan has a margin for the change (`planfly.planning.gust_altitude_margin`).  The
+    departure and the approach are added.  If the autopilot loiters at the end of the mission, the certificate names the
     hazards that the loiter may come too close to.
 
     A plan may take several searches, which share the scenario's budget of evaluations.
 
-    stop: as of `planner.search.plan_path.plan_path`.
-    flown: the plan being flown, and the leg to plan again from; None for a new plan.
+    stop: stop condition of `planner.search.plan_path.plan_path`.
+    flown: the plan being flown, and the leg from which it is replanned; None for a new plan.
     onward: True if the mission continues beyond the destination of the plan.
     """
     limits = airframe.limits.surely()
@@ -79,14 +79,14 @@ def make_plan(
 
 
 def finish_plan(plan: Plan, airframe: Airframe, *, onward: bool = False) -> Plan:
-    """Return a path with the steps that `make_plan` applies after its search, without another search."""
+    """Apply the steps of `make_plan` that follow its search to a plan, without another search."""
     return _with_ground_phases(keep_height(limit_waypoint_orbits(plan, airframe), airframe), airframe, onward=onward)
 
 
 def _with_ground_phases(plan: Plan, airframe: Airframe, old: Plan | None = None, *, onward: bool) -> Plan:
-    """Return the plan with its departure and approach, and with the hazards near the loiter at its end.
+    """Return the plan with its departure and approach, and with the hazards near its final loiter in the certificate.
 
-    old: the plan being flown.
+    old: the plan being flown, or None.
     """
     plan = laid_from_the_ground(plan, airframe, old)
     if onward or not airframe.autopilot.loiter_rules.ends_in_circle:

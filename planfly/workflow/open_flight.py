@@ -1,4 +1,4 @@
-"""Open a plan or a mission file with the options of its flight as a `FlightSetup`."""
+"""Make the `FlightSetup` of a plan or a mission file with the options of its flight."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,14 +22,16 @@ from world.errors import MissionError
 from world.files import did_you_mean
 from world.scenario import Scenario
 
-# Source of the mission of a plan without a file, in messages.
+# Name of a plan without a file, in messages about its mission.
 PLAN_FILE = "plan.json"
 
 
 def open_flight(source: Plan | str | Path, options: MissionOptions, program: Path | None = None) -> FlightSetup:
-    """Open a plan, or a plan.json, .waypoints or .plan file, in its own, a named or an implied scenario.
+    """Make the setup of a plan, or of a plan.json, .waypoints or .plan file.
 
-    program: the autopilot's program that flies.
+    The scenario is the named one, the plan's own, or for a mission file one implied by its items.
+
+    program: the autopilot program that flies, or None for a simulated autopilot.
     Raises MissionError, ScenarioError, ParameterError or TerrainError.
 
     >>> from planfly.workflow.make_plan import make_plan
@@ -41,7 +43,11 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
     """
     if isinstance(source, Plan) or Path(source).suffix.lower() == ".json":
         return _open_plan(source, options, program)
-    fences, named, terrain = read_named_fences(options.get("fence") or ()), options.get("scenario"), _terrain(options)
+    fences, named, terrain = (
+        read_named_fences(options.get("fence") or ()),
+        options.get("scenario"),
+        _terrain_option(options),
+    )
     mission = fences.on_mission(for_fixed_wing(read_mission(existing_mission(Path(source)))))
     if named is not None:
         scenario = named_scenario(named, options, program)
@@ -55,8 +61,12 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
 
 
 def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path | None) -> FlightSetup:
-    """Open a plan in its own scenario, or its mission in the scenario that the options name."""
-    fences, named, terrain = read_named_fences(options.get("fence") or ()), options.get("scenario"), _terrain(options)
+    """Make the setup of a plan in its own scenario, or of its mission in the scenario that the options name."""
+    fences, named, terrain = (
+        read_named_fences(options.get("fence") or ()),
+        options.get("scenario"),
+        _terrain_option(options),
+    )
     if not isinstance(source, Plan):
         plan, file = read_plan(existing_mission(Path(source)), terrain=terrain), str(source)
     else:
@@ -66,26 +76,27 @@ def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path
     mission, number = fences.on_mission(mission_of_plan(plan, airframe, file)), plan.seed if seed is None else seed
     if named is None:
         return make_setup(scenario, airframe, mission, number, plan=plan)
-    # The waypoints of the plan are on the map of its own scenario: in another one its mission is flown, as a file.
+    # The plan's waypoints are in the map coordinates of its own scenario; in another scenario its mission items are
+    # flown, like those of a file.
     scenario = fences.on_scenario(named_scenario(named, options, program))
     return make_setup(scenario, load_airframe(scenario), mission, number)
 
 
-def _terrain(options: MissionOptions) -> str | None:
+def _terrain_option(options: MissionOptions) -> str | None:
     terrain = options.get("terrain")
     return None if terrain is None else str(terrain)
 
 
 def existing_mission(path: Path) -> Path:
-    """Return the path of an existing file, or raise MissionError with the most similar name."""
+    """Return the path if its file exists; otherwise raise MissionError, which suggests the most similar name."""
     if not path.is_file():
-        near = did_you_mean(path.name, _mission_names(path.parent))
+        near = did_you_mean(path.name, _mission_file_names(path.parent))
         raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected{near}", file=path)
     return path
 
 
-def _mission_names(folder: Path) -> list[str]:
-    """List the names of the files in a folder that may hold missions."""
+def _mission_file_names(folder: Path) -> list[str]:
+    """List the names of a folder's possible mission files; empty if the folder cannot be read."""
     try:
         return sorted(file.name for file in folder.iterdir() if file.suffix in (".json", ".waypoints", ".plan", ".txt"))
     except OSError:
@@ -93,7 +104,7 @@ def _mission_names(folder: Path) -> list[str]:
 
 
 def for_fixed_wing(mission: Mission) -> Mission:
-    """Return the mission if a fixed wing can fly it.  Raises MissionError for an item of other vehicles.
+    """Return the mission unchanged.  Raises MissionError if it has an item that only other vehicles can fly.
 
     >>> from flight.mission.items import MissionItem
     >>> spline = MissionItem(3, 82, 3, (0.0,) * 4, 46.0, 8.0, 75.0)
@@ -111,7 +122,7 @@ def for_fixed_wing(mission: Mission) -> Mission:
 
 
 def mission_of_plan(plan: Plan, airframe: Airframe, source: str = PLAN_FILE) -> Mission:
-    """Return the waypoints of a plan as a mission without fences.  source: its file, for messages."""
+    """Return the waypoints of a plan as a mission without fences.  source: the plan's file name, for messages."""
     return plan_mission(plan, airframe.airspeed, airframe.max_bank, source, airframe.limits.tracking)
 
 
@@ -125,12 +136,13 @@ def make_setup(
     placed: PlacedMission | None = None,
     fdm_hz: Literal[60, 120] = FDM_HZ,
 ) -> FlightSetup:
-    """Fix everything that decides the flight of a mission in a scenario.
+    """Make the setup that determines the flight of a mission in a scenario.
 
-    placed: the mission's places on the map of the scenario if already known.  fdm_hz: step rate of JSBSim, Hz.
-    Raises MissionError for a mission that cannot be laid out, and for a fence that makes no zones.
+    placed: the mission placed on the map of the scenario, if already known.
+    fdm_hz: step rate of JSBSim, Hz.
+    Raises MissionError for a mission without a valid route, and for a fence without valid zones.
     """
-    # A fence without valid zones is bad input, and the verdict could not judge it.
+    # A fence without valid zones could not be judged.
     fence_zones(mission.fences, scenario.origin, mission.source)
     limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
     autopilot = airframe.autopilot

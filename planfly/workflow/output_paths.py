@@ -1,4 +1,4 @@
-"""Output files and folders: refuse to overwrite foreign files, clear old results of planfly."""
+"""Check output files and folders, and clear old results of planfly; other files are never overwritten."""
 
 import hashlib
 from pathlib import Path
@@ -7,7 +7,7 @@ from world.errors import PlanflyError
 
 # Default folder of results.
 RESULTS = Path("runs")
-# Default folder of a run as a pattern: {name} is the name of the scenario or mission, {seed} is the seed.
+# Pattern of the default folder of a run, in which {name} is the name of the scenario or mission.
 RUN_FOLDER = "runs/{name}-seed{seed}"
 # Default log of a flight as a pattern, in a folder that no run writes its pictures to.
 FLY_LOG = "runs/{name}-fly-seed{seed}/flight.mcap"
@@ -39,13 +39,13 @@ COMPARE_FILES = (
     *(f"compare-{name}.{kind}" for kind in ("png", "svg") for name in ("map", "profile")),
     "compare.html",
 )
-# Files of `planfly.survey`: the picture of the lines, and the missions and parameters of the remedies.
+# Files of `planfly.survey`, with the picture of the lines, and the missions and parameters of the remedies.
 SURVEY_FILES = (
     "survey.png",
     *(f"{kind}.waypoints" for kind in ("side", "turn-around", "every", "course", "parameter", "airspeed")),
     "parameter.param",
 )
-# Greatest number of returns that a program may fly.
+# Maximum number of returns that an autopilot program may fly.
 MAX_BY_PROGRAM = 20
 # Files of `planfly.returns`.
 RETURN_FILES = (
@@ -54,7 +54,7 @@ RETURN_FILES = (
     "returns.mcap",
     *(f"worst-return-{k}{suffix}" for k in range(1, MAX_BY_PROGRAM + 1) for suffix in (".mcap", ".BIN")),
 )
-# Greatest number of parts of a flight that are flown again.
+# Maximum number of parts of a flight that are flown again.
 REFLOWN = 9
 # Files of each part that is flown again, numbered from the second part on.
 REFLY_FILES = tuple(
@@ -68,7 +68,10 @@ REFLY_FILES = tuple(
 
 
 def refuse_existing(path: Path, overwrite: bool, source: Path | None = None) -> None:
-    """Raise PlanflyError for a target file that exists, is a folder, cannot be made, or is the input."""
+    """Raise PlanflyError if the target file is the input, is a folder, has no folder, or exists without `overwrite`.
+
+    source: the input file, or None.
+    """
     if source is not None and path.exists() and source.exists() and path.samefile(source):
         raise PlanflyError(f"{path}: is the input itself; name another file to write", file=path)
     if path.is_dir():
@@ -80,7 +83,7 @@ def refuse_existing(path: Path, overwrite: bool, source: Path | None = None) -> 
 
 
 def refuse_folder(folder: Path, overwrite: bool) -> None:
-    """Refuse a target folder that is a file or is not empty.  Raises PlanflyError."""
+    """Raise PlanflyError if the target folder is a file, or is not empty without `overwrite`."""
     if folder.exists() and not folder.is_dir():
         raise PlanflyError(f"{folder}: is a file; a folder is expected", file=folder)
     if not overwrite and folder.is_dir() and any(folder.iterdir()):
@@ -88,7 +91,7 @@ def refuse_folder(folder: Path, overwrite: bool) -> None:
 
 
 def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
-    """Make a folder and clear old results of planfly in it, never any other file."""
+    """Make a folder if it is missing, and remove old results of planfly from it, but no other file."""
     folder.mkdir(parents=True, exist_ok=True)
     rounds = sorted(folder.glob("round-[0-9]*")) if files is RUN_FILES else []
     if files is RUN_FILES:
@@ -101,7 +104,7 @@ def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
 
 
 def clean_folder(out: str | Path, files: tuple[str, ...], *, overwrite: bool) -> Path:
-    """Return a target folder, checked by `refuse_folder`, made, and cleared of old results of planfly."""
+    """Check a target folder with `refuse_folder`, make it, remove old results of planfly, and return its path."""
     folder = Path(out)
     refuse_folder(folder, overwrite)
     prepare_folder(folder, files)
@@ -118,9 +121,9 @@ def is_pattern(target: str | Path) -> bool:
 
 
 def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
-    """Fill in {name} and {seed} of a path; the name is made a safe and distinct folder name.
+    """Replace {name} and {seed} in a path, with the name made a safe folder name.
 
-    A name that has to be changed ends with the beginning of its SHA-256.
+    If this changes the name, the first digits of the name's SHA-256 are appended to keep it distinct.
 
     >>> str(expand_path_pattern(RUN_FOLDER, "a/b", 3)), str(expand_path_pattern(RUN_FOLDER, "a b", 3))
     ('runs/a-b-c14cdd-seed3', 'runs/a-b-c8687a-seed3')
@@ -132,7 +135,10 @@ def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
 
 
 def file_target(target: str | Path, name: str, seed: int, *, overwrite: bool, source: Path | None = None) -> Path:
-    """Return the file to write, checked as by `refuse_existing`; the caller makes the folder of a pattern."""
+    """Return the file to write, after the checks of `refuse_existing`.
+
+    A pattern whose folder does not exist is not checked; the caller makes the folder.
+    """
     path = expand_path_pattern(target, name, seed)
     if path.parent.exists() or not is_pattern(target):
         refuse_existing(path, overwrite, source)

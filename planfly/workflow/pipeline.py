@@ -1,4 +1,4 @@
-"""Plan, export, fly, record and judge a mission: functions of frozen data, one for each stage."""
+"""Plan, fly, record and judge a mission, with one function of frozen data for each stage."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,7 +30,7 @@ from planner.plan import Plan
 from world.errors import FlightError, StartError
 from world.scenario import Scenario
 
-# Flight time written at once, s; a simulated flight takes some 30 ms for it.
+# Flight time whose rows are written at once, s; its simulation takes about 30 ms.
 BATCH = 60
 # Limits of a flight unless others are given.
 _DEFAULT_LIMITS = FlightLimits()
@@ -43,7 +43,7 @@ class PlanThenFly:
     plan: the path, with its certificate.
     mission: the plan as mission items.
     track: the flight, one row for each guidance tick; None if there was no feasible plan to fly.
-    verdict: whether the mission flies, with a finding for every rule and place.
+    verdict: the verdict on the mission, with a finding for every rule and place.
 
     >>> from world.scenario import load_scenario
     >>> result = plan_then_fly(load_scenario("paper-07"), seed=1)
@@ -60,7 +60,7 @@ class PlanThenFly:
         return f"<PlanThenFly {self.plan!r}, {self.verdict!r}>"
 
     def _repr_html_(self) -> str:
-        """Return how a notebook shows it."""
+        """Return the HTML that a notebook shows."""
         return self.plan._repr_html_() + self.verdict._repr_html_()
 
 
@@ -80,10 +80,11 @@ class OffNominal:
 class JudgedFlight:
     """A flight from its first tick to its verdict.
 
-    setup: the setup, with the program that flew, if any.  requirements: the route requirements it was judged by.
-    track: the recorded rows, or all rows if there is no log; empty for a flight that could not begin.
+    setup: the setup, with the program that flew, if any.
+    requirements: the route requirements by which the flight was judged.
+    track: the recorded rows, or all rows if there is no log; empty for a flight that could not start.
     ended: "completed", or the reason for an early end.
-    verdict: the verdict on these rows.
+    verdict: the verdict on the rows of `track`.
     events: entries of the log in addition to the rows.
     reference: the results of reference flights; None if none were flown.
     returns: returns from a few places of the flight; None if they were not requested.
@@ -102,9 +103,9 @@ class JudgedFlight:
 def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | None = None) -> PlanThenFly:
     """Plan a path in a scenario, fly it and judge the flight.
 
-    seed: of planner and turbulence; None takes the seed of the scenario, or 1.
-    log: file for the flight; None writes none.
-    Raises a PlanflyError for bad input.  A plan that cannot be flown is a verdict, not an error.
+    seed: seed of planner and turbulence; None takes the seed of the scenario, or 1.
+    log: file for the flight log; None writes no log.
+    Raises a PlanflyError for bad input.  A plan that cannot be flown gives a verdict, not an error.
     """
     number = choose_seed(scenario, seed)
     airframe = load_airframe(scenario)
@@ -130,19 +131,20 @@ def fly_and_judge(
     returns: bool = False,
     limits: FlightLimits = _DEFAULT_LIMITS,
 ) -> JudgedFlight:
-    """Fly a setup, record it if a log is named, and judge it.
+    """Fly a setup, record the flight if a log is named, and judge it.
 
     every: one row out of this many is recorded and judged, so that a check of the log gives the same verdict.
-    autopilot: the program of ArduPlane or PX4, which then flies; its own log is kept next to the flight log.
-    off_nominal: differences between the flight and the assumptions of guidance; not for a program.
-    reference: cases in which reference flights are flown, as of
+    autopilot: the program of ArduPlane or PX4 that flies instead of planfly's simulated autopilot; its own log is kept
+    next to the flight log.
+    off_nominal: differences between the flight and the assumptions of plan and guidance; ignored if a program flies.
+    reference: cases in which reference flights are flown, see
     `planfly.workflow.reference_flights.judge_with_reference_flights`.
-    returns: True judges returns from a few places, and draws them in the log, if one is named.
+    returns: True judges returns from a few places, and draws them in the log.  Without a log no returns are judged.
     limits: limits of the flight time and of the size of the log.
 
-    A flight that cannot begin, or that `planfly.workflow.trial_flight.reason_not_to_start` gives a reason against, has
-    no row and no log; its verdict covers the route and says that the flight did not begin.  Raises FlightError for a
-    program that does not fly it to its end; then no log is left.
+    If the flight cannot start, or `planfly.workflow.trial_flight.reason_not_to_start` gives a reason not to start it,
+    the result has no row and no log; its verdict covers the route and says that the flight did not start.  Raises
+    FlightError if a program does not fly the mission to its end; then no log is left.
     """
     task = _Task(airframe, log, advance, every, limits, reference, returns=returns)
     requirements = route_requirements(setup)
@@ -151,7 +153,7 @@ def fly_and_judge(
         return _unflown(requirements, log, reason, reference)
     try:
         if autopilot is not None:
-            return _fly_program(task, setup, program_autopilot(autopilot).flying(setup.autopilot, autopilot))
+            return _fly_with_program(task, setup, program_autopilot(autopilot).flying(setup.autopilot, autopilot))
         how = off_nominal or OffNominal(Variation())
         flight = Flight(setup, airframe.aircraft, how.variation, start_offset=how.start_offset)
         return _record_and_judge(task, requirements, flight)
@@ -172,7 +174,7 @@ class _Task:
     returns: bool
 
 
-def _fly_program(task: _Task, setup: FlightSetup, program: ProgramAutopilot) -> JudgedFlight:
+def _fly_with_program(task: _Task, setup: FlightSetup, program: ProgramAutopilot) -> JudgedFlight:
     with program.start(setup, task.airframe.aircraft) as flight:
         flight.prepare()
         try:
@@ -196,14 +198,14 @@ def autopilot_log(log: Path, program: Path) -> Path:
 
 
 def _record_and_judge(task: _Task, requirements: RouteRequirements, flight: Airborne) -> JudgedFlight:
-    """Fly to the end, and judge the recorded rows."""
+    """Fly to the end, record the flight if a log is named, and judge the recorded rows."""
     flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
     if task.log is None:
         track, ended = _fly(task, flight, None)
-        return _judged(task, requirements, track, ended)
+        return _judge_rows(task, requirements, track, ended)
     with CrashSafeLog(task.log, flight.setup, every=task.every, batch=BATCH) as recorder:
         track, recorder.ended = _fly(task, flight, recorder)
-        judged = _judged(task, requirements, thin_track(track, task.every), recorder.ended)
+        judged = _judge_rows(task, requirements, thin_track(track, task.every), recorder.ended)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
         summary = return_summary(flight.setup, judged.track) if task.returns else None
@@ -213,7 +215,7 @@ def _record_and_judge(task: _Task, requirements: RouteRequirements, flight: Airb
 
 
 def _fly(task: _Task, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
-    """Fly to the end or until the log is full, record each block, and return the track and the end."""
+    """Fly to the end or until the log is full, recording each block; return the track and the reason for the end."""
     blocks, ended, length = list[FlightBlock](), "", flight.path.length
     for block in simulate(flight):
         blocks.append(block)
@@ -239,7 +241,7 @@ def _unflown(requirements: RouteRequirements, log: Path | None, ended: str, refe
     return JudgedFlight(setup, requirements, track, ended, verdict, ())
 
 
-def _judged(task: _Task, requirements: RouteRequirements, track: Track, ended: str) -> JudgedFlight:
+def _judge_rows(task: _Task, requirements: RouteRequirements, track: Track, ended: str) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
     aircraft = task.airframe.aircraft

@@ -1,4 +1,4 @@
-"""Explain the flight of an autopilot by reference flights: planfly's guidance, and other parameters."""
+"""Explain the flight of an autopilot by reference flights with planfly's guidance and with other parameters."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -23,10 +23,10 @@ from planfly.workflow.suggestion_trials import SuggestionTrials, tried_suggestio
 from planfly.workflow.trial_flight import Hurry, Trial, TrialAborted, no_hurry
 
 # ----------------------------------------------------------------------
-# Find the autopilot parameter that decides a failed flight, by flying with one parameter changed at a time.
+# Find the autopilot parameter that decides a failed flight, by flying again with one parameter changed at a time.
 
 
-# Rules that are broken by an altitude error rather than by a cross-track error.
+# Rules that an altitude error violates, not a cross-track error.
 _VERTICAL_RULES = ("clearance", "height", "bounds", "slope", "energy", "stall", "speed")
 
 # Function that flies with an autopilot and returns True if the flight passes.
@@ -34,13 +34,13 @@ Passes = Callable[[Autopilot], bool]
 
 
 def deciding_parameter(autopilot: Autopilot, findings: tuple[Finding, ...], passes: Passes) -> DecidingParameter | None:
-    """Return the first candidate parameter with a passing value, and the nearest such value, or None.
+    """Return the first parameter that lets the flight pass with another value, and the nearest such value, or None.
 
-    findings: of the flight that failed.
-    passes: flies the law with other parameters and returns True if that flight passes; called about ten times.
+    findings: findings of the flight that failed.
+    passes: flies with the given autopilot and returns True if that flight passes; called about ten times.
 
     Candidates for the kind of the failure, vertical or lateral, are tried first.  For each candidate the farthest value
-    is flown, and if it passes, the values between by bisection: the returned value was flown and passed.
+    is flown; if it passes, the nearest passing value is found by bisection.  The returned value was flown and passed.
 
     >>> from flight.autopilots.arduplane.autopilot import ArduPlane
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -64,16 +64,16 @@ def deciding_parameter(autopilot: Autopilot, findings: tuple[Finding, ...], pass
         def with_value(value: float, name: str = name) -> bool:
             return passes(autopilot.with_parameters(**{name: value}))
 
-        # Values below the documented range are not suggested.
-        passing = _nearest(max(current, least - step), step, far, with_value)
+        # Do not suggest values below the documented range.
+        passing = _nearest_passing_value(max(current, least - step), step, far, with_value)
         if passing is not None:
             off = _deviation_at_failure(failed, findings)
             return DecidingParameter(name, current, passing, unit, failed.rule, failed.place, off)
     return None
 
 
-def _nearest(current: float, step: float, far: float, passes: Callable[[float], bool]) -> float | None:
-    """Return the passing value nearest to the current one, in steps towards `far`; None if `far` fails."""
+def _nearest_passing_value(current: float, step: float, far: float, passes: Callable[[float], bool]) -> float | None:
+    """Return the passing value nearest to the current value, in steps towards `far`; None if `far` itself fails."""
     count = int(abs(far - current) / step + 1e-6)
     sign = 1.0 if far > current else -1.0
     values = [round(current + sign * k * step, 6) for k in range(1, count + 1)]
@@ -84,7 +84,7 @@ def _nearest(current: float, step: float, far: float, passes: Callable[[float], 
 
 
 def _deviation_at_failure(failed: Finding, findings: tuple[Finding, ...]) -> float | None:
-    """Return the deviation of the flight at its failure, m, as in `DecidingParameter`; None if unknown."""
+    """Return the cross-track or altitude error where the flight failed, m, or None if unknown."""
     if failed.rule == "corridor":
         return failed.flown
     if failed.place.kind != "leg" or failed.rule not in ("clearance", "height"):
@@ -95,10 +95,10 @@ def _deviation_at_failure(failed: Finding, findings: tuple[Finding, ...]) -> flo
 
 
 def airframe_answer(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry = no_hurry) -> AirframeAnswer:
-    """Fly a setup by planfly's guidance, which knows its exact position, and judge that flight.
+    """Fly a setup with planfly's guidance and the exact position, and judge that flight.
 
-    It flies the same true airspeeds as ArduPlane, which takes airspeeds as equivalent airspeeds: at a higher altitude
-    they are higher true airspeeds.
+    The flight has the same true airspeeds as a flight by ArduPlane.  ArduPlane treats airspeeds as equivalent
+    airspeeds, which are higher true airspeeds at a higher altitude.
     hurry: see `judge_with_reference_flights`.
     """
     same = true_route(setup)
@@ -108,7 +108,7 @@ def airframe_answer(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry = no_hu
         return AirframeAnswer(False, f"not flyable: {ended}", (("completion", FLIGHT),))
     verdict = trial.flown
     failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
-    # Undecided findings on the take-off and landing do not concern this flight.
+    # Undecided findings on take-off and landing do not apply to this flight.
     said = "flyable in the air" if verdict.flies and not verdict.flyable else verdict.headline
     return AirframeAnswer(verdict.flies, said, failed)
 
@@ -118,9 +118,10 @@ def find_deciding_parameter(
 ) -> DecidingParameter | None:
     """Find a parameter that lets a failed flight pass with another value, or return None.
 
-    verdict: on the flight with the setup's own parameters.  hurry: see `judge_with_reference_flights`.
-    Takes about ten flights by the law of the autopilot; they explain the flight of a program only if the flight of the
-    law fails, too.
+    verdict: verdict on the flight with the setup's own parameters.
+    hurry: see `judge_with_reference_flights`.
+    About ten flights with the simulated autopilot are needed.  They explain the flight of an autopilot program only if
+    the simulated autopilot fails, too; otherwise the result is None.
     """
     if setup.autopilot.parameters is None or verdict.flies:
         return None
@@ -130,7 +131,7 @@ def find_deciding_parameter(
         if own.flies:
             return None
         findings = own.findings
-    # The corridor keeps its width for every radius that is tried.
+    # Keep the width of the corridor for every radius that is tried.
     scenario = setup.scenario
     limits = scenario.limits.model_copy(update={"corridor_m": setup.corridor})
     spec = scenario.spec.model_copy(update={"limits": limits})
@@ -143,18 +144,20 @@ def find_deciding_parameter(
     return deciding_parameter(setup.autopilot, findings, passes)
 
 
-# Cross-track error of a law against its autopilot, as a fraction of its distance from the legs; nine in ten corners
-# that ArduPlane kept are within it.
+# Cross-track error of a simulated autopilot against the real one, as a fraction of the distance from the legs.  Nine in
+# ten corners that ArduPlane kept are within this error.
 STRAY_SHARE = 0.1
-# Altitude error of a law against its autopilot, m; the least clearances of 20 ArduPlane climbs are within it.
+# Altitude error of a simulated autopilot against the real one, m.  The minimum clearances of 20 ArduPlane climbs are
+# within this error.
 HEIGHT_ERROR = 1.2
 
 
 def has_room(flown: Sequence[Finding], failed: Sequence[Finding]) -> bool:
-    """Return True if each failed finding now passes with the margin that the error of the law requires.
+    """Return True if each finding that failed now passes with the margin that the simulation error requires.
 
-    flown: findings of a flight with another value of a parameter.  failed: findings of the flight before.  They are
-    compared for the failed rules and places: lateral distance from the legs, and height above ground.
+    flown: findings of a flight with another parameter value.
+    failed: findings of the flight that failed.
+    A margin is required in the lateral distance from the legs and in the height above ground.
     """
     wrong = {(item.rule, item.place) for item in failed if item.ok is False}
     for item in flown:

@@ -1,6 +1,6 @@
 """Tighten the limits of a scenario by the failures of a flight, for the next round of planning.
 
-Only the planning is tightened: every round is judged against the scenario as it was given.
+The tightened limits apply to planning only.  Each round is judged against the original scenario.
 """
 
 import copy
@@ -18,20 +18,20 @@ from world.scenario import Scenario, from_spec
 # Content of a scenario file.
 Spec = dict[str, Any]
 
-# Added to the clearance by which a flight fell short, m.
+# Margin added to the shortfall of clearance in a flight, m.
 CLEARANCE_BUFFER = 5.0
-# Added to the distance by which a flight entered the reach of a missile, m.
+# Margin added to the depth to which a flight entered a missile's sphere, m.
 MISSILE_BUFFER = 10.0
-# Added to the distance by which a flight violated a zone, m.
+# Margin added to the distance by which a flight violated a zone, m.
 ZONE_BUFFER = 5.0
-# Fraction of a limit that is left if it is already the limit of the aircraft and the flight failed nevertheless.
+# Factor on a limit that is already the limit of the aircraft, if the flight fails nevertheless.
 TIGHTENED_SHARE = 0.9
-# Least bank to which a plan is tightened, degrees.
+# Minimum bank to which a plan is tightened, degrees.
 MIN_BANK_DEG = 5.0
 # Remark on a round that is followed by another.
 GO_ON = "tightened and planned again"
 
-# Keys of the numbers that can be tightened.
+# Keys of the scenario's numbers that can be tightened.
 Tightened = Literal[
     "max_climb_deg",
     "max_dive_deg",
@@ -46,11 +46,11 @@ Tightened = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Tightening:
-    """Change of one number in the scenario to plan in.
+    """Change of one number in the scenario used for planning.
 
-    what: its key.
-    name: the threat that it belongs to, or "" if it belongs to the scenario itself.
-    current, wanted: in the unit of the key, or "aircraft" for the limit of the aircraft.
+    what: key of the number.
+    current, wanted: old and new value, in the unit of the key, or "aircraft" for the limit of the aircraft.
+    name: the threat to which the number belongs, or "" if it belongs to the scenario itself.
     """
 
     what: Tightened
@@ -78,24 +78,25 @@ def tightening_text(change: Tightening) -> str:
 
 
 def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list[Tightening]]:
-    """Return the next scenario to plan in and its changes; no changes if nothing can be tightened."""
+    """Return the scenario for the next round of planning, and its changes; empty if nothing can be tightened."""
     spec = copy.deepcopy(scenario.to_json())
     failed = [item for item in verdict.findings if item.ok is False]
-    changes = _slopes(spec, failed) + _turns(spec, scenario, failed)
+    changes = _tighten_slopes(spec, failed) + _tighten_turns(spec, scenario, failed)
     if not changes:
-        # A flight that cannot follow its plan also flies lower and closer: this is not a separate cause.
-        changes = _clearance(spec, scenario, failed) + _missiles(spec, failed)
-        changes += _height(spec, scenario, failed) + _zones(spec, scenario, failed)
+        # These limits are tightened only if the flight followed slopes and turns.  A flight that cannot follow its plan
+        # is also too low or too close, which is not a separate cause.
+        changes = _raise_clearance(spec, scenario, failed) + _enlarge_missiles(spec, failed)
+        changes += _lower_max_height(spec, scenario, failed) + _widen_zone_margin(spec, scenario, failed)
     if not changes:
         return scenario, []
     return from_spec(spec, scenario.name, ground=scenario.terrain), changes
 
 
-def _limits(spec: Spec) -> Spec:
+def _limits_table(spec: Spec) -> Spec:
     return spec.setdefault("limits", {})
 
 
-def _slopes(spec: Spec, failed: list[Finding]) -> list[Tightening]:
+def _tighten_slopes(spec: Spec, failed: list[Finding]) -> list[Tightening]:
     changes = []
     keys: tuple[tuple[Tightened, float], ...] = (("max_climb_deg", 1.0), ("max_dive_deg", -1.0))
     for key, sign in keys:
@@ -103,24 +104,24 @@ def _slopes(spec: Spec, failed: list[Finding]) -> list[Tightening]:
         steep = [angle for angle in mine if angle > 0.0]
         if not steep:
             continue
-        now = _limits(spec).get(key, "aircraft")
+        now = _limits_table(spec).get(key, "aircraft")
         by_aircraft = any(item.limit_source == "aircraft" and item.margin and item.margin < 0.0 for item in failed)
         tighter: float | str = "aircraft"
         if now == "aircraft" or not by_aircraft:
             tighter = round(TIGHTENED_SHARE * min([*steep, *([now] if isinstance(now, float) else [])]), 2)
-        _limits(spec)[key] = tighter
+        _limits_table(spec)[key] = tighter
         changes.append(Tightening(key, now, tighter))
     return changes
 
 
-def _turns(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
+def _tighten_turns(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
     if not any(item.rule in ("turn", "waypoint", "corridor") for item in failed):
         return []
-    now = _limits(spec).get("max_turn_deg", "aircraft")
+    now = _limits_table(spec).get("max_turn_deg", "aircraft")
     if now != "aircraft":
-        _limits(spec)["max_turn_deg"] = "aircraft"
+        _limits_table(spec)["max_turn_deg"] = "aircraft"
         return [Tightening("max_turn_deg", now, "aircraft")]
-    # Larger arcs to plan with, while the flight keeps its bank.
+    # Plan with larger arcs; the flight keeps its maximum bank.
     bank = scenario.flight.max_bank_deg
     tighter = round(TIGHTENED_SHARE * bank, 2)
     if tighter < MIN_BANK_DEG:
@@ -129,31 +130,31 @@ def _turns(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tighte
     return [Tightening("max_bank_deg", bank, tighter)]
 
 
-def _clearance(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
+def _raise_clearance(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
     short = [-item.margin for item in failed if item.rule == "clearance" and item.margin is not None]
     if not short:
         return []
     now = scenario.limits.min_clearance_m
     tighter = round(now + max(0.0, *short) + CLEARANCE_BUFFER, 1)
-    _limits(spec)["min_clearance_m"] = tighter
+    _limits_table(spec)["min_clearance_m"] = tighter
     return [Tightening("min_clearance_m", now, tighter)]
 
 
-def _height(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
-    """Lower the maximum height above ground if the flight exceeded it and can fly lower."""
+def _lower_max_height(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
+    """Lower the maximum height above ground in `spec` if the flight exceeded it and can fly lower."""
     now = scenario.limits.max_height_m
     over = [-item.margin for item in failed if item.rule == "height" and item.margin is not None]
     if now is None or not over:
         return []
     tighter = round(now - max(0.0, *over) - CLEARANCE_BUFFER, 1)
-    if tighter <= float(_limits(spec).get("min_clearance_m", scenario.limits.min_clearance_m)):
+    if tighter <= float(_limits_table(spec).get("min_clearance_m", scenario.limits.min_clearance_m)):
         return []
-    _limits(spec)["max_height_m"] = tighter
+    _limits_table(spec)["max_height_m"] = tighter
     return [Tightening("max_height_m", now, tighter)]
 
 
-def _zones(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
-    """Widen the margin around zones if the flight violates one and the plan itself does not."""
+def _widen_zone_margin(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
+    """Widen the margin around zones in `spec` if the flight violated a zone and the plan itself did not."""
     mine = [item for item in failed if item.rule == "fence" and not (item.planned or 0.0) > ROUNDING_M]
     deep = [-item.margin for item in mine if item.margin is not None]
     if not deep:
@@ -165,12 +166,12 @@ def _zones(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tighte
     return [Tightening("zone_margin_m", now, tighter)]
 
 
-def _missiles(spec: Spec, failed: list[Finding]) -> list[Tightening]:
+def _enlarge_missiles(spec: Spec, failed: list[Finding]) -> list[Tightening]:
     changes = []
     for item in failed:
         if item.planned:
-            # The plan itself enters the sphere: the planner found no path outside it, and a larger sphere leaves none
-            # either.
+            # The plan itself enters the sphere, because the planner found no path outside.  It would find none outside
+            # a larger sphere either.
             continue
         depth = next((-fact.value for fact in item.facts if fact.what == "nearest"), None)
         if depth is None:
@@ -184,16 +185,16 @@ def _missiles(spec: Spec, failed: list[Finding]) -> list[Tightening]:
 
 # Changes and results of each round.
 Rounds = list[dict[str, Any]]
-# Function that plans and flies one round.
+# Function that plans and flies one round in a scenario; it returns the verdict, and whether the plan was flown.
 OneRound = Callable[[Scenario], tuple[Verdict, bool]]
 
 
 def refine(scenario: Scenario, most: int, one_round: OneRound, keep: Callable[[int], None]) -> tuple[Verdict, Rounds]:
-    """Plan and fly in rounds, each tightened by the one before, until flyable or shown not to be.
+    """Plan and fly in rounds, each with limits tightened by the previous round, until one flies or none can follow.
 
-    most: rounds after the first.
-    one_round: plans in a scenario and flies; returns the verdict, and whether it was flown.
-    keep: called with the number of a round whose results will be replaced by another round.
+    most: maximum number of rounds after the first.
+    one_round: plans in a scenario and flies; returns the verdict, and whether the plan was flown.
+    keep: called with the number of a round before another round replaces its results.
 
     Returns the last verdict, and the changes and results of each round in the format of ``rounds.json``.
     """
@@ -212,15 +213,15 @@ def refine(scenario: Scenario, most: int, one_round: OneRound, keep: Callable[[i
             }
         )
         planned_in, changes = tighten_limits(planned_in, verdict)
-        rounds[-1]["next"] = _next_step(verdict, flown, number == most, changes)
+        rounds[-1]["next"] = _next_step_remark(verdict, flown, number == most, changes)
         if rounds[-1]["next"] != GO_ON:
             break
         keep(number)
     return verdict, rounds
 
 
-def _next_step(verdict: Verdict, flown: bool, last: bool, changes: list[Tightening]) -> str:
-    """Return the remark on what follows a round."""
+def _next_step_remark(verdict: Verdict, flown: bool, last: bool, changes: list[Tightening]) -> str:
+    """Return the remark on the step after a round, which is `GO_ON` or the reason to end."""
     if verdict.flyable:
         return "done: it flies"
     if verdict.undecided:

@@ -1,4 +1,4 @@
-"""One trial: a setup with its geometric verdict, its flight, and the verdict on its flight."""
+"""Judge a setup by its geometry and by a trial flight."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,12 +17,13 @@ from logs.verdict.measures.route_requirements import RouteRequirements, route_re
 from logs.verdict.verdict import Verdict
 from world.errors import StartError
 
-# A mission predicted to need more than this many times the energy carried is not flown: it would show nothing more.
+# A mission is not flown if it is predicted to need more than this multiple of the energy carried, because the flight
+# would show nothing more.
 MAX_ENERGY_RATIO = 2.0
 
 
 class TrialAborted(Exception):
-    """Raised when a trial flight is aborted in a hurry."""
+    """Raised when a trial flight is aborted because `hurry` returned True."""
 
 
 # Function that returns True if trial flights should be aborted.
@@ -30,15 +31,15 @@ Hurry = Callable[[], bool]
 
 
 def no_hurry() -> bool:
-    """Return False: fly trials to their end."""
+    """Return False, so that trials are flown to their end."""
     return False
 
 
 @dataclass(eq=False)
 class Trial:
-    """A setup that is judged and flown when its verdicts are first requested, each once.
+    """A setup that is judged and flown when a verdict is first requested, and only once.
 
-    hurry: called throughout the flight; once it returns True the flight is aborted with TrialAborted.
+    hurry: called throughout the flight; once it returns True, the flight is aborted with TrialAborted.
     """
 
     setup: FlightSetup
@@ -57,7 +58,7 @@ class Trial:
 
     @cached_property
     def flight(self) -> tuple[Track, str]:
-        """Track of the flight and how it ended; the track of a flight that cannot begin has no row."""
+        """Track of the flight and the reason for its end; a flight that cannot start has no row."""
         reason = reason_not_to_start(self.requirements)
         if reason:
             return join_tracks([]), reason
@@ -78,9 +79,10 @@ class Trial:
 
 
 def reason_not_to_start(requirements: RouteRequirements) -> str:
-    """Return why a flight is not begun, "" if it is: it is predicted to need several times the energy carried.
+    """Return the reason not to start a flight, or "" if it may start.
 
-    Full power throughout that needs less than `MAX_ENERGY_RATIO` times the energy carried is no reason.
+    A flight is not started if it is predicted to need more than `MAX_ENERGY_RATIO` times the energy carried.  The
+    prediction is skipped if even full power throughout needs no more.
     """
     setup = requirements.setup
     seconds, full = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full

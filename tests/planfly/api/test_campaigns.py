@@ -128,7 +128,7 @@ def test_a_fence_that_is_named_is_kept_to(tmp_path: Path) -> None:
     ring = [[8.0, 46.01], [8.01, 46.01], [8.01, 46.02], [8.0, 46.01]]
     zone.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
     with_both, without = (
-        campaigns._open(
+        campaigns._open_base(
             mission,
             {"scenario": scenario, "fence": fences},
             default_dispersions(),
@@ -159,7 +159,7 @@ def test_a_plan_at_hand_is_flown_as_its_file_is(tmp_path: Path, monkeypatch: pyt
     (tmp_path / "field.toml").write_text(f"{FIELD}[planner]\npopulation = 20\ngenerations = 5\n", encoding="utf-8")
     plan = planfly.plan(tmp_path / "field.toml", seed=1, out=tmp_path / "plan.json")
     bases = [
-        campaigns._open(
+        campaigns._open_base(
             target,
             {"seed": 3, "wind": (4.0, 90.0)},
             default_dispersions(),

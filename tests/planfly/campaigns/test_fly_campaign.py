@@ -19,7 +19,7 @@ from planfly.campaigns import fly_campaign as fly_campaign_module
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.flight_requests import LOST, FlightRequest, FlyOne
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
-from planfly.campaigns.fly_campaign import _Book, _fly_rest, _Pace, fly_campaign, open_store, resumed_goal
+from planfly.campaigns.fly_campaign import _FlightTally, _fly_rest, _Pace, fly_campaign, open_store, resumed_goal
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally, lower_bound
 from planfly.campaigns.summary import summarise
 from planfly.campaigns.tables import DATABASE, StoreError, kept_settings, read_table
@@ -65,7 +65,7 @@ def test_it_decides_in_the_order_of_indices_whoever_was_quicker(order: int) -> N
     goal = Goal(0.95, True, 500)
     shuffled = list(range(80))
     random.Random(order).shuffle(shuffled)
-    book = _Book(Estimator(goal), goal)
+    book = _FlightTally(Estimator(goal), goal)
     for index in shuffled:
         book.add(index, "flyable")
     # 59 flights without a failure show 0.95; those beyond are not looked at.
@@ -76,7 +76,7 @@ def test_it_decides_in_the_order_of_indices_whoever_was_quicker(order: int) -> N
 
 def test_what_is_known_is_not_sent_again() -> None:
     goal = Goal(None, False, 6)
-    book = _Book(Estimator(goal), goal)
+    book = _FlightTally(Estimator(goal), goal)
     for known in (0, 1, 3):
         book.add(known, "flyable")
     sent = []
@@ -93,7 +93,7 @@ def test_the_last_line_of_progress_counts_every_flight(base: CampaignBase, tmp_p
 
     goal, told = Goal(None, False, 6), list[tuple[float, float, str]]()
     estimator = Estimator(goal)
-    book = _Book(estimator, goal)
+    book = _FlightTally(estimator, goal)
     pace = _Pace(goal, estimator, book.tally, lambda *said: told.append(said))
     with open_store(base, goal, tmp_path, resume=False) as store:
         _fly_rest(cast("WorkerPool", AtOnce()), book, store, pace)

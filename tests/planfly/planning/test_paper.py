@@ -136,7 +136,7 @@ def test_a_signal_while_processes_start_leaves_none_half_started(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """A process that is started and gets no task ends with a traceback."""
-    results = paper._results([(7, "umda", seed) for seed in (1, 2, 3)], 2)
+    results = paper._plan_in_processes([(7, "umda", seed) for seed in (1, 2, 3)], 2)
     next(results)
     resource_tracker.ensure_running()
     spawn, started = multiprocessing.util.spawnv_passfds, list[int]()

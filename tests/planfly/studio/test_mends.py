@@ -321,7 +321,7 @@ class ByWhom:
 def test_works_are_pickled_where_missions_are_judged() -> None:
     """Judging fills caches of the mission: pickled beside it, a flight was lost, and every one after it."""
     server = server_of(drawn_session(5, 12))
-    work = pickle.loads(server._packed(Work(1, "works.fly", ByWhom())))
+    work = pickle.loads(server._pack_work(Work(1, "works.fly", ByWhom())))
     assert work.payload.startswith("studio-judge")
 
 
@@ -331,7 +331,7 @@ def test_a_stale_drag_is_answered() -> None:
     async def run() -> list[dict[str, Any]]:
         server, page = server_of(session), Page(NoSocket(), dark=False)  # type: ignore[arg-type]
         drag = {"kind": "drag", "rev": session.rev + 1, "n": 7, "k": 2, "east": 0.0, "north": 0.0}
-        await server._hear(page, json.dumps(drag))
+        await server._handle_message(page, json.dumps(drag))
         task = asyncio.create_task(server._preview(page))
         while page.frames.empty():
             await asyncio.sleep(0.01)
@@ -346,10 +346,10 @@ def test_a_value_out_of_range_is_a_fault_and_no_message_is_the_end() -> None:
 
     async def run() -> list[dict[str, Any]]:
         server, page = server_of(session), Page(NoSocket(), dark=False)  # type: ignore[arg-type]
-        await server._hear(page, '{"kind": "raise", "rev": 1, "by": 1e9}')
+        await server._handle_message(page, '{"kind": "raise", "rev": 1, "by": 1e9}')
         for text in ('{"kind": "x"}', "[", "{}"):
             with pytest.raises(ValueError, match="1 validation error"):
-                await server._hear(page, text)
+                await server._handle_message(page, text)
         return sent(page)
 
     (fault,) = asyncio.run(run())
