@@ -1,7 +1,7 @@
 """The waypoint rule: judge if each waypoint was reached within the mission's or the autopilot's radius.
 
 ArduPlane also considers a waypoint reached, and turns to the next leg, once the aircraft has crossed the line across
-the leg at its end, however far to the side.  For ArduPlane's simulated law this crossing is accepted within the corridor.
+the leg at its end, however far to the side.  For ArduPlane's simulated law, crossing within the corridor is accepted.
 The rule ignores altitude, because other rules judge the harm that a wrong altitude can do.
 """
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Home
-from logs.verdict.measures.photo_lines import LineMeasure, _cells, over_ground
+from logs.verdict.measures.photo_lines import LineMeasure, _line_steps, over_ground
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rules.survey_rule import _is_too_tight, lost_text
 from tests.logs.verdict.judging import judge
@@ -28,7 +28,7 @@ def test_low_over_ground_a_photo_may_be_five_metres_off(off: float, lost: float)
 
 def test_a_line_is_looked_at_metre_by_metre() -> None:
     along = np.arange(0.0, 12.25, 0.25)
-    taken = _cells(along, along <= 7.0, 12.0)
+    taken = _line_steps(along, along <= 7.0, 12.0)
     assert (len(taken), np.count_nonzero(taken)) == (12, 7)
 
 
