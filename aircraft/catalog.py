@@ -163,7 +163,7 @@ def find_aircraft(name: str) -> Aircraft:
 
 
 def find_again(name: str, asked: str) -> Aircraft:
-    """Return the aircraft that a setup or a log names, given the name or folder that its scenario states.
+    """Return the aircraft called `name` in a setup or log, whose scenario states the name or folder `asked`.
 
     Raise FlightError as `load_aircraft` does.
 
@@ -190,7 +190,7 @@ def read_aircraft(folder: Path) -> Aircraft:
         raise FlightError(f"{file}: title = {title!r} is not a text", file=file, field="title", value=title)
     try:
         model = read_model(table.pop("model"), folder.name) if "model" in table else DEFAULT_MODEL
-        values = _numbers(table)
+        values = _numeric_fields(table)
     except FlightError as error:
         raise FlightError.from_error(error, file) from None
     if not values["stall_speed"] <= values["airspeed_min"] <= values["airspeed"] <= values["airspeed_max"]:
@@ -204,7 +204,7 @@ def read_aircraft(folder: Path) -> Aircraft:
     return Aircraft(name=folder.name, title=title, folder=folder, model=model, **values)
 
 
-def _numbers(table: dict[str, Any]) -> dict[str, float]:
+def _numeric_fields(table: dict[str, Any]) -> dict[str, float]:
     """Return the numeric fields of `Aircraft`; raise FlightError without the file's name."""
     store = _FUEL_KEYS if set(_FUEL_KEYS) & table.keys() else _BATTERY_KEYS
     allowed = {*_FIELD_BY_KEY, *store}
@@ -285,7 +285,7 @@ def make_own_folder(folder: Path, source: Aircraft) -> tuple[str, ...]:
     1124.9
     """
     target = check_new_folder(folder)
-    files = _renamed(source, target.name)
+    files = _renamed_files(source, target.name)
     write_folder(target, files)
     return tuple(sorted(files))
 
@@ -308,8 +308,8 @@ def check_new_folder(folder: Path) -> Path:
     return target
 
 
-def _renamed(source: Aircraft, name: str) -> dict[str, bytes]:
-    """Return the contents of the new folder by path: the aircraft's files, with its own two renamed."""
+def _renamed_files(source: Aircraft, name: str) -> dict[str, bytes]:
+    """Return the aircraft's files for a new folder, by path, with the model and metadata files renamed."""
     folders = [source.folder, *(folder for folder in source.model_folders if source.folder in folder.parents)]
     found = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]
     files = {}

@@ -124,7 +124,7 @@ def _leg_begins(first: list[int], count: int) -> list[int]:
 def _planned_altitudes(
     at: Floats, route: Floats, above: Floats, distance: Floats, up: Floats, ground: Floats, scenario: Scenario
 ) -> Floats:
-    """Return the planned altitude at each route sample, m AMSL, (s,), with height above ground on terrain-following legs.
+    """Return the planned altitude at each route sample, m AMSL, (s,); terrain-following legs keep above the ground.
 
     at: distance of each waypoint along the route, m.
     above: height above ground at the end of each leg, m, (w,); NaN if the leg does not follow the terrain.
