@@ -164,7 +164,7 @@ def find_aircraft(name: str) -> Aircraft:
 
 
 def find_again(name: str, asked: str) -> Aircraft:
-    """Return the aircraft that a setup or a log names, given the name or folder that its scenario states.
+    """Return the aircraft called `name` in a setup or log, whose scenario states the name or folder `asked`.
 
     Raise FlightError as `load_aircraft` does.
 
@@ -192,7 +192,7 @@ def read_aircraft(folder: Path) -> Aircraft:
         raise FlightError(f"{file}: title = {title!r} is not a text", file=file, field="title", value=title)
     try:
         model = read_model(table.pop("model"), folder.name) if "model" in table else DEFAULT_MODEL
-        values = _numbers(table)
+        values = _numeric_fields(table)
     except FlightError as error:
         raise FlightError.from_error(error, file) from None
     if not values["stall_speed"] <= values["airspeed_min"] <= values["airspeed"] <= values["airspeed_max"]:

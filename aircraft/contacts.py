@@ -82,7 +82,7 @@ def usual_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def contacts_of(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
-    """Return the contacts that an aircraft flies with: its model's contacts, or the usual ones.
+    """Return the contacts that an aircraft flies with: its model's contacts, or the usual contacts without any.
 
     Contacts that it stands on come first.
 
@@ -101,7 +101,7 @@ def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
     if _own_contacts(model):
         return model
     made = usual_contacts(aircraft, gear)
-    text = "\n".join(_contact_xml(contact, aircraft, made, _centre(model)) for contact in made)
+    text = "\n".join(_contact_xml(contact, aircraft, made, _center_of_gravity(model)) for contact in made)
     section = f"<ground_reactions>\n{text}\n</ground_reactions>".encode()
     found, count = re.subn(rb"<ground_reactions\s*(/>|>\s*</ground_reactions>)", lambda _: section, model, count=1)
     return found if count else model.replace(b"</fdm_config>", section + b"\n</fdm_config>")
@@ -133,19 +133,19 @@ def _own_contacts(model: bytes) -> tuple[Contact, ...]:
 
     It stands on its wheels, or on its lowest points if it has none.
     """
-    found = _stated(model)
+    found = _read_contacts(model)
     if not any(one.wheel for one in found):
         deepest = max((one.down for one in found), default=0.0)
         found = [replace(one, stands=one.down >= _MIN_SKID_DEPTH_RATIO * deepest > 0.0) for one in found]
     return tuple(sorted(found, key=lambda one: not one.stands))
 
 
-def _stated(model: bytes) -> list[Contact]:
-    """Return the contacts of a model, of which only the wheels stand."""
+def _read_contacts(model: bytes) -> list[Contact]:
+    """Return the contacts of a model, with `stands` set for wheels only."""
     section = ElementTree.fromstring(model).find("ground_reactions")
-    found, centre = [], _centre(model)
+    found, centre = [], _center_of_gravity(model)
     for one in [] if section is None else section.findall("contact"):
-        place = _place(one.find("location"))
+        place = _location(one.find("location"))
         if place is None:
             continue
         wheel = one.get("type", "BOGEY") == "BOGEY"
@@ -154,7 +154,7 @@ def _stated(model: bytes) -> list[Contact]:
     return found
 
 
-def _centre(model: bytes) -> Floats:
+def _center_of_gravity(model: bytes) -> Floats:
     """Return the loaded aircraft's center of gravity, (3,) m aft, right, up.
 
     It is relative to the model's reference point, and includes the empty aircraft, its point masses and the initial
@@ -162,9 +162,9 @@ def _centre(model: bytes) -> Floats:
     """
     root = ElementTree.fromstring(model)
     empty = [one for one in root.findall("mass_balance/location") if one.get("name") == "CG"]
-    loads = [(root.find("mass_balance/emptywt"), _place(empty[0]) if empty else None)]
-    loads += [(one.find("weight"), _place(one.find("location"))) for one in root.findall("mass_balance/pointmass")]
-    loads += [(one.find("contents"), _place(one.find("location"))) for one in root.findall("propulsion/tank")]
+    loads = [(root.find("mass_balance/emptywt"), _location(empty[0]) if empty else None)]
+    loads += [(one.find("weight"), _location(one.find("location"))) for one in root.findall("mass_balance/pointmass")]
+    loads += [(one.find("contents"), _location(one.find("location"))) for one in root.findall("propulsion/tank")]
     carried = [(_mass(weight), place) for weight, place in loads if place is not None]
     total = sum(mass for mass, _ in carried)
     if not total > 0.0:
@@ -179,8 +179,8 @@ def _mass(weight: ElementTree.Element | None) -> float:
     return _KILOGRAMS_PER_UNIT.get(weight.get("unit", "LBS"), 1.0) * float(weight.text or "0")
 
 
-def _place(location: ElementTree.Element | None) -> Floats | None:
-    """Return a location of a model, (3,) m, or None."""
+def _location(location: ElementTree.Element | None) -> Floats | None:
+    """Return a location of a model, m, (3,), or None if it has none."""
     if location is None:
         return None
     unit = _METERS_PER_UNIT.get(location.get("unit", "IN"), 1.0)

@@ -346,13 +346,13 @@ def size_aircraft(sheet: DataSheet, title: str = "", kind: AircraftClass | None 
     (0.269, ('area', 'top', 'bank', 'climb', 'volts', 'energy'))
     """
     kind = CLASSES[sheet.layout] if kind is None else kind
-    filled, guessed = _filled(sheet)
+    filled, guessed = _fill_sheet(sheet)
     aero = _aerodynamics(filled, kind)
     drag = _drag_of(filled, aero)
     if sheet.sink:
-        aero, drag = _with_sink(filled, aero, sheet.sink)
+        aero, drag = _match_sink(filled, aero, sheet.sink)
     propulsion: ElectricMotor | FuelEngine
-    propulsion, filled = (_engine if sheet.fuelled else _motor)(sheet, filled, drag)
+    propulsion, filled = (_engine if sheet.fuelled else _size_motor)(sheet, filled, drag)
     chord = filled.area / filled.span
     jx, jy, jz = (filled.mass * (share * filled.span) ** 2 for share in kind.gyration)
     numbers = ModelNumbers(
@@ -377,7 +377,7 @@ def size_aircraft(sheet: DataSheet, title: str = "", kind: AircraftClass | None 
 _LAYOUT_TEXTS = {"tail": "aircraft with a tail", "wing": "flying wing", "vtail": "aircraft with a V-tail"}
 
 
-def _filled(sheet: DataSheet) -> tuple[DataSheet, tuple[str, ...]]:
+def _fill_sheet(sheet: DataSheet) -> tuple[DataSheet, tuple[str, ...]]:
     """Return the sheet with missing values filled in, and the names of those values."""
     usual: dict[str, Any] = {
         "area": _area(sheet),
@@ -464,8 +464,8 @@ def _drag_of(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
     return drag
 
 
-def _with_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[AeroCoefficients, Drag]:
-    """Set the least drag for a stated sink rate (m/s) without power at cruise, with a folded propeller."""
+def _match_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[AeroCoefficients, Drag]:
+    """Set the minimum drag to match a sink rate (m/s) at cruise without power, with a folded propeller."""
     angle = math.asin(min(0.5, sink / sheet.cruise))
     area_pressure = 0.5 * SHEET_DENSITY * sheet.cruise**2 * sheet.area
     lift = _weight(sheet) * math.cos(angle) / area_pressure
@@ -485,8 +485,8 @@ def _with_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[A
 # Motor and propeller that give the stated climb at cruise and the stated top speed.
 
 
-def _motor(stated: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[ElectricMotor, DataSheet]:
-    """Return motor and propeller of a sheet, and the sheet with the climb and top speed that they give.
+def _size_motor(stated: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[ElectricMotor, DataSheet]:
+    """Size motor and propeller for a sheet, and return them with the sheet's resulting climb and top speed.
 
     A stated propeller fixes diameter and pitch, a stated motor its speed per volt; free values are chosen to meet the
     climb, and the throttle of level flight or the top speed. If motor and propeller are both stated, climb and top
@@ -602,11 +602,11 @@ def _thrust_error(motor: Drive, sheet: DataSheet, drag: Drag, name: str) -> floa
 
 
 def _solve_errors(errors: Callable[[Sequence[float]], list[float]], count: int, sheet: DataSheet) -> list[float]:
-    """Return positive numbers near 1 at which all errors vanish. Raise FlightError without a solution."""
+    """Solve for positive numbers near 1 at which all errors vanish. Raise FlightError without a solution."""
     if not count:
         return []
     for size in (1.0, 0.6, 1.7):
-        x = _newton(lambda x: np.array(errors(np.exp(x).tolist())), np.log([size, 1.0 / size][:count]))
+        x = _solve_by_newton(lambda x: np.array(errors(np.exp(x).tolist())), np.log([size, 1.0 / size][:count]))
         if x is not None:
             return np.exp(x).tolist()
     raise _no_propeller(sheet)
@@ -622,8 +622,8 @@ _SEARCH_BOUND = 2.5
 _THRUST_TOLERANCE_RATIO = 1e-7
 
 
-def _newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | None:
-    """Return numbers within the bound at which the errors vanish, by Newton's method, or None.
+def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | None:
+    """Solve for numbers within the bound at which the errors vanish, by Newton's method; return None if it fails.
 
     A step that does not reduce the errors is halved.
     """

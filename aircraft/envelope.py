@@ -1,4 +1,4 @@
-"""Performance envelope of an aircraft: steady climb, descent, speed and power over airspeed and altitude."""
+"""Performance envelope of an aircraft: steady climb, descent, speed and power by airspeed and altitude."""
 
 import math
 from dataclasses import dataclass, field, replace

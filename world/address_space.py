@@ -13,7 +13,7 @@ LLVM_ROOM = 192 * 2**20
 
 
 class AddressSpaceError(MemoryError):
-    """The limit leaves too little address space for a library: a fault of the machine, not of a file."""
+    """Error for a limit that leaves too little address space for a library; the machine is at fault, not a file."""
 
 
 def has_room(size: int) -> bool:

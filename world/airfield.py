@@ -82,7 +82,7 @@ class Launch:
         return {"catapult": _CATAPULT_SPEED_RATIO * slowest, "hand": _THROW_SPEED_MPS, "runway": 0.0}[self.method]
 
     def acceleration(self, slowest: float) -> float:
-        """Return the mean acceleration along the launch, m/s2: v^2 / 2 L; 0 for a runway.
+        """Return the mean acceleration along the launch, v^2 / (2 L), m/s^2; 0 for a runway.
 
         slowest: slowest level flight, m/s.
 
@@ -172,7 +172,7 @@ class AskedReturns:
 def make_home(
     table: HomeTable | None, source: str, origin: GeoOrigin, ground: Terrain | None, bounds: Floats, start: Floats
 ) -> Floats | None:
-    """Return home (3,), m, on the ground, or None without a table.
+    """Return home on the ground, m, (3,), or None without a table.
 
     start: (3,) m, above home if place = "start".  source: name of the file in messages.
     Raises ScenarioError if home is outside the area (2, 2), or if the ground height there is not known.
@@ -227,7 +227,7 @@ def make_returns(
 
 
 def _on_ground(key: str, place: tuple[float, float], source: str, ground: Terrain | None, bounds: Floats) -> Floats:
-    """Return a place with the height of its ground, (3,) m."""
+    """Return a place on the ground, m, (3,)."""
     check_in_area(key, np.array(place), source, bounds)
     under = float(ground.height(*place)) if ground is not None else math.nan
     if math.isnan(under):

@@ -29,7 +29,7 @@ _NUMBERS: dict[Any, Any] = {
 
 
 class Reference(types.Type):
-    """Numba's type of a pointer to a named tuple's fields as they lie in memory."""
+    """Numba's type of a pointer to the fields of a named tuple in memory."""
 
     def __init__(self, held: Any) -> None:
         """Point to this named tuple type, under a short name that keeps the names of compiled functions short."""
@@ -117,7 +117,7 @@ def _in_memory(kind: Any, value: Any) -> Any:
 
 
 def _member(kind: Reference, name: str) -> tuple[int, Any]:
-    """Return the index and type of a field; a field of a marked class is again a pointer."""
+    """Return the index and type of a field; the type is a pointer if the field's class is marked."""
     number = kind.held.fields.index(name)
     member = kind.held.types[number]
     if _is_named(member) and hasattr(member.instance_class, "_address"):

@@ -1,4 +1,4 @@
-"""Callbacks before kernels are compiled, which takes time only for kernels that are not in the cache."""
+"""Callbacks that run before a kernel is compiled, which takes time and happens only for kernels not in the cache."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -26,6 +26,6 @@ def tell_before_compiling(told: BeforeCompiling) -> Iterator[None]:
 
 
 def kernel_is_compiled() -> None:
-    """Call the innermost callback: a kernel is about to be compiled, because no cache has it."""
+    """Call the innermost callback, because a kernel that is not in the cache is about to be compiled."""
     if _callbacks:
         _callbacks[-1]()

@@ -22,7 +22,7 @@ from typing import Any, Self
 
 
 class PlanflyError(Exception):
-    """Bad input: the message names file, field, value and range in one line.
+    """Error for bad input; the message names file, field, value and range in one line.
 
     file: source of the input: a file's path, a scenario's name, or another beginning of the message; "" if unknown.
     field: key, column or option; "" if unknown, or if the fault concerns the whole file.
@@ -114,7 +114,7 @@ class FlightError(PlanflyError):
 
 
 class CrashError(FlightError):
-    """The controlling program failed in flight: a failure of the machine, not bad input."""
+    """Error for a controlling program that failed in flight, which is a failure of the machine, not bad input."""
 
 
 class ParameterError(PlanflyError):
@@ -122,7 +122,7 @@ class ParameterError(PlanflyError):
 
 
 class StartError(FlightError):
-    """A flight cannot begin as its mission states.
+    """Error for a flight that cannot begin as its mission states.
 
     The aircraft and the place are known, but no flight is possible there.
     source: mission or command that requires it.  reason: why it cannot begin.  field, value, allowed: as in
@@ -146,11 +146,11 @@ class LogError(PlanflyError):
 
 
 class ArgumentError(PlanflyError, ValueError):
-    """An argument of a call is out of its range."""
+    """Error for an argument of a call that is out of range."""
 
 
 class MissingExtraError(PlanflyError, ImportError):
-    """A feature needs an extra of planfly that is not installed.
+    """Error for a feature that needs an extra of planfly that is not installed.
 
     value: the extra's name.  allowed: the command that installs it.  name: the module that is missing.
     """

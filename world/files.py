@@ -159,7 +159,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def write_whole(path: Path, data: str | bytes) -> None:
-    """Write a file under a temporary name next to its target and rename it, so that it is written whole or not at all.
+    """Write a file completely or not at all, by renaming a temporary file next to it.
 
     Text is written in UTF-8.  A target that is a link stays a link: the file that it leads to is replaced.  Raises
     OSError, which names the target, and leaves the old file.

@@ -91,11 +91,11 @@ def _open(file: Path, driver: str, unreadable: str) -> RasterFile:
         except (RasterioError, OSError) as error:
             raise TerrainError(f"{file}: cannot be read: {_first_error_line(error)}", file=file) from error
 
-    return _place(file, shape, grid, crs, unit, read)
+    return _georeferenced(file, shape, grid, crs, unit, read)
 
 
 def _first_error_line(error: BaseException) -> str:
-    """Return the text of the first error in a line: the text of the last one only refers to the previous error."""
+    """Return the text of the first error of a chain in one line, because the last error only refers to earlier ones."""
     while error.__cause__ is not None:
         error = error.__cause__
     return one_line(error)
@@ -115,7 +115,7 @@ def _refuse_layout(file: Path, source: Any) -> None:
 
 
 def _refuse_unplaced(file: Path) -> NoReturn:
-    """Raise TerrainError for a file without a place on Earth."""
+    """Raise TerrainError for a file without georeferencing."""
     beside = file.with_name(f"{file.name}.aux.xml")
     unread = f" in the file itself; {beside.name} is not read" if beside.exists() else ""
     raise TerrainError(f"{file}: no coordinate reference system and position are stated{unread}", file=file)
@@ -149,8 +149,8 @@ def _unit_of(unit: str, tags: Iterable[tuple[str, str]]) -> str:
     return unit
 
 
-def _place(file: Path, shape: tuple[int, int], grid: Grid, crs: str | None, unit: str, read: Any) -> RasterFile:
-    """Make a file of heights in metres on a grid of its reference system.  Raises TerrainError."""
+def _georeferenced(file: Path, shape: tuple[int, int], grid: Grid, crs: str | None, unit: str, read: Any) -> RasterFile:
+    """Return a raster file with its georeferencing; its heights must be in metres.  Raises TerrainError."""
     a, b, c, d, e, f = grid
     determinant = a * e - b * d
     if crs is None or determinant == 0.0:
@@ -204,17 +204,17 @@ def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, o
 
 
 def _clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: int) -> None:
-    """Set missing blocks of a GeoTIFF to NaN: GDAL reads 0 there if the file states no value for missing data."""
+    """Set missing blocks of a GeoTIFF to NaN, because GDAL reads 0 if the file has no value for missing data."""
     rows, cols = source.block_shapes[0]
     bottom, right = top + len(heights), left + heights.shape[1]
     for down in range(top // rows, -(-bottom // rows)):
         for across in range(left // cols, -(-right // cols)):
-            if _span(source, down, across) is None:
+            if _block_bytes(source, down, across) is None:
                 above, before = max(0, down * rows - top), max(0, across * cols - left)
                 heights[above : (down + 1) * rows - top, before : (across + 1) * cols - left] = np.nan
 
 
-def _span(source: Any, down: int, across: int) -> tuple[int, int] | None:
+def _block_bytes(source: Any, down: int, across: int) -> tuple[int, int] | None:
     """Return the bytes [begin, end) of a block of an open GeoTIFF; None for a block that was never written."""
     at, size = (source.get_tag_item(f"BLOCK_{what}_{across}_{down}", "TIFF", bidx=1) for what in ("OFFSET", "SIZE"))
     return None if at is None or size is None else (int(at), int(at) + int(size))
@@ -231,7 +231,7 @@ def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple
         rows, cols = source.block_shapes[0]
         for down in range(top // rows, -(-bottom // rows)):
             for across in range(left // cols, -(-right // cols)):
-                if (span := _span(source, down, across)) is not None:
+                if (span := _block_bytes(source, down, across)) is not None:
                     yield span
 
 

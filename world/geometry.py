@@ -87,7 +87,7 @@ def path_length(waypoints: ArrayLike) -> Floats:
 
 
 def tangent_length(turn: float, radius: float) -> float:
-    """Return the length of leg (m) on either side of a waypoint that its fly-by arc takes: R tan(turn / 2).
+    """Return the length of leg that a fly-by arc uses on either side of its waypoint, R tan(turn / 2), m.
 
     turn: rad, from 0 to below pi.  radius: m.
 
@@ -98,7 +98,7 @@ def tangent_length(turn: float, radius: float) -> float:
 
 
 def fly_by_offset(turn: float, radius: float) -> float:
-    """Return the distance (m) at which a fly-by arc passes its waypoint: R (1 / cos(turn / 2) - 1).
+    """Return the distance at which a fly-by arc passes its waypoint, R (1 / cos(turn / 2) - 1), m.
 
     turn: rad, from 0 to below pi.  radius: m.
 
@@ -124,7 +124,7 @@ def turning_angle(ax: float, ay: float, bx: float, by: float, cx: float, cy: flo
 
 @inlined
 def sphere_window(a: Floats, b: Floats, centre: Floats, radius: float) -> tuple[float, float, float]:
-    """Intersect the segment a-b with a sphere: closest distance to its centre (m), fractions of entry and exit.
+    """Intersect the segment a-b with a sphere; return the distance to its centre, m, and fractions of entry and exit.
 
     a, b, centre: (3,).  Both fractions are in [0, 1], and 0 if the segment stays outside.  A point on the surface is
     inside (paper eq. 9: d <= R).
@@ -175,7 +175,7 @@ def segment_exposure(a: Floats, b: Floats, centre: Floats, radius: float, scale:
 
 @inlined
 def window_exposure(enter: float, leave: float, length2: float, along: float, start2: float, scale: float) -> float:
-    """Return the mean over a segment of (scale/d)^4 between two fractions of it: the integral of `segment_exposure`.
+    """Return the mean over a segment of (scale/d)^4 between two of its fractions, which `segment_exposure` integrates.
 
     length2: squared length.  along: step times (start - centre).  start2: squared distance of the start.
     """

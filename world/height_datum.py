@@ -1,4 +1,4 @@
-"""Vertical datum of an elevation file: mean sea level, or the ellipsoid, some 47 m below it in the Alps.
+"""Vertical datum of an elevation file: mean sea level, or the ellipsoid, which is some 47 m lower in the Alps.
 
 Heights above an ellipsoid are converted with PROJ's grid of the geoid if this machine has it, and refused otherwise.  A
 datum that the user states overrides the datum of the file.
@@ -85,7 +85,7 @@ def _constant_sea_level(height: float) -> Callable[[Floats, Floats], Floats]:
 
 
 def _undulation(transformer: Any) -> Callable[[Floats, Floats], Floats]:
-    """Make a function of the geoid's height above the ellipsoid: minus the converted ellipsoidal height of 0."""
+    """Return a function for the geoid's height above the ellipsoid: minus the converted ellipsoidal height 0."""
 
     def heights(lon: Floats, lat: Floats) -> Floats:
         _, _, below = transformer.transform(lon, lat, np.zeros(np.shape(lon)))

@@ -57,7 +57,7 @@ def _fill_cells(heights: Heights, to_pixel: PolyMapRecord, west: float, south: f
 
 @inner
 def _raise(out: Floats, i: int, j: int, height: float) -> None:
-    """Raise a cell to a height if it is lower; a cell outside the array is ignored, and NaN stays."""
+    """Raise cell (i, j) of `out` to a height if it is lower; ignore a cell outside the array, and keep NaN."""
     if 0 <= i < out.shape[0] and 0 <= j < out.shape[1] and (height > out[i, j] or math.isnan(height)):
         out[i, j] = height
 

@@ -49,7 +49,7 @@ _state = _State()
 
 
 def interrupt(number: int, _frame: FrameType | None = None) -> None:
-    """Raise `Interrupted` for a signal, at once or at the end of an `uninterrupted` block: a signal handler.
+    """Handle a signal by raising `Interrupted`, immediately or at the end of an `uninterrupted` block.
 
     >>> import signal
     >>> try:
@@ -65,7 +65,7 @@ def interrupt(number: int, _frame: FrameType | None = None) -> None:
 
 
 class uninterrupted:
-    """Context manager that completes its block; a signal that arrives meanwhile is raised at the end.
+    """Context manager that completes its block, and raises a signal that arrives meanwhile at the end.
 
     >>> import signal
     >>> try:
@@ -132,7 +132,7 @@ def _remove(path: Path) -> bool:
 
 @contextlib.contextmanager
 def children_ignore_sigint() -> Iterator[None]:
-    """Block SIGINT in processes that are started inside: Ctrl-C reaches a whole terminal, and their parent ends them.
+    """Block SIGINT in child processes started inside, because Ctrl-C reaches all of them but their parent ends them.
 
     This process receives at the end a SIGINT that arrives meanwhile.  Use it with `uninterrupted`: if another signal
     interrupts the start, the child waits for its task and ends with a traceback.

@@ -39,12 +39,12 @@ def kernel_sources(root: Path) -> dict[str, bytes]:
         name = waiting.pop()
         if name in contents and name not in found:
             found[name] = contents[name]
-            waiting += _imported(contents[name])
+            waiting += _imported_paths(contents[name])
     return found
 
 
-def _imported(content: bytes) -> list[str]:
-    """Return paths that a source may import: of modules, and of names in packages, which may be modules."""
+def _imported_paths(content: bytes) -> list[str]:
+    """Return the paths of modules that a source may import, including names in packages, which may be modules."""
     paths = []
     for module, names in _IMPORT.findall(content):
         path = module.decode().replace(".", "/")
@@ -73,7 +73,7 @@ _PREFIX = "kernels-"
 
 
 def wanted_folder(base: Path, root: Path) -> Path:
-    """Return the folder within a base where the kernels of the sources below a root are kept.
+    """Return the folder in `base` for the kernels of the sources below a root.
 
     A base that already is such a folder, or a temporary one of this process, is returned unchanged.
 

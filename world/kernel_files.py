@@ -19,7 +19,7 @@ _DIGEST_BYTES = 32
 
 
 class CheckedCacheFiles(IndexDataCacheFile):
-    """Index and data files of one kernel; a file that is missing, damaged or cannot be read holds nothing.
+    """Index and data files of one kernel; a file that is missing, damaged or unreadable counts as empty.
 
     The digest of a data file covers the types of its compiled form, which the index maps to the file's name.
     """

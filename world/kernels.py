@@ -37,7 +37,7 @@ TEMPORARY = _usable not in (WANTED, None)
 
 
 class _Compiling(event.Listener):
-    """Listener that reports when numba compiles a kernel, which it does only for kernels not in its cache."""
+    """Listener that reports when numba compiles a kernel that is not in its cache."""
 
     def on_start(self, event: Any) -> None:
         """Report a kernel before it is compiled."""

@@ -77,7 +77,7 @@ class Signals:
         return made
 
     def thinned(self, every: int, extra: Mapping[str, Floats]) -> "Signals":
-        """Return one of ``every`` rows, low-passed before.
+        """Return every ``every``-th row, after low-pass filtering.
 
         extra: (n,) further columns to thin alike.
         """
@@ -169,7 +169,7 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
 
 
 def invert_first_order_lag(values: Floats, lag: float, hertz: float) -> Floats:
-    """Return values (n,) before a first-order lag (s): each plus the lag times its rate of change.
+    """Return values (n,) before a first-order lag (s), which are the values plus the lag times their rate of change.
 
     >>> invert_first_order_lag(np.arange(4.0), 0.5, 10.0)
     array([5., 6., 7., 8.])
@@ -190,7 +190,7 @@ _SIMPLEX_STEPS_S = np.diag([0.02, 0.02, 0.03])
 
 
 def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
-    """Return the clocks with the smallest misfit: best of a grid, then a simplex (Nelder and Mead 1965).
+    """Find the clocks with the smallest misfit, by a grid and then a simplex search (Nelder and Mead 1965).
 
     >>> found = find_clocks(lambda clock: abs(clock.lag - 0.05) + abs(clock.delay - 0.03) + clock.servo_lag)
     >>> round(found.lag, 2), round(found.delay, 2), round(found.servo_lag, 2)

@@ -119,7 +119,7 @@ class ForwardForces:
 def fit_drag(
     signals: Signals, base: BaseModel, values: Floats, flow: Flow, doubt: AlphaDoubt | None = None
 ) -> tuple[Fit, Floats, Floats]:
-    """Fit drag and motor: the fit, values (5,) of the parameters, and their covariance (5, 5).
+    """Fit drag and motor; return the fit, the parameters' values (5,), and their covariance (5, 5).
 
     The values give the same forces and currents with the base's own resistance, idle current, voltage and elevator drag
     as the fit does with its own.
@@ -132,9 +132,9 @@ def fit_drag(
     with_current = bool(np.isfinite(thin.current).all())
     means, sds = drag_priors(with_current=with_current)
     # First the forces alone, then both: with the current from the start the first steps would diverge.
-    fit = _search(forces, _Measurement(thin, with_current=False), means, sds)
+    fit = _fit_from(forces, _Measurement(thin, with_current=False), means, sds)
     if with_current:
-        fit = _search(forces, _Measurement(thin, with_current=True), means, sds, fit.estimate)
+        fit = _fit_from(forces, _Measurement(thin, with_current=True), means, sds, fit.estimate)
     force, _ = forces.predicted(fit.estimate)
     goal = thin.smooth(thin.acceleration[:, 0], FORCE_BAND)
     explained = 1.0 - float((goal - force).var() / goal.var())
@@ -151,7 +151,7 @@ def drag_priors(*, with_current: bool) -> tuple[Floats, Floats]:
 
 
 def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Floats]:
-    """Fold the aircraft's nuisances into the parameters: return their values (5,) and derivatives (5, p).
+    """Fold the aircraft's nuisances into the parameters; return the parameters' values (5,) and derivatives (5, p).
 
     Least squares over the log's own flow and throttle. unknown: (p,) as fitted.
     """
@@ -184,7 +184,9 @@ class _Measurement:
         self.block, self.floor = signals.block, FORCE_FLOOR**2 * FLOOR_SECONDS * signals.hertz
 
 
-def _search(forces: ForwardForces, goal: _Measurement, means: Floats, sds: Floats, start: Floats | None = None) -> Fit:
+def _fit_from(
+    forces: ForwardForces, goal: _Measurement, means: Floats, sds: Floats, start: Floats | None = None
+) -> Fit:
     """Fit by Gauss-Newton steps from a start, each at most one standard deviation of the prior."""
     now = means.copy() if start is None else start.copy()
     for _ in range(_MAX_STEPS):

@@ -15,7 +15,7 @@ _DRAWS_PER_AIRCRAFT = 20
 
 
 def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
-    """Return joint draws (count, n) of `aircraft.identification.parameters.PARAMETERS` in their bounds."""
+    """Draw `aircraft.identification.parameters.PARAMETERS` jointly within their bounds, (count, n)."""
     generator = np.random.default_rng(seed)
     low, high = np.array([parameter.bounds for parameter in PARAMETERS]).T
     many = generator.multivariate_normal(

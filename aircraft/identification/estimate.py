@@ -145,7 +145,7 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
 
 
 def _noise_bias(nominal: Estimate, noisier: Estimate) -> Floats:
-    """Return the bias (n,) of the moments' parameters by sensor noise.
+    """Return the bias that sensor noise causes in the moments' parameters, (n,).
 
     It equals the effect of adding as much noise again. Noise in a regressor flattens its slope (Cook and Stefanski
     1994, with the straight line of their extrapolants). An axis that keeps its prior under noise gives no estimate of

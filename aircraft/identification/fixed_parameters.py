@@ -41,7 +41,7 @@ class FixedParameter:
 
 
 def _further(value: float, share: float, least: float) -> float:
-    """Return a value one standard deviation further from 0.
+    """Return `value` moved away from 0 by one standard deviation.
 
     share, least: standard deviation as a ratio to the value, and its smallest value.
 

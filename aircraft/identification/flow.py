@@ -52,14 +52,14 @@ def pressure_of(signals: Signals, base: BaseModel) -> Floats:
 
 
 def other_lift(signals: Signals, base: BaseModel) -> Floats:
-    """Return the lift coefficient (n,) of pitch rate and elevator, which are held at the base's values."""
+    """Return the lift coefficient due to pitch rate and elevator, with the base's derivatives, (n,)."""
     c = base.coefficients
     pitching = signals.rates[:, 1] * base.chord / (2.0 * signals.airspeed)
     return np.asarray(c.lift_rate * pitching + c.lift_elevator * signals.surfaces[:, 0])
 
 
 def vane(signals: Signals, base: BaseModel, values: Floats) -> Flow:
-    """Return the flow according to the accelerometers.
+    """Return the flow angles derived from the accelerometers.
 
     values: (n,) of `aircraft.identification.parameters.PARAMETERS`, of which the parameters of lift and motor are used.
     """

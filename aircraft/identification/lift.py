@@ -18,7 +18,7 @@ LIFT_BAND = 0.15
 
 
 def fit_lift(signals: Signals, base: BaseModel, lift: Floats, level: float = 0.0) -> tuple[Fit, Floats, Floats]:
-    """Fit the lift curve: the fit, values (2,) of slope and offset, and their covariance (2, 2).
+    """Fit the lift curve; return the fit, values of slope and offset (2,), and their covariance (2, 2).
 
     lift: (n,) lift coefficient.
     level: rad.

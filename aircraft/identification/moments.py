@@ -33,7 +33,7 @@ def fit_moments(
     motor: Motor | None = None,
     spread: float = 1.0,
 ) -> dict[Group, Fit]:
-    """Return the three fits by axis; roll and yaw have an additional constant, which is not kept.
+    """Fit pitch, roll and yaw, and return the fits by axis; roll and yaw fit an additional constant, which is dropped.
 
     alpha, beta: (n,) rad.
     motor: motor whose torque rolls the aircraft; None for the base's motor.
@@ -42,7 +42,7 @@ def fit_moments(
     thin = signals.thinned(MOMENT_THINNING, {"alpha": alpha, "beta": beta})
     pressure = pressure_of(thin, base)
     turning = _required_moments(thin, base, base.motor if motor is None else motor)
-    terms = _terms(thin, base)
+    terms = _moment_regressors(thin, base)
     fits = {}
     ixx, iyy, izz, _ = base.inertia
     for axis, inertia, length in zip(AXES, (iyy, ixx, izz), (base.chord, base.span, base.span), strict=True):
@@ -74,8 +74,8 @@ def _required_moments(signals: Signals, base: BaseModel, motor: Motor) -> dict[G
     }
 
 
-def _terms(signals: Signals, base: BaseModel) -> dict[Group, list[Floats]]:
-    """Return the coefficients (n,) of each axis: a fixed term, then one term per parameter."""
+def _moment_regressors(signals: Signals, base: BaseModel) -> dict[Group, list[Floats]]:
+    """Return the terms of each axis's moment coefficient, (n,) each: first the known part, then one per parameter."""
     c = base.coefficients
     alpha, beta = signals.extra["alpha"], signals.extra["beta"]
     elevator, aileron, rudder = signals.surfaces.T

@@ -1,6 +1,6 @@
-"""Places of a log in order: doubled, late or impossible rows are dropped and counted, none is added.
+"""Put a log's positions in order: doubled, late or impossible rows are dropped and counted, and none is added.
 
-First the clock is made steady, then rows are sorted, then places that no aircraft can have been at are taken out.
+First the clock is made steady, then rows are sorted, then positions that no aircraft can have reached are removed.
 """
 
 import math
@@ -51,7 +51,7 @@ def steady_clock(time: Floats, usual: float = 0.1) -> SteadyClock:
     while begin < moved.size:
         latest = np.maximum.accumulate(moved[begin:])
         behind = np.flatnonzero(moved[begin:] < latest - BEHIND)
-        jump = _first_for_good(behind, moved[begin:], latest)
+        jump = _first_late_row(behind, moved[begin:], latest)
         if jump < 0:
             break
         at = begin + jump
@@ -61,8 +61,8 @@ def steady_clock(time: Floats, usual: float = 0.1) -> SteadyClock:
     return SteadyClock(moved, tuple(jumps))
 
 
-def _first_for_good(behind: Ints, time: Floats, latest: Floats) -> int:
-    """Return the first row from which enough rows are behind for a jump, or all to the end; -1 without one."""
+def _first_late_row(behind: Ints, time: Floats, latest: Floats) -> int:
+    """Return the first row after which enough rows (or all to the end) are late to show a jump; -1 if there is none."""
     for k in behind.tolist():
         until = min(k + ROWS_BEHIND, time.size)
         if until - k >= min(ROWS_BEHIND, 2) and (time[k:until] < latest[k - 1] - BEHIND).all():
@@ -137,7 +137,7 @@ def clean_places(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> Pl
     ([0.0, 1.0, 2.0, 3.0, 4.0, 9.0], 1, 1, (Gap(start=4.0, end=9.0),))
     """
     time, values = series.time, series.values
-    good = _usable(time, values)
+    good = _usable_rows(time, values)
     unusable = int(good.size - good.sum())
     time, values = time[good], values[good]
     order = np.argsort(time, kind="stable")
@@ -147,7 +147,7 @@ def clean_places(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> Pl
     fresh = np.concatenate([[True], np.diff(time) > 0.0]) if time.size else np.zeros(0, bool)
     doubled = int(fresh.size - fresh.sum())
     time, values = time[fresh], values[fresh]
-    out = _glitches(time, values)
+    out = _glitch_rows(time, values)
     time, values = time[~out], values[~out]
     near = _is_in_main_group(time)
     time, shifts = _without_jumps(time[near], values[near])
@@ -177,7 +177,7 @@ def metres_between(lat: Floats, lon: Floats) -> Floats:
     return np.hypot(north, east * DEGREE * np.cos(np.radians(0.5 * (lat[1:] + lat[:-1]))))
 
 
-def _usable(time: Floats, values: Floats) -> Flags:
+def _usable_rows(time: Floats, values: Floats) -> Flags:
     lat, lon, up = values.T
     with np.errstate(invalid="ignore"):
         placed = (np.abs(lat) <= 90.0) & (np.abs(lon) <= 180.0) & ((lat != 0.0) | (lon != 0.0))
@@ -187,8 +187,8 @@ def _usable(time: Floats, values: Floats) -> Flags:
         return np.asarray((time >= 0.0) & (time < 1e9) & placed & high & known)
 
 
-def _glitches(time: Floats, values: Floats) -> Flags:
-    """Return the rows at which the vehicle cannot have been, because it was elsewhere before and after."""
+def _glitch_rows(time: Floats, values: Floats) -> Flags:
+    """Return a mask of rows with impossible positions, because the vehicle was elsewhere before and after."""
     out = np.zeros(time.size, bool)
     if time.size < 5:
         return out
@@ -234,7 +234,7 @@ def _is_in_main_group(time: Floats) -> Flags:
 
 
 def _without_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[float, float], ...]]:
-    """Remove jumps forward: pauses in which a moving vehicle got no further than in a usual step."""
+    """Remove forward jumps of the clock: pauses in which a moving vehicle moved no more than in a usual step."""
     shifts: list[tuple[float, float]] = []
     if time.size < 20:
         return time, ()

@@ -225,7 +225,7 @@ def index_dataflash(data: Bytes, names: Collection[str], let_go: Callable[[], No
 
 
 class _FoundMessages(NamedTuple):
-    """Starts and types of the wanted messages, the number of messages of each type, and the damage."""
+    """Starts and types of the requested messages, the number of messages of each type, and the damage."""
 
     at: Ints
     kinds: Bytes
@@ -306,7 +306,7 @@ def _walk_messages(
     trailing: int,
     wanted: NDArray[np.bool_],
 ) -> tuple[Ints, Bytes]:
-    """Return starts and types of wanted messages before a byte, continuing from the state."""
+    """Return starts and types of requested messages before byte `until`, continuing from and updating `state`."""
     at, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
     count, end = 0, data.size
     places, size, k, behind = state[_PLACES], state[_LOST], state[_AT], state[_BEHIND]

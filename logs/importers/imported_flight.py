@@ -91,7 +91,7 @@ def flight_parts(
     missions: Sequence[LoggedMission],
     last: float,
 ) -> list[FlightPart]:
-    """Return each flight, once for every mission that it was flown along.
+    """Return one part for each flight and each mission that the flight followed.
 
     spans: from `flown_spans`.  last: time of the last row of the log, s.  Without modes, the whole flight is taken as
     flown along the mission.

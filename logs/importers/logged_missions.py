@@ -84,7 +84,7 @@ def _begins_mission(following: MissionItem | None, known: Mapping[int, MissionIt
 
 
 def _is_same_mission(one: LoggedItems, other: LoggedItems) -> bool:
-    """Return True for the same mission: all items equal; or announced number and common items equal.
+    """Return True if two missions are the same: all items, or the announced number and common items, are equal.
 
     Home, item 0, is the same in all missions flown from a place: it alone in common is no evidence.
     """
@@ -169,7 +169,7 @@ def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission |
 
 
 def _longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
-    """Return the longest run of successive items, up to a jump out of it; the first of several such runs."""
+    """Return the longest run of successive items, cut before a jump out of the run; the first of equally long runs."""
     runs: list[list[MissionItem]] = [[]]
     for item in items:
         if runs[-1] and item.seq != runs[-1][-1].seq + 1:

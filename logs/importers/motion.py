@@ -75,7 +75,7 @@ class MotionLog:
 
     @property
     def moved(self) -> Samples:
-        """Commands to the surfaces: controls if logged, otherwise pulses."""
+        """Commands to the surfaces, which are the controls if logged, otherwise the pulses."""
         return self.controls if len(self.controls.time) else self.outputs
 
 

@@ -81,7 +81,7 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
 
 
 class _Steps:
-    """File in which a step back after a read at the end is as long as the read data; formats are counted.
+    """File in which a step back after a short read at the end equals the data read, and which counts formats.
 
     pyulog steps back by the claimed length of a record, and would read the end of a damaged file again and again; it
     reads a record's three bytes of length and letter, and then its content.
@@ -123,7 +123,7 @@ def find_damage(data: Bytes, let_go: Callable[[], None] = lambda: None) -> Damag
     state = np.zeros(5, np.int64)
     state[_AT], state[_READING] = _HEADER, 1
     for until in pieces(data.size, let_go):
-        _walk(read_only(data), until, state, np.frombuffer(_LETTERS, np.uint8))
+        _walk_records(read_only(data), until, state, np.frombuffer(_LETTERS, np.uint8))
     cut = bool(state[_CUT]) or int(state[_AT]) < data.size
     return Damage(int(state[_PLACES]), int(state[_LOST]), cut)
 
@@ -146,7 +146,7 @@ _CUT = 4
 
 
 @compiled
-def _walk(data: Bytes, until: int, state: Ints, letters: Bytes) -> None:
+def _walk_records(data: Bytes, until: int, state: Ints, letters: Bytes) -> None:
     """Continue a walk from its state up to a byte."""
     known = np.zeros(256, np.bool_)
     for letter in letters:

@@ -115,7 +115,7 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
             program_kind="px4",
             controls=controls,
             elevons=elevons,
-            hovering=tuple(_hovering(topics)),
+            hovering=tuple(_hover_periods(topics)),
         )
 
 
@@ -171,7 +171,7 @@ def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
     return rising(time, values[:, :1]), rising(time[moving], ratio)
 
 
-def _hovering(topics: Topics) -> Iterable[tuple[float, float]]:
+def _hover_periods(topics: Topics) -> Iterable[tuple[float, float]]:
     """Yield the periods (s) in which a VTOL was not a plane, or in transition."""
     kinds = topics.table("vehicle_status", ("vehicle_type", "in_transition_mode"), ("vehicle_type",))
     if kinds is None:
@@ -186,14 +186,14 @@ def _hovering(topics: Topics) -> Iterable[tuple[float, float]]:
 
 
 def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples, bool]:
-    """Return (n, 4) pitch, roll, yaw as fractions of travel, and throttle; and whether there are elevons.
+    """Return pitch, roll and yaw as fractions of travel, and throttle, (n, 4), and True if there are elevons.
 
     A surface's positive is up, or right; its torque scales (CA_SV_CSn_TRQ_*) give the axes that it moves, and an axis
     is the mean of its surfaces weighted by them.  Raises LogError for surfaces that cannot be modelled.
     """
     servos, motors = _actuators(topics, "actuator_servos", _SERVOS), _actuators(topics, "actuator_motors", _MOTORS)
     # An unused servo has NaN.
-    known = np.isfinite(servos.values).any(axis=1) & _armed(topics, servos.time)
+    known = np.isfinite(servos.values).any(axis=1) & _armed_times(topics, servos.time)
     servos = Samples(servos.time[known], servos.values[known])
     if len(servos.time) < 2 or len(motors.time) < 2:
         # Roll, pitch, yaw and throttle before the mixer.
@@ -225,13 +225,13 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
     sums = np.abs(scales).sum(axis=1, keepdims=True)
     shares = np.nan_to_num(servos.values) @ (scales / np.where(sums > 0.0, sums, 1.0)).T
     # A motor below 2 % of its thrust is stopped, which is NaN (PX4's control allocator).
-    pushing = np.nan_to_num(motors.values[:, _pushers(topics, airframe, parameters, motors)])
+    pushing = np.nan_to_num(motors.values[:, _forward_motors(topics, airframe, parameters, motors)])
     throttle = np.clip(pushing.mean(axis=1), 0.0, 1.0) if pushing.size else np.zeros(len(motors.time))
     rows = np.clip(np.searchsorted(motors.time, servos.time, side="right") - 1, 0, len(motors.time) - 1)
     return Samples(servos.time, np.column_stack([shares, throttle[rows]])), elevons
 
 
-def _pushers(topics: Topics, airframe: int, parameters: Mapping[str, float], motors: Samples) -> list[int]:
+def _forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, float], motors: Samples) -> list[int]:
     """Return the motors that push forward.  Raises LogError for a VTOL without one."""
     count = int(np.clip(parameters.get("CA_ROTOR_COUNT", 0.0), 0.0, _MOTORS))
     if airframe == _STANDARD_VTOL:
@@ -267,8 +267,8 @@ def _actuators(topics: Topics, topic: str, size: int) -> Samples:
     return Samples(steps.time, found.values[steps.values[:, 0].astype(np.intp)])
 
 
-def _armed(topics: Topics, time: Floats) -> Flags:
-    """Return whether the vehicle was armed, (n,); true if the log does not state it."""
+def _armed_times(topics: Topics, time: Floats) -> Flags:
+    """Return True for each time at which the vehicle was armed, (n,); also True if the log does not tell."""
     states = _samples(topics, "vehicle_status", ("arming_state",))
     if not len(states.time):
         return np.ones(len(time), np.bool_)

@@ -201,7 +201,7 @@ def _degrees(whole: str, minutes: str, thousandths: str, side: str) -> float:
 
 
 def _fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, float, float]], int]:
-    """Return second of the day, latitude, longitude, both altitudes of each fix; and unreadable fixes."""
+    """Return second of the day, latitude, longitude and both altitudes of each fix, and unreadable fixes."""
     rows, unreadable = [], 0
     for line in lines:
         if not line.startswith("B"):

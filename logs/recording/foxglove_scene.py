@@ -140,7 +140,7 @@ def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
 
 
 def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
-    """Return the triangles field of the entity; empty if no ground is known."""
+    """Return the encoded triangles field of the ground's entity; empty if no ground is known."""
     ground, colours, known = _ground(terrain, bounds)
     if not known.any():
         return b""
@@ -230,7 +230,7 @@ def _pose(position: ArrayLike) -> Pose:
 
 
 def _line(colour: tuple[float, float, float, float]) -> LinePrimitive:
-    """Return a line without points."""
+    """Return a line primitive without points."""
     return LinePrimitive(
         type=LinePrimitive.LINE_STRIP,
         pose=_pose((0.0, 0.0, 0.0)),

@@ -99,7 +99,7 @@ _CHECK_INTERVAL_NS = 200_000_000
 
 
 class FlightEvents:
-    """Makes a Log message of each event, independent of the blocks of rows."""
+    """Converter of flight events to Log messages, independent of how rows are split into blocks."""
 
     def __init__(self, setup: FlightSetup, channel: int) -> None:
         """Prepare for a setup.  channel: number of the log's topic."""

@@ -106,7 +106,7 @@ def _read(file: BinaryIO, found: Container) -> Iterator[bytes]:
         crc = zlib.crc32(content, zlib.crc32(head, crc))
     if not ended:
         raise _Damage("the data section has no end record")
-    _summary(file)
+    _check_summary(file)
 
 
 def _check_data_section(file: BinaryIO, crc: int, at: int) -> None:
@@ -219,8 +219,8 @@ def _data_end(content: bytes, at: int, crc: int) -> None:
         raise _Damage("the data section is damaged (its CRC differs)")
 
 
-def _summary(file: BinaryIO) -> None:
-    """Check the rest of the file, which is only an index: its CRC, and the magic at the end."""
+def _check_summary(file: BinaryIO) -> None:
+    """Check the CRC of the summary, which is only an index, and the magic at the end of the file."""
     crc = 0
     while True:
         at = file.tell()

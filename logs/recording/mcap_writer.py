@@ -55,7 +55,7 @@ _PAIRS_HEAD = 6
 
 
 class ChannelIndex(NamedTuple):
-    """Message index of a channel after a chunk: start of its record, and number of its messages."""
+    """Message index of a channel after a chunk, with the start of its record and its number of messages."""
 
     channel: int
     offset: int

@@ -272,7 +272,7 @@ class _MessageCollector:
 
 
 def read_log(path: Path | str) -> FlightLog:
-    """Read a flight log; a damaged or unfinished one is given up to its damage, with ``complete`` False.
+    """Read a flight log; return a damaged or unfinished log up to its damage, with ``complete`` False.
 
     Raises LogError, in one line, for a file that is missing, empty, not an MCAP file or not a planfly log, or that
     holds no complete second of flight.

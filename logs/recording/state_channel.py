@@ -237,7 +237,7 @@ def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> State
 
 
 def join_records(parts: list[StateRecords], kind: np.dtype[np.void]) -> StateRecords:
-    """Join arrays of one structured type; as bytes, since numpy compares structured types name by name."""
+    """Join arrays of one structured type as bytes, because numpy compares structured types name by name."""
     if not parts:
         return np.zeros(0, dtype=kind)
     return np.concatenate([np.ascontiguousarray(part).view(np.uint8) for part in parts]).view(kind)

@@ -1,4 +1,4 @@
-"""State what a verdict applies to: aircraft, speed, weather and world, in the lines after the answer."""
+"""Describe the conditions of a verdict: aircraft, speed, weather and world, in the lines after the answer."""
 
 import math
 from contextlib import suppress
@@ -35,7 +35,7 @@ _AIRSPEED_SOURCE_TEXTS: dict[AirspeedSource, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Conditions(DocumentConfig):
-    """Conditions of a verdict or a plan; for an imported flight as far as its log states them."""
+    """Conditions of a verdict or a plan; fields that the log of an imported flight does not state are None."""
 
     aircraft: str
     """Its name or folder; empty for an imported flight whose aircraft nobody named."""
@@ -78,7 +78,7 @@ def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot:
         aircraft_named=not table.aircraft_by_default,
         airspeed_mps=airspeed,
         airspeed_kind="equivalent" if autopilot.equivalent_airspeeds else "true",
-        airspeed_source=_source_of_airspeed(scenario, autopilot),
+        airspeed_source=_airspeed_source(scenario, autopilot),
         wind_mps=wind.speed,
         wind_from_deg=round(math.degrees(wind.from_course) % 360.0, 9),
         turbulence=wind.turbulence,
@@ -92,20 +92,20 @@ def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot:
 
 
 def _autopilot_source(table: FlightTable) -> str:
-    """Return a clause naming the file from which a non-default autopilot was taken; "" for none."""
+    """Return a clause that names the file from which a non-default autopilot was taken; "" if there is none."""
     if table.autopilot_from is None or table.steering.autopilot == DEFAULT_AUTOPILOT:
         return ""
     return f"; taken from {table.autopilot_from}, for nobody named an autopilot"
 
 
-def _source_of_airspeed(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:
+def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:
     if scenario.flight.airspeed_mps is not None:
         return "scenario"
     return "aircraft" if autopilot.stated_airspeed is None else "parameters"
 
 
 def setup_conditions(setup: FlightSetup) -> Conditions:
-    """Return the conditions of the verdict of a flight, or of a mission that is not flown."""
+    """Return the conditions of the verdict on a flight, or on a mission that is not flown."""
     found = conditions_of(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
     found = replace(found, navigation=setup.nav, zones=len(airspace_of(setup).zones))
     source = setup.source
@@ -175,10 +175,10 @@ _SAME_LINE_DISTANCE_M = 1.0
 
 
 def corridor_line(setup: FlightSetup) -> str:
-    """Return a line on the width and origin of an unstated corridor.
+    """Describe the width and origin of a corridor that the scenario does not state.
 
-    Warns if it is wider than the gap between legs.  A flight within so wide a corridor may have been off its lines all
-    along.  "" if the corridor is stated, or if a survey's cross-track errors are judged line by line.
+    Warn if the corridor is wider than the gap between legs, because a flight within it may then have been off its lines
+    all the time.  Return "" if the corridor is stated, or if a survey's cross-track errors are judged line by line.
     """
     half, radius = setup.corridor, setup.autopilot.acceptance_radius or 0.0
     if setup.scenario.limits.corridor_m is not None or surveys_of(setup):
@@ -198,11 +198,11 @@ def corridor_line(setup: FlightSetup) -> str:
 
 
 def least_gap(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
-    """Return the least distance (m) between a leg and the next but one, and the first leg's number.
+    """Return the minimum distance between a leg and the leg after the next, m, and the first leg's number.
 
-    Only legs that are side by side are compared.
+    Only legs that are side by side are compared; return None if there are none.
 
-    waypoints: (w, 3) m.  None if no two legs are side by side.
+    waypoints: east, north and up, m, (w, 3).
 
     >>> lines = np.array([[0, 0, 0], [0, 900, 0], [40, 900, 0], [40, 0, 0]], dtype=float)
     >>> least_gap(lines)
@@ -224,5 +224,5 @@ def least_gap(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
         if min(run, reach[1]) - max(0.0, reach[0]) >= 0.5 * min(run, length):
             middle = 0.5 * (back + on) - start
             found.append((abs(float(along[0] * middle[1] - along[1] * middle[0])), k))
-    # A line that is flown twice is no survey.
+    # A line that is flown twice is not a survey.
     return min((one for one in found if one[0] >= _SAME_LINE_DISTANCE_M), default=None)

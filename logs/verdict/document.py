@@ -1,4 +1,4 @@
-"""Define the data classes of ``verdict.json``: a verdict with its texts, for its JSON schema.
+"""Define the data classes of ``verdict.json``, from which its JSON schema is made: a verdict with its texts.
 
 `logs.verdict.verdict.Verdict.document` fills them.
 """
@@ -66,7 +66,7 @@ class LevelDocument(DocumentConfig):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecidingDocument(DocumentConfig):
-    """The parameter of the autopilot that decides."""
+    """The autopilot parameter that decides the verdict."""
 
     name: str
     current: float
@@ -80,7 +80,7 @@ class DecidingDocument(DocumentConfig):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParameterDocument(DocumentConfig):
-    """A parameter in the autopilot's unit, and who states it."""
+    """A parameter in the autopilot's unit, and the source of its value."""
 
     name: str
     value: float
@@ -122,13 +122,13 @@ class VerdictDocument(DocumentConfig):
 
 
 def finding_document(finding: Finding) -> FindingDocument:
-    """Add the words for the place and the suggestions to a finding."""
+    """Return a finding with the texts of its place and its suggestions."""
     data = {field.name: getattr(finding, field.name) for field in fields(finding)}
     return FindingDocument(**data, where=finding.where, passes=finding.limit_text, suggestion=finding.suggestion)
 
 
 def level_document(level: LevelAnswer) -> LevelDocument:
-    """Add the words for the disagreements to a level's answer."""
+    """Return a level's answer with the texts of its disagreements."""
     return LevelDocument(
         name=level.name,
         flyable=level.flyable,
@@ -140,13 +140,13 @@ def level_document(level: LevelAnswer) -> LevelDocument:
 
 
 def deciding_document(deciding: DecidingParameter) -> DecidingDocument:
-    """Add the words to the parameter that decides."""
+    """Return the deciding parameter with its text."""
     data = {field.name: getattr(deciding, field.name) for field in fields(deciding)}
     return DecidingDocument(**data, text=deciding_text(deciding))
 
 
 def parameters_document(parameters: Parameters) -> ParametersDocument:
-    """List each parameter's value and origin, and the names in the file that have no effect."""
+    """Return each parameter's value and origin, and the names in the file that have no effect."""
     return ParametersDocument(
         file=parameters.source,
         values=tuple(ParameterDocument(**value._asdict()) for value in parameters.values),

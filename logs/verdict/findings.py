@@ -8,7 +8,7 @@ from logs.verdict.places import Place, Suggestion
 from logs.verdict.wording import compared_texts, place_text, quantity_text, suggestions_text
 from world.json_schema import DocumentConfig
 
-# Checks of findings that are not judged, so that the verdict is left open.
+# Checks of unjudged findings that leave the verdict undecided.
 # The aircraft is not known well enough.
 UNKNOWN_AIRCRAFT = "unknown aircraft"
 # Only a flight shows the flown path.
@@ -19,14 +19,14 @@ GROUND_WAY = "ground way"
 NOT_FLOWN = "not flown"
 # Returns or glides that a scenario requires are not known well enough.
 UNKNOWN_RETURN = "unknown return"
-# Checks that no flight shows: a flight may pass all the same.
+# Checks on which a flight gives no evidence, so that a flight may pass without them.
 APART_FROM_FLIGHT = (GROUND_WAY, UNKNOWN_RETURN)
 _UNDECIDED = (UNKNOWN_AIRCRAFT, UNKNOWN_WAY, NOT_FLOWN, *APART_FROM_FLIGHT)
 
 
 @dataclass(frozen=True, slots=True)
 class Fact(DocumentConfig):
-    """Number that a rule measured and does not judge."""
+    """Number that a rule measured but does not judge."""
 
     what: str
     """overshoot, settled, bank, radius, height error, slope error, throttle at full, nearest, ..."""
@@ -49,9 +49,9 @@ class Finding:
     suggestions: for a failed finding, the smallest changes of the plan with which it passes, the least change first.
     brief: the reason in a few words, for a headline.
     placed: True if the reason begins with the place.
-    check: the check of a rule with several checks; `UNKNOWN_AIRCRAFT`, `UNKNOWN_WAY`, `NOT_FLOWN`, `GROUND_WAY` or
-        `UNKNOWN_RETURN` for what those leave undecided; "" otherwise.
-    facts: further measured numbers that are no faults.
+    check: name of the check, for a rule with several checks; `UNKNOWN_AIRCRAFT`, `UNKNOWN_WAY`, `NOT_FLOWN`,
+        `GROUND_WAY` or `UNKNOWN_RETURN` if the finding is undecided for that reason; "" otherwise.
+    facts: further measured numbers that are not faults.
     at_least: True if values of at least the limit pass, False if values of at most the limit pass.
     """
 
@@ -76,9 +76,9 @@ class Finding:
 
     @property
     def effective_limit(self) -> float | None:
-        """Value up to which the rule passes: the limit with its tolerance; None without a limit.
+        """Value up to which the rule passes, the limit with its tolerance; None without a limit.
 
-        A finding that fails by other evidence than the number with this tolerance is compared with the limit alone.
+        If a finding fails by other evidence than its number, this is the limit without tolerance.
 
         >>> make_finding("waypoint", Place("waypoint", 1), ok=True, reason="", limit=3.0, tolerance=5.3).effective_limit
         8.3
@@ -90,12 +90,12 @@ class Finding:
 
     @property
     def limit_sign(self) -> str:
-        """Sign between a value that passes and the limit."""
+        """Comparison sign between a passing value and the limit."""
         return "≥" if self.at_least else "≤"
 
     @property
     def value(self) -> float | None:
-        """The number that is compared with the limit: the flown one, or the planned one if the margin is its margin."""
+        """The value that is compared with the limit: the flown value, or the planned value if it has the margin."""
         if self.flown is None or self.planned is None or self.limit is None or self.margin is None:
             return self.planned if self.flown is None else self.flown
         off = {value: abs(abs(value - self.limit) - abs(self.margin)) for value in (self.flown, self.planned)}
@@ -103,7 +103,7 @@ class Finding:
 
     @property
     def limit_text(self) -> str:
-        """The values that pass, in words; "" without a limit.
+        """Text of the values that pass; "" without a limit.
 
         >>> make_finding("stall", Place("flight"), ok=True, reason="", limit=9.5, unit="m/s", at_least=True).limit_text
         '≥ 9.5 m/s'
@@ -111,7 +111,7 @@ class Finding:
         return self.compared_texts()[1]
 
     def compared_texts(self) -> tuple[str, str]:
-        """Return the value and the values that pass in words, with enough digits that a failing value differs."""
+        """Return texts of the value and of the passing values, with enough digits that a failing value differs."""
         value, limit = self.value, self.effective_limit
         if value is None or limit is None:
             texts = ["" if one is None else quantity_text(one, self.unit) for one in (value, limit)]
@@ -121,18 +121,18 @@ class Finding:
 
     @property
     def where(self) -> str:
-        """Place in words."""
+        """Text of the place."""
         return place_text(self.place)
 
     @property
     def suggestion(self) -> str:
-        """Suggestions in words, "" without any."""
+        """Text of the suggestions, "" if there are none."""
         return suggestions_text(self.suggestions)
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A message of a rule: the full text, and its brief beginning for a headline.
+    """A message of a rule: the full text, and its brief first part for a headline.
 
     placed: True if the message begins with the finding's place.
     """
@@ -143,7 +143,7 @@ class Message:
 
 
 def message(brief: str, more: str = "", *, placed: bool = False) -> Message:
-    """Make a message from its brief beginning and the rest.
+    """Make a message from its brief first part and the rest.
 
     >>> message("overshoots its arc by 8 m", " (at most 5 m)").text
     'overshoots its arc by 8 m (at most 5 m)'
@@ -152,7 +152,7 @@ def message(brief: str, more: str = "", *, placed: bool = False) -> Message:
 
 
 def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return the findings that leave the verdict open: the aircraft or a path is not known well enough.
+    """Return the findings that leave the verdict undecided, such as those on an aircraft that is not known well enough.
 
     >>> slope = make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)
     >>> undecided_findings([slope]) == (slope,)
@@ -162,10 +162,10 @@ def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:
-    """Return the failed finding of a rule that is furthest beyond its limit, else the finding closest to its limit.
+    """Return the failed finding that is furthest beyond its limit, or else the finding closest to its limit.
 
-    A finding that fails by other evidence than its number has no margin and is ranked after failed findings with one.
-    None if no finding failed or was judged by a number.
+    A finding that fails by other evidence than its number has no margin and is ranked after failed findings with a
+    margin.  Return None if no finding failed or was judged by a number.
 
     >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
     >>> failed = make_finding("slope", Place("leg", 2), ok=False, reason="too slow", margin=5.0)
@@ -197,8 +197,8 @@ def make_finding(
 ) -> Finding:
     """Make a finding with numbers rounded to 1e-6, and None for non-finite numbers.
 
-    faults: the beginning of the reason, if it begins with faults.
-    facts: further measured numbers; non-finite ones are left out.
+    faults: faults with which the reason begins.
+    facts: further measured numbers; non-finite numbers are left out.
     at_least: True if values of at least the limit pass.
     A finding that fails by other evidence while its number is within the limit and its tolerance has no margin: the
     reason says what failed.
@@ -211,12 +211,12 @@ def make_finding(
     return Finding(
         rule=rule,
         place=place,
-        planned=_plain(planned),
-        flown=_plain(flown),
-        limit=_plain(limit),
+        planned=_rounded_or_none(planned),
+        flown=_rounded_or_none(flown),
+        limit=_rounded_or_none(limit),
         limit_source=source,
-        tolerance=_plain(tolerance),
-        margin=_plain(margin),
+        tolerance=_rounded_or_none(tolerance),
+        margin=_rounded_or_none(margin),
         unit=unit,
         method=method,
         ok=None if ok is None else bool(ok),
@@ -229,14 +229,14 @@ def make_finding(
     )
 
 
-def _plain(value: float | None) -> float | None:
+def _rounded_or_none(value: float | None) -> float | None:
     if value is None or not math.isfinite(value):
         return None
     return round(float(value), 6) + 0.0  # no -0.0
 
 
 def badness(item: Finding) -> tuple[int, float]:
-    """Return the sort key of a finding, the worst first: failed, not judged, passed, and by margin.
+    """Return a sort key that puts the worst finding first: failed, not judged, passed, and within each by margin.
 
     >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
     >>> badness(near) < badness(far)
@@ -246,7 +246,7 @@ def badness(item: Finding) -> tuple[int, float]:
 
 
 def reason_of(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
-    """Join faults with the facts in brackets after them, or return the facts alone.
+    """Join faults, followed by the facts in brackets; without faults, join the facts alone.
 
     >>> reason_of([message("bank 40.0° beyond 35.0°")], ["turns 62.0°", "radius 76 m"])
     'bank 40.0° beyond 35.0° (turns 62.0°; radius 76 m)'

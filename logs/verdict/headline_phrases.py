@@ -1,16 +1,16 @@
-"""Write a failed finding for a headline: the rule, the place, and the numbers or the reason in brief."""
+"""Phrase a failed finding for a headline: the rule, the place, and the numbers or the reason in brief."""
 
 from collections.abc import Callable
 
 from logs.verdict.findings import Finding
 from logs.verdict.wording import compared_texts, place_text, shortened
 
-# Makes the phrase of a failed finding; its first argument is what a person calls the rule.
+# Function that phrases a failed finding; its first argument is the rule's name for people.
 HeadlinePhrase = Callable[[str, Finding], str]
 
 
 def _with_place(noun: str, item: Finding, text: str) -> str:
-    """Join a rule's noun, the place unless it is the whole flight, and a text in brackets."""
+    """Join a rule's noun, its place (unless the place is the whole flight), and a text in brackets."""
     if item.place.kind == "flight":
         return f"{noun} ({text})"
     return f"{noun} {'at' if item.place.kind == 'waypoint' else 'on'} {place_text(item.place)} ({text})"
@@ -22,12 +22,12 @@ def name_reason(noun: str, item: Finding) -> str:
 
 
 def name_event(noun: str, item: Finding) -> str:
-    """Name the reason in brief, of an event that ends the flight wherever it is."""
+    """Name the brief reason of an event that ends the flight, without its place."""
     return f"{noun} ({shortened(item.brief)})"
 
 
 def name_shortfall(noun: str, item: Finding) -> str:
-    """Compare the flown value, or else the planned value, with a limit that is a least value."""
+    """Compare the flown value, or else the planned value, with a minimum."""
     low, limit = item.value, item.effective_limit
     if low is None or limit is None or low >= limit:
         return name_reason(noun, item)
@@ -35,7 +35,7 @@ def name_shortfall(noun: str, item: Finding) -> str:
 
 
 def name_excess(noun: str, item: Finding) -> str:
-    """Compare the worse of planned and flown value with the limit, or name the reason if both are within."""
+    """Compare the worse of planned and flown value with the limit, or name the reason if both are within the limit."""
     values = [value for value in (item.flown, item.planned) if value is not None]
     worst = max(values, key=abs, default=None)
     limit = item.effective_limit
@@ -46,7 +46,7 @@ def name_excess(noun: str, item: Finding) -> str:
 
 
 def name_circle(noun: str, item: Finding) -> str:
-    """Compare the radius of a circle that is too small with the least radius."""
+    """Compare the radius of a circle that is too small with the minimum radius."""
     limit = item.effective_limit
     if item.planned is None or limit is None or item.planned >= limit:
         return name_excess(noun, item)
@@ -69,7 +69,7 @@ def name_missile(_noun: str, item: Finding) -> str:
 
 
 def name_photo_line(noun: str, item: Finding) -> str:
-    """Compare the usable share of a photo line, or the overlap of its photos, with the least share."""
+    """Phrase the shortfall of a photo line: its usable share, or its photos' overlap, against the required minimum."""
     return name_shortfall(item.check or noun, item)
 
 

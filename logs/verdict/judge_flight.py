@@ -1,7 +1,7 @@
-"""Is this flight evidence that its plan is flyable?  Every number is worked out again from the track.
+"""Judge whether a flight shows that its plan is flyable, with every number computed again from the track.
 
-What guidance noted about itself (leg, cross-track, height error, clearance) and any verdict that was recorded are
-not read.
+Data that guidance recorded about itself (leg, cross-track, height error, clearance) and any recorded verdict are not
+read.
 """
 
 from collections.abc import Mapping
@@ -41,14 +41,17 @@ def judge_flight(
     reference: ReferenceFlights | None = None,
     requirements: RouteRequirements | None = None,
 ) -> Verdict:
-    """Judge a flown track: level "flown".
+    """Judge a flown track at the level "flown".
 
-    Any track is judged, however short or damaged: what cannot be known makes it incomplete.  One without a row is a
-    flight that never began: its route is judged, level "geometric".  An imported one is judged as far as its log goes.
+    Any track is judged, however short or damaged; missing data makes the verdict incomplete.  A track without rows is a
+    flight that never began, so its route is judged at the level "geometric".  An imported flight is judged as far as
+    its log permits.
 
-    ended: how the flight ended, "completed" or what stopped it.  log_complete: the record has its end.
-    envelope: whether the aircraft's envelope counts beside what the flight showed, and not that alone.
-    reference: the results of reference flights.  requirements: the setup's route requirements if already known.
+    ended: "completed", or the reason why the flight ended early.
+    log_complete: True if the record has its end.
+    envelope: True to apply the aircraft's envelope as well as the evidence of the flight, False for the flight alone.
+    reference: results of reference flights.
+    requirements: the setup's route requirements if already known.
 
     >>> from aircraft.catalog import find_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -93,25 +96,26 @@ def judge_flight(
     )
 
 
-def _levels(
+def _level_answers(
     requirements: RouteRequirements, flown: tuple[Finding, ...], flyable: bool, reference: ReferenceFlights | None
 ) -> tuple[LevelAnswer, ...]:
-    """Return what geometry and the airframe's reference flight say, where each differs, and the flight's own answer.
+    """Return the answers of geometry, of the airframe's reference flight, and of the flight itself.
 
-    Without the envelope there is the flight's own answer alone.
+    The first two include their disagreements with the flight.  Without the envelope, only the flight's own answer is
+    returned.
     """
     levels, source = [], requirements.setup.envelope.source
     if requirements.envelope:
         predicted = (*deciding_items(requirements.setup), *geometric_findings(requirements, flown))
         fails = any(item.ok is False for item in predicted)
         passes = not fails and not undecided_findings(predicted)
-        differing = _differing("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
+        differing = _disagreements("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
         said = headline(predicted, passes, source)
         levels.append(LevelAnswer("geometry", passes, said, differing, undecided=not passes and not fails))
     if requirements.envelope and reference is not None and reference.airframe is not None:
         airframe = reference.airframe
         passed = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}
-        differing = _differing("airframe", passed, flown)
+        differing = _disagreements("airframe", passed, flown)
         # What is not flyable although nothing of it failed was left open.
         unsure = not airframe.flyable and not airframe.failed
         levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing, undecided=unsure))
@@ -120,10 +124,10 @@ def _levels(
     return (*levels, own)
 
 
-def _differing(
+def _disagreements(
     level: str, outcomes: Mapping[tuple[str, Place], bool | None], flown: tuple[Finding, ...]
 ) -> tuple[Disagreement, ...]:
-    """Return the disagreements between a level and the flight, in the order of the level."""
+    """Return the disagreements between a level and the flight, in the order of the level's findings."""
     judged = {(item.rule, item.place): item.ok for item in flown}
     out = []
     for (rule, place), there in outcomes.items():

@@ -1,4 +1,4 @@
-"""Verdicts without a flight: of a route, of a flight that never began, and of a plan that was not feasible."""
+"""Judge without a flight: a route, a flight that never began, or a plan that was not feasible."""
 
 import math
 from collections.abc import Sequence
@@ -32,14 +32,14 @@ from planner.plan import Plan, Violation
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """Return findings of the mission's items alone, for any autopilot."""
+    """Return findings on the mission's items alone, for any autopilot."""
     return [item for rule in RULES.values() if rule.judge_items is not None for item in rule.judge_items(setup)]
 
 
 def deciding_items(setup: FlightSetup) -> list[Finding]:
-    """Return what of a mission fails or stays open by its items alone.
+    """Return the findings on a mission's items alone that fail or leave the verdict undecided.
 
-    Items of a plan are planfly's own, but for what PX4 asks of them.
+    Items of a plan come from planfly, so only PX4's requirements on them are judged.
     """
     asked = setup.plan is None or setup.autopilot.refuses
     found = mission_findings(setup) if asked else []
@@ -47,36 +47,37 @@ def deciding_items(setup: FlightSetup) -> list[Finding]:
 
 
 def geometric_findings(requirements: RouteRequirements, flown: Sequence[Finding] | None = None) -> tuple[Finding, ...]:
-    """Return findings of a route's geometry against the aircraft's envelope.
+    """Return findings on a route's geometry, judged by the aircraft's envelope.
 
-    flown: those of its flight, from which rules that say the same of both are taken.
+    flown: findings on the route's flight, from which the findings of rules with `Rule.of_route` are copied.
     """
-    return _judged(requirements, None, (), geometric=True, flown=flown)
+    return _run_rules(requirements, None, (), geometric=True, flown=flown)
 
 
 def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
-    """Return those of `geometric_findings` that say something of legs, corners, threats or zones."""
-    return _judged(requirements, None, (), geometric=True, whole=False)
+    """Return the findings of `geometric_findings` on legs, corners, threats or zones, without those on the whole."""
+    return _run_rules(requirements, None, (), geometric=True, whole=False)
 
 
 def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
-    """Return findings of a flown track against its route and the aircraft's envelope, but for how the flight ended."""
-    return (*deciding_items(requirements.setup), *_judged(requirements, aligned, (), geometric=False))
+    """Return findings on a flown track, judged by its route and the aircraft's envelope, except on how it ended."""
+    return (*deciding_items(requirements.setup), *_run_rules(requirements, aligned, (), geometric=False))
 
 
 def flown_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
 ) -> tuple[Finding, ...]:
-    """Return findings of a flight: of its track, and of how it ended.
+    """Return findings on the track of a flight and on how the flight ended.
 
-    ended: "completed" or what stopped it.  log_complete: the record has its end.
+    ended: "completed", or the reason why the flight ended early.
+    log_complete: True if the record has its end.
     """
     ends = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
     at_end = tuple(item for judge in ends for item in judge(requirements, aligned, ended, log_complete))
-    return (*deciding_items(requirements.setup), *_judged(requirements, aligned, at_end, geometric=False))
+    return (*deciding_items(requirements.setup), *_run_rules(requirements, aligned, at_end, geometric=False))
 
 
-def _judged(
+def _run_rules(
     requirements: RouteRequirements,
     aligned: AlignedTrack | None,
     at_end: Sequence[Finding],
@@ -85,9 +86,11 @@ def _judged(
     whole: bool = True,
     flown: Sequence[Finding] | None = None,
 ) -> tuple[Finding, ...]:
-    """Return findings of all rules, and then those of how the flight ended, merged.
+    """Run all rules and return their findings, followed by `at_end`, merged.
 
-    whole: whether those count that judge the flight as one.  flown: as of `geometric_findings`.
+    at_end: findings on how the flight ended.
+    whole: True to include rules that judge the flight as a whole.
+    flown: as in `geometric_findings`.
     """
 
     def asked(rule: Rule, judge: Judge) -> Sequence[Finding]:
@@ -106,19 +109,19 @@ def _judged(
         if rule.merge is not None:
             findings = rule.merge(requirements, aligned, findings)
     if whole:
-        findings = (*one_per_stop(findings), *_other_sides(requirements, findings))
+        findings = (*one_per_stop(findings), *_other_side_findings(requirements, findings))
     return findings
 
 
-# Rules that judge where the aircraft is, and so depend on the side that a reversal is turned to.
+# Rules that judge where the aircraft is, and so depend on the side to which it turns at a course reversal.
 _RULES_OF_PLACE = ("clearance", "threat", "fence")
 
 
-def _other_sides(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
-    """Return what stays open because a reversal of the course can be turned to either side and one side fails.
+def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
+    """Return undecided findings on course reversals that fail if the aircraft turns to the other side.
 
-    A flight shows one side.  The navigation error of the day decides which: of 12 ArduPlane flights through a turn of
-    180 degrees, 4 turned left.
+    A flight shows only one side, which depends on the navigation error of the day: of 12 ArduPlane flights through a
+    turn of 180 degrees, 4 turned left.
     """
     setup = requirements.setup
     corners = reversals(setup.route)
@@ -146,7 +149,7 @@ def _other_sides(requirements: RouteRequirements, findings: Sequence[Finding]) -
 
 
 def one_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Return findings with those of a rule at the corners of one stop, or at its legs, replaced by the worst of them.
+    """Keep only each rule's worst finding of those at the corners of one stop, and of those at its legs.
 
     >>> from logs.verdict.places import Place
     >>> legs = [Place("leg", k, to_item=4, number=2) for k in (2, 3, 4)]
@@ -168,9 +171,9 @@ def one_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 def with_suggestions(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Fill in ``suggestions`` of every failed finding that a change of the plan could mend, and of what is left open.
+    """Return findings with ``suggestions`` for failed or undecided findings that a change of the plan could fix.
 
-    The way of a return to launch is the autopilot's: no change of its legs can be made.
+    Findings on the legs of a return to launch get none, because the autopilot chooses its path.
     """
     out, first = [], requirements.setup.route.return_from
     last = min(requirements.legs, requirements.setup.route.return_until)
@@ -214,9 +217,9 @@ def with_passing_suggestions(
 
 
 def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = None) -> Verdict:
-    """Judge a route by its geometry and the aircraft's envelope, without flying it: level "geometric".
+    """Judge a route by its geometry and the aircraft's envelope, without a flight, at the level "geometric".
 
-    requirements: the route requirements of the setup if they are known already.
+    requirements: the setup's route requirements if already known.
 
     >>> from aircraft.catalog import find_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -238,7 +241,7 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
     findings = (
         *mission_findings(setup),
         *with_suggestions(requirements, None, geometric_findings(requirements)),
-        *([_not_feasible(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
+        *([_infeasible_finding(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
     )
     complete = setup.plan is None or setup.plan.feasible
     unjudged, fails = undecided_text(findings), any(item.ok is False for item in findings)
@@ -260,14 +263,15 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
 
 
 def flown_level(setup: FlightSetup) -> LevelName:
-    """Return the level that a flight of a setup answers."""
+    """Return the level at which a flight of a setup is judged."""
     return setup.autopilot.level
 
 
 def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: bool = True) -> Verdict:
-    """Judge a flight of which there is no row: its route's geometry, and why nothing was flown; never complete.
+    """Judge a flight without rows by its route's geometry and the reason why nothing was flown; never complete.
 
-    ended: why not.  log_complete: the record has its end.
+    ended: reason why nothing was flown.
+    log_complete: True if the record has its end.
 
     >>> from logs.recording.example_log import example_log
     >>> verdict = judge_unflown(route_requirements(example_log().setup), "not started: no way made against the wind")
@@ -292,9 +296,9 @@ def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: 
 
 
 def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict:
-    """Judge a run that found no feasible plan, so that nothing was flown: level "plan", never complete.
+    """Judge a run that found no feasible plan, so that nothing was flown, at the level "plan"; never complete.
 
-    conditions: what it was planned for.
+    conditions: conditions for which the plan was made.
 
     >>> import numpy as np
     >>> from planner.plan import Certificate
@@ -333,12 +337,12 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
                 method="certificate",
             )
         )
-    findings.append(_not_feasible(plan))
+    findings.append(_infeasible_finding(plan))
     lines = _plan_lines(findings, plan, conditions)
     return Verdict(tuple(findings), False, False, lines, "plan", conditions=conditions)
 
 
-def _not_feasible(plan: Plan) -> Finding:
+def _infeasible_finding(plan: Plan) -> Finding:
     problems = plan.certificate.problems or ("the search still counts violations",)
     first, *others = problems
     fault = message(f"no feasible plan was found: {first}", "".join(f"; {problem}" for problem in others))

@@ -1,4 +1,4 @@
-"""Write a verdict as JUnit XML for continuous integration: a case for each finding and the answer."""
+"""Write a verdict as JUnit XML for continuous integration, with a case for each finding and for the answer."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -10,9 +10,9 @@ from logs.verdict.rule_words import rule_word
 
 
 def junit_text(verdicts: Mapping[str, Presentation]) -> str:
-    """Write the text of the file, a test suite for each verdict.
+    """Return the text of the file, with a test suite for each verdict.
 
-    verdicts: by the name of the judged plan or flight.  A finding that fails is a failure, and one that was not judged
+    verdicts: by name of the judged plan or flight.  A finding that fails is a failure, and one that was not judged
     is skipped.  The case ``verdict`` fails if the answer is not "flyable", even if nothing failed but a part was not
     judged.
 
@@ -25,14 +25,14 @@ def junit_text(verdicts: Mapping[str, Presentation]) -> str:
         suite = ElementTree.SubElement(
             root,
             "testsuite",
-            name=_plain(name),
+            name=_without_control_characters(name),
             tests=str(len(cases)),
             failures=str(counts["failure"]),
             errors="0",
             skipped=str(counts["skipped"]),
         )
         suite.extend(cases)
-        ElementTree.SubElement(suite, "system-out").text = _plain(
+        ElementTree.SubElement(suite, "system-out").text = _without_control_characters(
             "\n".join([verdict.headline, *verdict.details]), keep="\n"
         )
     return _document_text(root)
@@ -60,7 +60,7 @@ def _document_text(root: ElementTree.Element) -> str:
 def _answer_case(verdict: Presentation) -> ElementTree.Element:
     case = ElementTree.Element("testcase", classname="planfly", name="verdict")
     if verdict.state != "ok":
-        ElementTree.SubElement(case, "failure", message=_plain(verdict.headline))
+        ElementTree.SubElement(case, "failure", message=_without_control_characters(verdict.headline))
     return case
 
 
@@ -68,23 +68,25 @@ def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
     seen: Counter[tuple[str, str]] = Counter()
     cases = []
     for finding in findings:
-        place = _plain(finding.where)
+        place = _without_control_characters(finding.where)
         seen[finding.rule, place] += 1
         # Names of cases must be unique.
         number = seen[finding.rule, place]
         name = place if number == 1 else f"{place} ({number})"
         case = ElementTree.Element("testcase", classname=f"planfly.{finding.rule}", name=name)
         if finding.ok is False:
-            said = _plain(f"{rule_word(finding.rule)}: {finding.reason}")
+            said = _without_control_characters(f"{rule_word(finding.rule)}: {finding.reason}")
             failure = ElementTree.SubElement(case, "failure", message=said)
             if finding.suggestions:
-                failure.text = _plain(f"would pass: {finding.suggestion}")
+                failure.text = _without_control_characters(f"would pass: {finding.suggestion}")
         elif finding.ok is None:
-            ElementTree.SubElement(case, "skipped", message=_plain(f"not judged: {finding.reason}"))
+            ElementTree.SubElement(
+                case, "skipped", message=_without_control_characters(f"not judged: {finding.reason}")
+            )
         cases.append(case)
     return cases
 
 
-def _plain(text: str, keep: str = "") -> str:
-    """Replace each character that XML 1.0 cannot hold by a space."""
+def _without_control_characters(text: str, keep: str = "") -> str:
+    """Replace each character that XML 1.0 does not permit with a space."""
     return "".join(letter if letter.isprintable() or letter in keep else " " for letter in text)

@@ -1,4 +1,4 @@
-"""Represent places of findings, changes of a plan, and the three levels of a verdict, as data."""
+"""Define places of findings, changes of a plan, and the three levels of a verdict, as data."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -10,7 +10,7 @@ from world.json_schema import DocumentConfig
 #
 # `logs.verdict.wording` writes them in words.
 
-# "flight", "mission" and "plan" are the whole of each; "missile" and "radar" are a threat's two spheres; "exclusion"
+# "flight", "mission" and "plan" mean the whole of each; "missile" and "radar" are a threat's two spheres; "exclusion"
 # and "inclusion" are zones of airspace.
 PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "radar", "exclusion", "inclusion"]
 
@@ -80,13 +80,13 @@ class Change(DocumentConfig):
     """The upper end of a range that passes, of which wanted is the lower end."""
 
 
-# Changes to make together; a finding has alternatives of these, any of which would pass.
+# Changes to make together.  A finding has alternative suggestions, any of which would make it pass.
 Suggestion = tuple[Change, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Disagreement(DocumentConfig):
-    """Rule at a place that another level and the verdict judge differently."""
+    """Rule at a place where another level and the verdict judge differently."""
 
     rule: str
     place: Place
@@ -112,7 +112,7 @@ LevelName = Literal["geometry", "airframe", "autopilot"]
 class LevelAnswer:
     """Answer of one level.
 
-    headline: the answer in a line.
+    headline: the answer in one line.
     disagreements: findings that this level and the verdict judge differently; empty for the verdict's own level.
     undecided: True if nothing failed, but a required part was not judged.
     """
@@ -141,9 +141,10 @@ class DecidingParameter(DocumentConfig):
     """Autopilot parameter that decides: with another value of it alone the flight passes.
 
     name: the autopilot's own name.
-    current, passing: its values, in ``unit``: as flown, and the nearest value with which a flight passed.
-    rule, place: of the finding that failed first with the current value.
-    off: error there, m: below (negative) or above for a height, to the side for the corridor; None if unknown.
+    current: value as flown, in ``unit``.
+    passing: nearest value with which a flight passed, in ``unit``.
+    rule, place: rule and place of the finding that failed first with the current value.
+    off: error at that place, m: above (negative: below) for a height, to the side for the corridor; None if unknown.
     """
 
     name: str

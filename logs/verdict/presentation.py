@@ -1,4 +1,4 @@
-"""A verdict in the order in which it is shown: by rule, the failed findings first, and the findings that leave it open.
+"""Present a verdict in the order in which it is shown: by rule, failed findings first, and undecided findings.
 
 Terminal, report page, notebook, studio and JUnit read a `Presentation`, which `logs.verdict.verdict.Verdict.present`
 makes.  It holds data; `logs.verdict.wording` makes words of places and suggestions.
@@ -30,23 +30,23 @@ class RuleFindings:
 
     @property
     def closest(self) -> Finding | None:
-        """The failed finding that is furthest beyond its limit, else the finding closest to its limit."""
+        """The failed finding that is furthest beyond its limit, or else the finding closest to its limit."""
         return closest_to_limit(self.findings)
 
     @property
     def count_text(self) -> str:
-        """The number of findings that pass, of those that were judged."""
+        """Text with the number of findings that pass out of those that were judged."""
         return f"{self.judged - len(self.failed)} of {self.judged} ok" if self.judged else "not judged"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Presentation:
-    """A verdict as readers meet it.
+    """A verdict as it is shown to readers.
 
     headline: the answer in a line.  details: the other lines of the summary.
     state: "ok", "open" (nothing failed, and a part was not judged) or "fail".
     findings: in the verdict's order.  rules: the findings by rule, in the order of `RULE_WORDS`.
-    zones: number of zones of airspace that the verdict judges by.
+    zones: number of airspace zones that apply to the verdict.
     """
 
     headline: str
@@ -64,13 +64,13 @@ class Presentation:
 
     @property
     def undecided(self) -> tuple[Finding, ...]:
-        """The findings that leave the verdict open."""
+        """The findings that leave the verdict undecided."""
         return undecided_findings(self.findings)
 
     def worth_listing(self, most: int) -> list[tuple[int, Finding]]:
-        """List findings with their numbers: those that failed or are left open, then the closest to its limit by rule.
+        """List failed and undecided findings, then each rule's finding closest to its limit, with their numbers.
 
-        most: number of failed and open findings at most.
+        most: maximum number of failed and undecided findings.
         """
         is_open = {id(item) for item in self.undecided}
         closest = {id(rule.closest) for rule in self.rules}

@@ -1,4 +1,4 @@
-"""Define a rule of the verdict: how it judges on each level, what it needs of a log, its tolerances.
+"""Define a rule of the verdict: how it judges on each level, what data it needs from a log, and its tolerances.
 
 Each file in `logs/verdict/rules/` makes its own `Rule`; `logs.verdict.rules.registry.RULES` lists them.  Code that
 judges uses that list; code that shows a verdict reads `logs.verdict.rule_words.RULE_WORDS`.
@@ -17,7 +17,7 @@ from logs.verdict.places import Suggestion
 
 
 class Judge(Protocol):
-    """Callable that judges the planned path (``geometric``), or the flown track.
+    """Callable that judges the planned path if ``geometric``, otherwise the flown track.
 
     aligned: None if nothing was flown, and for the planned path.
     """
@@ -25,16 +25,16 @@ class Judge(Protocol):
     def __call__(
         self, requirements: RouteRequirements, aligned: AlignedTrack | None, /, *, geometric: bool = False
     ) -> list[Finding]:
-        """Return its findings, in the order of the route."""
+        """Return the rule's findings, in the order of the route."""
 
 
 # Judges a mission's items alone, for any autopilot.
 ItemsJudge = Callable[[FlightSetup], list[Finding]]
 # Judges how a flight ended and whether its record is complete.
 EndJudge = Callable[[RouteRequirements, AlignedTrack | None, str, bool], list[Finding]]
-# Judges all stretches of an imported flight together, and whether planfly's own log of it is complete.
+# Judges all stretches of an imported flight together, and whether planfly's own log of the flight is complete.
 ImportedEndJudge = Callable[[FlightSetup, Sequence[FlownLegs], bool], Finding]
-# Replaces findings of other rules by its own, after all have judged.
+# Replaces findings of other rules with the rule's own, after all rules have judged.
 Merge = Callable[[RouteRequirements, AlignedTrack | None, Sequence[Finding]], tuple[Finding, ...]]
 # Suggests changes that would make a failed finding pass, the smallest change first.
 Suggest = Callable[[RouteRequirements, AlignedTrack | None, Finding], tuple[Suggestion, ...]]
@@ -65,7 +65,7 @@ class Rule:
     """A rule of the verdict.
 
     name: name of its words in `logs.verdict.rule_words.RULE_WORDS`.
-    tolerances: names of the constants in `logs.verdict.tolerances` that it and its measures use.
+    tolerances: names of the constants in `logs.verdict.tolerances` that the rule and its measures use.
 
     Judging functions, each None if the rule has none:
     judge: planned path and flown track.  judge_items, judge_end, judge_imported_end, merge: see their types.

@@ -1,6 +1,6 @@
-"""Define the words of each rule, without any judging: name, title, question, unit, scale, urgency.
+"""Define the texts and units of each rule, without its judging: name, title, question, unit, scale, urgency.
 
-`logs.verdict.rules.registry.RULES` holds how each rule judges.  Everything that shows a verdict reads this table.
+`logs.verdict.rules.registry.RULES` contains the judging functions.  All code that shows a verdict reads this table.
 """
 
 from dataclasses import dataclass
@@ -23,10 +23,10 @@ from logs.verdict.headline_phrases import (
 class Margin:
     """The quantity whose distance to the limit is a rule's margin, and the scale that ranks flights by it.
 
-    of: the quantity that is compared with the limit, in words.
-    unit: of quantity, limit and margin.
+    of: name of the quantity that is compared with the limit.
+    unit: unit of quantity, limit and margin.
     scale: a difference that a person would call noticeable, in that unit.  It ranks flights and marks a narrow pass,
-    and decides no verdict.  None for a count, a time or a limit of geometry, which do not say how close a flight was.
+    but decides no verdict.  None for a count, a time or a limit of geometry, which do not say how close a flight was.
     """
 
     of: str
@@ -36,10 +36,10 @@ class Margin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RuleWords:
-    """The words of a rule.
+    """The texts of a rule.
 
-    name: in findings, in file formats, and in the columns of a campaign's table.
-    title: heads the rule's findings in tables.  noun: names the rule within a sentence; "" for its name.
+    name: name in findings, in file formats, and in the columns of a campaign's table.
+    title: heading of the rule's findings in tables.  noun: name of the rule within a sentence; "" to use `name`.
     asks: the question that the rule answers, one sentence.
     margin: None for a rule without a number of its own.
     urgency: a headline names failures of a greater urgency first.
@@ -74,12 +74,12 @@ class RuleWords:
 
     @property
     def margin_column(self) -> str:
-        """Column of a campaign's table with the least margin of each flight."""
+        """Column of a campaign's table with the smallest margin of each flight."""
         return f"margin_{self.name}"
 
     @property
     def place_column(self) -> str:
-        """Column of a campaign's table with the place of the least margin."""
+        """Column of a campaign's table with the place of the smallest margin."""
         return f"place_{self.name}"
 
 

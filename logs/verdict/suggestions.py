@@ -46,7 +46,7 @@ from world.kernels import Records
 from world.terrain import Terrain
 
 # ----------------------------------------------------------------------
-# The side on which a path should pass a zone: the least shift of its legs there that ends the violation.
+# The side on which a path should pass a zone: the smallest shift of its legs that ends the violation.
 
 # Horizontal shifts of a path: their name, the coordinate, and its sign.
 _HORIZONTAL_SHIFTS: tuple[tuple[Quantity, str, float], ...] = (
@@ -60,10 +60,12 @@ _VERTICAL_SHIFTS: tuple[tuple[Quantity, str, float], ...] = (("height", "up", 1.
 
 
 def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
-    """Suggest passing a zone further to one side, or higher or lower; the least change first.
+    """Suggest passing a zone further to one side, or higher or lower; the smallest change first.
 
-    item: the finding of the violated zone.  All legs of the violation are shifted: of the planned path if that violates
-    the zone, by as much more as the flight went deeper; of the flight if only the flight violates it.
+    item: the finding on the violated zone.
+
+    If the planned path violates the zone, the shift of its violating legs includes how much deeper the flight went.  If
+    only the flight violates the zone, the violating legs of the flight are shifted.
     """
     z, facts = item.place.index, {fact.what: fact.value for fact in item.facts}
     if z is None or "entry leg" not in facts:
@@ -80,7 +82,7 @@ def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, ite
     for ways in (_HORIZONTAL_SHIFTS, _VERTICAL_SHIFTS):
         best: tuple[float, Change] | None = None
         for what, axis, sign in ways:
-            shift = _least_shift(near, record, terrain, axis, sign, math.inf if best is None else best[0])
+            shift = _smallest_shift(near, record, terrain, axis, sign, math.inf if best is None else best[0])
             if shift is not None:
                 best = (
                     shift,
@@ -91,14 +93,13 @@ def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, ite
     return tuple((change,) for _, change in sorted(found, key=lambda one: one[0]))
 
 
-def _least_shift(
+def _smallest_shift(
     moves: Records, record: ZoneRecords, terrain: Terrain | None, axis: str, sign: float, most: float
 ) -> float | None:
-    """Return the least shift (m) in one direction that ends a violation, or None.
+    """Return the smallest shift (m) in one direction that ends a violation; None if above ``most`` or not found.
 
-    None if it is above ``most``, or was not found.  A path at some depth beyond a limit needs a shift of at least that
-    depth, so shifting by the depth at each step misses no smaller shift.  Ground that rises faster than the step may be
-    missed.
+    A path at some depth beyond a limit needs a shift of at least that depth, so shifting by the depth at each step
+    misses no smaller shift.  Ground that rises faster than the step may be missed.
     """
     shift, shifted = 0.0, np.array(moves)
     for _ in range(ZONE_SUGGESTION_TRIAL_COUNT):
@@ -130,7 +131,7 @@ def _smallest_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
 
 
 def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
-    """Suggest a gentler slope, a longer leg or another speed for one leg; the least relative change first.
+    """Suggest a gentler slope, a longer leg or another speed for one leg; the smallest relative change first.
 
     If the aircraft is not known well enough, suggest a flight that measures its ability.
     """
@@ -167,7 +168,7 @@ def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, i
 
 
 def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
-    """Suggest gentler legs on either side of a fly-by arc that is too steep while the legs are not."""
+    """Suggest gentler legs on either side of a fly-by arc that is too steep although the legs are not."""
     steep = steep_arc(requirements, leg)
     if steep is None:
         return ()
@@ -183,7 +184,7 @@ def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion,
 
 
 def ease_turn(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
-    """Suggest a gentler turn, longer legs or a lower speed; the least relative change first."""
+    """Suggest a gentler turn, longer legs or a lower speed; the smallest relative change first."""
     i = item.place.index
     if i is None:
         return ()
@@ -207,7 +208,7 @@ def ease_turn(requirements: RouteRequirements, _aligned: AlignedTrack | None, it
 
 
 def _longer_legs(requirements: RouteRequirements, i: int) -> list[_Sized]:
-    """Suggest both legs at a waypoint long enough for its turn and its neighbours; empty if they are."""
+    """Suggest legs at a waypoint long enough for its turn and the neighbouring turns; return [] if they already are."""
     before = (
         requirements.before[i] + requirements.after[i - 1] + requirements.reversal[i - 1] + SUGGESTION_LENGTH_MARGIN_M
     )
@@ -223,10 +224,10 @@ def _longer_legs(requirements: RouteRequirements, i: int) -> list[_Sized]:
 
 
 def _gentler_turn(requirements: RouteRequirements, i: int, allowed: float) -> float:
-    """Return the largest turn in tenths of a degree, up to ``allowed`` (rad), that passes; 0 if none does.
+    """Return the largest turn up to ``allowed`` (rad) that passes, in steps of 0.1 degrees; 0 if none passes.
 
-    All that follows is turned with it.  In wind the next turns change with their courses, and so does the length
-    available to this turn.
+    The route after the waypoint is rotated with the turn.  In wind the next turns change with their courses, and so
+    does the length available to this turn.
     """
     first, last = max(0, i - 2), min(len(requirements.points), i + 3)
     route = requirements.route
@@ -263,7 +264,7 @@ def _true_airspeed_ratio(requirements: RouteRequirements, leg: int) -> float:
 
 
 def _level_speeds(requirements: RouteRequirements, amsl: float, now: float, factor: float) -> list[float]:
-    """Return speeds to command for level flight at an altitude, the nearest to ``now`` first.
+    """Return the airspeeds to command for level flight at an altitude, m/s, the nearest to ``now`` first.
 
     factor: ratio of true airspeed to commanded airspeed.
     """
@@ -296,7 +297,7 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
 
 
 def _turn_speed(requirements: RouteRequirements, i: int) -> float | None:
-    """Return the highest lower airspeed at which the turn at a waypoint fits its legs, or None."""
+    """Return the highest airspeed below the command at which the turn at a waypoint fits its legs, or None."""
     now = float(max(requirements.setup.route.airspeed[i - 1 : i + 1]))
     available = min(
         available_lengths(requirements.runs, requirements.before, requirements.after, requirements.reversal, i)
@@ -315,7 +316,7 @@ def _turn_speed(requirements: RouteRequirements, i: int) -> float | None:
 
 
 def _whole_metres(metres: float) -> float:
-    """Return whole metres for a suggestion."""
+    """Round a length to whole metres for a suggestion."""
     return float(round(metres))
 
 
@@ -402,9 +403,9 @@ def fly_faster(requirements: RouteRequirements, _aligned: AlignedTrack | None, i
 def fly_level_speed(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest an airspeed of level flight at the leg's altitude.
+    """Suggest an airspeed at which level flight is possible at the leg's altitude.
 
-    A certain one if the maximum is uncertain.
+    If the maximum airspeed is uncertain, suggest only airspeeds that are certainly possible.
     """
     leg = item.place.index
     if leg is None or item.limit is None or item.margin is None:

@@ -1,4 +1,4 @@
-"""The summary of a verdict: the headline, and the lines that a reader should know with it."""
+"""Write the summary of a verdict: the headline, and the lines that a reader needs with it."""
 
 import math
 from collections.abc import Sequence
@@ -19,9 +19,9 @@ from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule_words import RULE_WORDS, RuleWords
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
 
-# Failed findings that the first line names.
+# Maximum number of failed findings that the first line names.
 _NAMED = 4
-# How the other levels are introduced.
+# Introductions of the lines on the other levels.
 _LEVELS = {
     "geometry": "By geometry alone",
     "airframe": "By the airframe (planfly's guidance, exact navigation)",
@@ -29,7 +29,7 @@ _LEVELS = {
 
 
 def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> str:
-    """Write the first line: the answer, and what failed, was not judged or only just passed.
+    """Write the first line: the answer, and which findings failed, were not judged or narrowly passed.
 
     source: the source of the aircraft's model, if the model is uncertain.
     """
@@ -37,17 +37,17 @@ def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> st
     if flyable:
         silent = [_unjudged_text(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
         return "; ".join(["flyable", *filter(None, silent), *_near_miss_notes(findings), *whose])
-    failed = _failed(findings)
+    failed = _failed_by_urgency(findings)
     if not failed and (open_text := undecided_text(findings)):
         return "; ".join([f"not judged in full: {open_text}", *whose])
-    named = _most_telling(failed)
+    named = _headline_findings(failed)
     more = len(failed) - len(named)
     text = "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
     return "; ".join([text, *whose])
 
 
 def undecided_text(findings: Sequence[Finding]) -> str:
-    """Describe what leaves the verdict open, or return "" for nothing.
+    """Describe the findings that leave the verdict undecided; return "" if there are none.
 
     >>> from logs.verdict.findings import UNKNOWN_AIRCRAFT, make_finding
     >>> from logs.verdict.places import Place
@@ -70,7 +70,7 @@ def undecided_text(findings: Sequence[Finding]) -> str:
 
 
 def _unknown_aircraft_text(every: Sequence[Finding]) -> str:
-    """Describe the findings for which the aircraft is not known well enough, or return "" for none."""
+    """Describe the findings for which the aircraft is not known well enough; return "" if there are none."""
     found = [item for item in every if item.rule == "slope"]
     if len(found) < len(every):
         speeds = sum(item.rule == "speed" for item in every)
@@ -103,19 +103,19 @@ def first_failed(findings: Sequence[Finding]) -> Finding | None:
     >>> first.rule
     'completion'
     """
-    failed = _failed(findings)
-    return _most_telling(failed)[0] if failed else None
+    failed = _failed_by_urgency(findings)
+    return _headline_findings(failed)[0] if failed else None
 
 
-def _failed(findings: Sequence[Finding]) -> list[Finding]:
-    """Return the failed findings by urgency, and in the order of the rules."""
+def _failed_by_urgency(findings: Sequence[Finding]) -> list[Finding]:
+    """Return the failed findings sorted by urgency, and then by the order of the rules."""
     order = {name: k for k, name in enumerate(RULE_WORDS)}
     failed = (item for item in findings if item.ok is False)
     return sorted(failed, key=lambda item: (-RULE_WORDS[item.rule].urgency, order[item.rule]))
 
 
 def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
-    """Describe what of a rule was not judged, or return "" for nothing."""
+    """Describe which findings of a rule were not judged; return "" if all were judged."""
     mine = [item for item in findings if item.rule == rule.name]
     silent = sum(item.ok is None for item in mine)
     if not silent:
@@ -133,8 +133,8 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
     return out
 
 
-def _most_telling(failed: list[Finding]) -> list[Finding]:
-    """Return at most four findings: the worst of each rule before the second worst of any rule."""
+def _headline_findings(failed: list[Finding]) -> list[Finding]:
+    """Return at most four failed findings, the worst of each rule before the second worst of any rule."""
     margins = [0.0 if item.margin is None else item.margin for item in failed]
     by_margin = sorted(range(len(failed)), key=margins.__getitem__)
     count: dict[str, int] = {}
@@ -161,7 +161,7 @@ def summary_lines(
 ) -> tuple[str, ...]:
     """Write the summary: answer, airframe or autopilot, start, conditions, autopilot, what was not judged, levels.
 
-    levels: the verdict's own last, with the headline.
+    levels: answers of all levels; the verdict's own is last and has the headline.
     """
     *others, own = levels
     lines = [own.headline, *_airframe_or_autopilot_lines(levels, deciding, setup)]
@@ -174,7 +174,7 @@ def summary_lines(
         if item.ok is None and RULE_WORDS[item.rule].explained:
             silent.setdefault(item.rule, item.reason)
     lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in silent.items()]
-    # Limits of that autopilot's own, which say nothing of the aircraft.
+    # These are the autopilot's own limits, which say nothing about the aircraft.
     lines += [
         f"PX4 would not take it: {item.reason}"
         for item in findings
@@ -196,7 +196,7 @@ def summary_lines(
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
     for other in others:
-        agreement = f"; {_agreement(other)}" if level == "flown" else ""
+        agreement = f"; {_agreement_text(other)}" if level == "flown" else ""
         lines.append(f"{_LEVELS[other.name]}: {other.headline}{agreement}")
     return tuple(lines)
 
@@ -218,9 +218,9 @@ def _airframe_or_autopilot_lines(
 
 
 def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
-    """Describe the source of the parameters if a file states any, and the names in the file that have no effect.
+    """Describe the source of the parameters if a file sets any, and the names in the file that have no effect.
 
-    Without a flight only what is wrong with the file is said.
+    Without a flight, only faults of the file are described.
     """
     parameters = setup.autopilot.parameters
     if parameters is None or not parameters.source:
@@ -274,8 +274,8 @@ def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> lis
     ]
 
 
-def _agreement(other: LevelAnswer) -> str:
-    """Describe where the verdict and another level differ."""
+def _agreement_text(other: LevelAnswer) -> str:
+    """Describe where the verdict and another level agree or differ."""
     differing = other.disagreements
     if not differing:
         geometry = other.name == "geometry"

@@ -1,6 +1,6 @@
 """Search candidate changes for one that passes a trial: a flight, a simulated return, or a computation.
 
-Whatever answers "what would help" searches with these two functions.
+Code that searches for remedies uses these two functions.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -10,7 +10,7 @@ Candidate = TypeVar("Candidate")
 
 
 def first_that_passes(candidates: Iterable[Candidate], passes: Callable[[Candidate], bool]) -> Candidate | None:
-    """Return the first candidate that passes, or None if none does; later ones are not tried.
+    """Return the first candidate that passes, or None if none passes; candidates after it are not tried.
 
     >>> first_that_passes([3, 8, 9], lambda metres: metres > 5)
     8
@@ -19,9 +19,9 @@ def first_that_passes(candidates: Iterable[Candidate], passes: Callable[[Candida
 
 
 def least_change(changes: Sequence[Candidate], passes: Callable[[Candidate], bool]) -> Candidate | None:
-    """Return the least of rising changes that passes, by bisection, or None if none of those tried passes.
+    """Return the smallest change that passes, by bisection, or None if no tried change passes.
 
-    All changes above one that passes are assumed to pass.
+    The changes are in increasing order, and all changes above a passing one are assumed to pass.
 
     >>> tried = []
     >>> least_change(range(0, 120, 10), lambda metres: not tried.append(metres) and metres >= 30)

@@ -1,4 +1,4 @@
-"""The verdict: findings, and the two questions that they answer, is the plan flyable and was it flown to its end."""
+"""Define the verdict: findings, and the answers to whether the plan is flyable and was flown to its end."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -24,7 +24,7 @@ from world.extras import need_extra
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Verdict:
-    """The answer to the question whether a plan really flies, with a finding for every rule and place.
+    """The answer to the question whether a plan can really be flown, with a finding for every rule and place.
 
     flyable: complete, and no finding failed.
     complete: the plan was feasible, flown to its end, and recorded in full (at the geometric level: feasible, or a
@@ -32,7 +32,7 @@ class Verdict:
     lines: the summary for a person; its first line, the headline, answers the question.
     level: "flown", "geometric" (from the envelope, without a flight) or "plan" (no feasible plan, so nothing was
     flown).
-    levels: the answers of the levels that were asked, geometry first, the verdict's own last; empty for a plan that was
+    levels: the answers of the judged levels, geometry first, the verdict's own last; empty for a plan that was
     not flown.
     deciding: the autopilot's parameter that decides, if the flight fails by one parameter and the aircraft passes.
     notes: items that are not flown as the mission states them; the lines name them too.
@@ -42,7 +42,7 @@ class Verdict:
     parameters: the parameters of the autopilot that flew, or None.
     unjudged: the part that was not judged, for which the flight is not flyable although nothing failed, or "": items
     that the log of an imported flight lacks, its end, or slopes that the aircraft is not known well enough for.
-    imported: True for a flight that another program logged, which was flown as planned or was not.
+    imported: True for a flight logged by another program; its answer is "flown as planned" or "not flown as planned".
     conditions: aircraft, speed, weather, navigation, autopilot and ground of the verdict; the lines name them too.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
@@ -86,12 +86,12 @@ class Verdict:
 
     @property
     def undecided(self) -> bool:
-        """True if nothing failed, and a part of the mission was not judged."""
+        """True if nothing failed, but a part of the mission was not judged."""
         return bool(self.unjudged) and not self.failed
 
     @property
     def flies(self) -> bool:
-        """True if the flight is flyable, apart from departure, approach and returns that are not decided.
+        """True if the flight is flyable, except that departure, approach or returns may be undecided.
 
         >>> from dataclasses import replace
         >>> from logs.verdict.findings import GROUND_WAY, make_finding
@@ -106,7 +106,7 @@ class Verdict:
 
     @property
     def headline(self) -> str:
-        """The answer in a line."""
+        """The answer in one line."""
         return self.lines[0] if self.lines else ""
 
     @property
@@ -121,7 +121,7 @@ class Verdict:
 
     @property
     def closest(self) -> dict[str, Finding]:
-        """By rule the failed finding that is furthest beyond its limit, else the one closest to it.
+        """By rule, the failed finding furthest beyond its limit, or else the finding closest to its limit.
 
         Rules without a finding that failed or was judged by a number are left out.
 
@@ -189,7 +189,7 @@ class Verdict:
         )
 
     def to_junit(self, name: str) -> str:
-        """Write the verdict as JUnit XML, which continuous integration shows.  name: of what was judged."""
+        """Write the verdict as JUnit XML for continuous integration.  name: name of the judged plan or flight."""
         return junit_text({name: self.present()})
 
     def _repr_html_(self) -> str:
@@ -198,7 +198,7 @@ class Verdict:
 
 
 def verdict_json(verdict: Verdict) -> str:
-    """Write the verdict as the text of a ``verdict.json``.
+    """Return the verdict as the text of a ``verdict.json``.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import Place

@@ -1,4 +1,4 @@
-"""Describe places, changes and disagreements in words that no code of planfly reads back."""
+"""Describe places, changes and disagreements in texts that no code of planfly parses."""
 
 import math
 
@@ -13,7 +13,7 @@ _MAX_STATEMENT_LENGTH = 80
 
 
 def place_text(place: Place) -> str:
-    """Return the name of a place as a person says it.
+    """Return the name of a place for people.
 
     >>> [place_text(place) for place in (Place("waypoint", 3, item=4), Place("missile", 0, name="Alfa"), Place("plan"))]
     ['waypoint 3 (item 4)', 'Alfa (missile)', 'plan']
@@ -40,7 +40,7 @@ def place_text(place: Place) -> str:
 
 
 def place_text_within(place: Place) -> str:
-    """Return a place for use within a sentence: the item of a leg is set between commas.
+    """Return the name of a place for use within a sentence, with the item of a leg between commas.
 
     >>> place_text_within(Place("leg", 7, to_item=9))
     'leg 7, to item 9,'
@@ -58,7 +58,7 @@ def threat_text(place: Place) -> str:
 
 
 def change_text(change: Change) -> str:
-    """Return one change as an instruction.
+    """Phrase one change as an instruction.
 
     >>> change_text(Change("length", Place("leg", 1), 300.0, 400.0, "m"))
     'make leg 1 400 m long instead of 300 m'
@@ -76,9 +76,9 @@ def change_text(change: Change) -> str:
     where, wanted = place_text_within(change.place), change.wanted
     match change.what:
         case "length":
-            return f"make {_length(change)}"
+            return f"make {_length_text(change)}"
         case "rise":
-            return _rise(change)
+            return _rise_text(change)
         case "airspeed" if change.most is not None:
             return f"command {wanted:.1f} to {change.most:.1f} m/s on {place_text(change.place)}"
         case "airspeed":
@@ -99,7 +99,7 @@ def change_text(change: Change) -> str:
 
 
 def _other_change_text(change: Change) -> str:
-    """Return a change of anything but the path as an instruction."""
+    """Phrase a change of anything but the path as an instruction."""
     wanted = change.wanted
     match change.what:
         case "duration":
@@ -115,7 +115,7 @@ def _other_change_text(change: Change) -> str:
     return f"take a {change.what} {wanted:.2f} times as large"
 
 
-def _rise(change: Change) -> str:
+def _rise_text(change: Change) -> str:
     verb = "climb" if math.copysign(1.0, change.wanted) > 0.0 else "fall"
     if change.current is None:
         return f"{verb} {abs(change.wanted):.0f} m on {place_text(change.place)}"
@@ -124,26 +124,26 @@ def _rise(change: Change) -> str:
     )
 
 
-def _length(change: Change) -> str:
+def _length_text(change: Change) -> str:
     current = change.current or 0.0
     instead = "; it goes nowhere now" if current < MIN_LEG_LENGTH_M else f" instead of {current:.0f} m"
     return f"{place_text_within(change.place)} {change.wanted:.0f} m long{instead}"
 
 
 def suggestion_text(suggestion: Suggestion) -> str:
-    """Return changes to make together, as one instruction.
+    """Join the changes of one suggestion into one instruction.
 
     >>> longer = [Change("length", Place("leg", k), 150.0, 260.0, "m") for k in (1, 2)]
     >>> suggestion_text(tuple(longer))
     'make leg 1 260 m long instead of 150 m and leg 2 260 m long instead of 150 m'
     """
     if all(change.what == "length" for change in suggestion):
-        return "make " + " and ".join(map(_length, suggestion))
+        return "make " + " and ".join(map(_length_text, suggestion))
     return " and ".join(map(change_text, suggestion))
 
 
 def suggestions_text(suggestions: tuple[Suggestion, ...]) -> str:
-    """Return alternatives, as one instruction; "" for none.
+    """Join alternative suggestions into one instruction; return "" if there are none.
 
     >>> slower = Change("airspeed", Place("leg", 1), 25.0, 20.5, "m/s")
     >>> suggestions_text(((Change("length", Place("leg", 1), 300.0, 400.0, "m"),), (slower,)))
@@ -152,12 +152,12 @@ def suggestions_text(suggestions: tuple[Suggestion, ...]) -> str:
     return ", or ".join(map(suggestion_text, suggestions))
 
 
-# How a level judges, after "passes" and "fails".
+# Phrase for how a level judges, which follows "passes" or "fails".
 _LEVEL_PHRASES = {"geometry": "by geometry", "airframe": "with planfly's guidance", "autopilot": "with the autopilot"}
 
 
 def disagreement_text(one: Disagreement) -> str:
-    """Return the statement that another level and the verdict judge a place differently.
+    """State that another level and the verdict judge a place differently.
 
     >>> disagreement_text(Disagreement("speed", Place("leg", 0), "geometry", there=True, here=False))
     'speed at leg 0 passes by geometry and fails in flight'
@@ -168,7 +168,7 @@ def disagreement_text(one: Disagreement) -> str:
 
 
 def deciding_text(deciding: DecidingParameter) -> str:
-    """Return which parameter decides, the effect of its value, and the value that would pass.
+    """Describe the deciding parameter, the effect of its value, and the value that would pass.
 
     >>> deciding_text(DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.2))
     'TECS_HDEM_TCONST 3 puts it 8 m low on leg 4; 1.2 would pass'
@@ -183,9 +183,10 @@ def deciding_text(deciding: DecidingParameter) -> str:
 
 
 def gentle_launch_text(found: float, trigger: tuple[float, str]) -> str:
-    """Return the statement that a launch accelerates too little to start the motor.
+    """State that a launch accelerates too little to start the motor.
 
-    found: m/s^2.  trigger: m/s^2 that starts the motor, and the parameter with that value.
+    found: acceleration of the launch, m/s^2.
+    trigger: acceleration that starts the motor, m/s^2, and the name of its parameter.
 
     >>> gentle_launch_text(8.33, (15.0, "TKOFF_THR_MINACC"))
     'the launch accelerates at 8.3 m/s², less than TKOFF_THR_MINACC 15'
@@ -194,7 +195,7 @@ def gentle_launch_text(found: float, trigger: tuple[float, str]) -> str:
 
 
 def shortened(text: str) -> str:
-    """Return a statement cut to the greatest length in a headline.
+    """Return a statement cut to the maximum length in a headline.
 
     >>> shortened("bank 80° at 3.0 s"), len(shortened("m" * 200))
     ('bank 80° at 3.0 s', 80)
@@ -203,12 +204,12 @@ def shortened(text: str) -> str:
 
 
 def quantity_text(value: float, unit: str) -> str:
-    """Return a value with its unit, to three figures and without a power of ten: a tank holds 1140000 Wh.
+    """Return a value with its unit, to three significant figures, and without an exponent even for 1140000 Wh.
 
     >>> quantity_text(11.87, "deg"), quantity_text(1_140_000.0, "Wh")
     ('11.9°', '1140000 Wh')
     """
-    return _figures(value, 3) + UNITS.get(unit, f" {unit}" if unit else "")
+    return _significant_digits(value, 3) + UNITS.get(unit, f" {unit}" if unit else "")
 
 
 # Most significant digits of two numbers that are compared.
@@ -216,7 +217,7 @@ _MOST_DIGITS = 9
 
 
 def compared_texts(value: float, limit: float, unit: str) -> tuple[str, str]:
-    """Return two values with their unit, with as many digits as make different values look different.
+    """Return two values with their unit, with enough digits that different values look different.
 
     >>> compared_texts(-7.04, -7.02, "deg"), compared_texts(12.0, 15.0, "m")
     (('-7.04°', '-7.02°'), ('12 m', '15 m'))
@@ -224,13 +225,17 @@ def compared_texts(value: float, limit: float, unit: str) -> tuple[str, str]:
     ('30.0004 m/s', '30 m/s')
     """
     digits = 3
-    while digits < _MOST_DIGITS and value != limit and _figures(value, digits) == _figures(limit, digits):
+    while (
+        digits < _MOST_DIGITS
+        and value != limit
+        and _significant_digits(value, digits) == _significant_digits(limit, digits)
+    ):
         digits += 1
     suffix = UNITS.get(unit, f" {unit}" if unit else "")
-    return _figures(value, digits) + suffix, _figures(limit, digits) + suffix
+    return _significant_digits(value, digits) + suffix, _significant_digits(limit, digits) + suffix
 
 
-def _figures(value: float, digits: int) -> str:
-    """Write a number to so many significant digits, without a power of ten."""
+def _significant_digits(value: float, digits: int) -> str:
+    """Write a number to a number of significant digits, without an exponent."""
     figures = f"{value:.{digits}g}"
     return figures if "e" not in figures else f"{value:.0f}" if abs(value) >= 1.0 else f"{value:.9f}".rstrip("0")

@@ -193,7 +193,7 @@ def parted(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
 
 
 def held_band(held: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
-    """Shade the stretches of a long axis (t,) at which a control is held at its limit, over the full height."""
+    """Return a layer that shades, over the full height, where a control is held at its limit on a long axis (t,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(np.int8)))
     starts, ends = along[edges[::2]], along[edges[1::2] - 1]
     gap = np.full(len(starts), np.nan)
@@ -209,7 +209,7 @@ def leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...
 
 
 def outline_rows(values: ArrayLike, count: int) -> Indices:
-    """Return rows that keep the outline of a long series: lowest and highest of each of `count` equal blocks, in order.
+    """Return the rows of the lowest and highest value of each of `count` blocks, to keep the outline of a long series.
 
     values: (t,); NaN rows are left out unless a block has no other rows.  All rows of a short series are returned.
     """
@@ -322,7 +322,7 @@ class LegendEntry:
 
 
 def legend_entries(panels: Sequence[Panel]) -> tuple[LegendEntry, ...]:
-    """Return each name of the panels' layers once, in their order; limits last, as lines without values."""
+    """Return one entry for each name of the panels' layers, in order, and then the limits, as lines without values."""
     found: dict[str, list[Layer]] = {}
     for panel in panels:
         for layer in panel.layers:

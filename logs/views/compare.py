@@ -68,7 +68,7 @@ def both_along(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
     tracks = [flight.track for flight in flights]
     panels = (
         Panel("height", "m AMSL", both([track.position[:, 2] for track in tracks])),
-        Panel("height above ground", "m", both([_above(flight) for flight in flights])),
+        Panel("height above ground", "m", both([_height_above_ground(flight) for flight in flights])),
         Panel("airspeed", "m/s", both([doubles(track.airspeed) for track in tracks]), min_span=4.0),
         Panel("bank, right +", "°", both([np.degrees(doubles(_roll(track))) for track in tracks])),
         Panel("cross-track, right +", "m", both([doubles(track.cross_track) for track in tracks]), min_span=0.1),
@@ -94,7 +94,7 @@ def _distance(track: Track) -> Floats:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def _above(flight: NamedFlight) -> Floats:
+def _height_above_ground(flight: NamedFlight) -> Floats:
     terrain, position = flight.setup.scenario.terrain, flight.track.position
     if terrain is None:
         return np.full(len(position), np.nan)

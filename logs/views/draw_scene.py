@@ -97,11 +97,11 @@ def draw_scene(view: SceneView) -> Figure:
         handles += _threats(axes, projection, setup, failed)
         handles += _zones(axes, projection, setup)
         placer = LabelPlacer(axes)
-        handles += _paths(axes, projection, terrain, route, track, failed, placer)
-        _labels(setup, projection, route, failed, placer)
+        handles += _draw_paths(axes, projection, terrain, route, track, failed, placer)
+        _draw_labels(setup, projection, route, failed, placer)
         name = shorten(setup.scenario.name, 60)
         times = "true to scale" if projection.stretch == 1.0 else f"heights × {projection.stretch:g}"
-        side = _direction(projection.azimuth)
+        side = _compass_name(projection.azimuth)
         axes.set_title(f"{name}: seen from the {side}, {times}", fontweight="bold")
         draw_legend(figure, handles, _LEFT + 0.1, (_BOTTOM - 0.08) / float(figure.get_figheight()))
     return figure
@@ -123,7 +123,7 @@ def _projection(route: Floats, bounds: Floats, stretch: float, narrow: bool) -> 
     return Projection(azimuth, np.array([*bounds.mean(axis=1), float(route[:, 2].mean())]), stretch)
 
 
-def _direction(azimuth: float) -> str:
+def _compass_name(azimuth: float) -> str:
     names = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
     return names[round(azimuth / (math.pi / 4.0)) % 8]
 
@@ -269,7 +269,7 @@ def _hidden(projection: Projection, terrain: Terrain | None, points: Floats) -> 
     return hidden
 
 
-def _paths(
+def _draw_paths(
     axes: Any,
     projection: Projection,
     terrain: Terrain | None,
@@ -295,10 +295,12 @@ def _paths(
             zorder=4.5,
             solid_capstyle="butt",
         )
-    _line(axes, projection, terrain, samples, theme.colour("planned"), 3.6, 5)
+    _draw_path(axes, projection, terrain, samples, theme.colour("planned"), 3.6, 5)
     handles: list[Any] = [_handle("line", "planned", "planned path")]
     if track is not None:
-        _line(axes, projection, terrain, track.position[drawn_rows(track, _MAX_TRACK)], theme.colour("flown"), 1.2, 6)
+        _draw_path(
+            axes, projection, terrain, track.position[drawn_rows(track, _MAX_TRACK)], theme.colour("flown"), 1.2, 6
+        )
         handles.append(_handle("line", "flown", "flown track"))
     corners = projection.project(route)
     placer.avoid(*projection.project(samples)[:, :2].T)
@@ -323,7 +325,7 @@ def _paths(
     return handles + [_handle(kind, role, text) for some, kind, role, text in marks if some]
 
 
-def _line(
+def _draw_path(
     axes: Any, projection: Projection, terrain: Terrain | None, points: Floats, colour: str, width: float, order: float
 ) -> None:
     """Draw a path, thin and dashed where the ground hides it."""
@@ -337,7 +339,9 @@ def _line(
     axes.plot(*shut_part.T, color=colour, linewidth=0.5 * width, alpha=0.6, linestyle=(0, (2, 1.5)), zorder=order)
 
 
-def _labels(setup: FlightSetup, projection: Projection, route: Floats, failed: Failures, placer: LabelPlacer) -> None:
+def _draw_labels(
+    setup: FlightSetup, projection: Projection, route: Floats, failed: Failures, placer: LabelPlacer
+) -> None:
     corners = projection.project(route)
     last = len(route) - 1
 

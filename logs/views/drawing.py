@@ -137,7 +137,7 @@ def few_colours(png: bytes) -> bytes:
 
 
 def svg_bytes(figure: Figure) -> bytes:
-    """Render the figure as an SVG, its letters as outlines; the same figure gives the same bytes."""
+    """Render the figure as an SVG with letters as outlines; the same figure gives the same bytes."""
     return _rendered(figure, "svg", {"Date": None, "Creator": None})
 
 
@@ -280,13 +280,13 @@ def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, numbered: bool) -> Non
     if panel.note:
         at: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "right", "fontsize": 7}
         axes.annotate(panel.note, (1.0, 1.0), (0, 3), color=theme.colour("limit"), **at)
-    axes.set_ylabel(panel.label if chart.inches > 2.0 else "\n".join(_wrapped(panel)))
+    axes.set_ylabel(panel.label if chart.inches > 2.0 else "\n".join(_title_lines(panel)))
     axes.yaxis.set_label_coords(-_LABEL / (WIDTH * axes.get_position().width), 0.5)
     axes.grid(visible=True, axis="both" if chart.shared else "y")
     axes.set_axisbelow(True)
 
 
-def _wrapped(panel: Panel) -> list[str]:
+def _title_lines(panel: Panel) -> list[str]:
     words = textwrap.wrap(panel.title.replace(" +", "\N{NO-BREAK SPACE}+"), 13)
     lines = [line.replace("\N{NO-BREAK SPACE}", " ") for line in words]
     if not panel.unit:

@@ -50,7 +50,7 @@ class Subject:
 
     @property
     def things(self) -> str:
-        """Ground, threats and paths in words."""
+        """Text that lists ground, threats and paths."""
         legs, threats = self.setup.route.legs, len(self.setup.scenario.threats)
         ground = "shaded terrain" if self.setup.scenario.terrain is not None else "no terrain"
         return f"{ground}, {threats} threats, the planned path of {legs} legs{self.flown(' and the flown track')}."

@@ -1,4 +1,4 @@
-"""Chart flight without an engine: least heights to reach home, flat ground, and destinations within reach."""
+"""Chart flight without an engine: minimum heights to reach home, flat ground, and destinations within reach."""
 
 import numpy as np
 
@@ -26,7 +26,7 @@ def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
     sites = np.array([[site.east, site.north, 0.0] for site in glides.sites])
     extent = map_extent(scenario, route, [sites, np.array([one.start for one in glides.each])])
     layers = footprint_layers(drawn, extent)
-    layers += way_layers(drawn.by_reach, _LOOKS, lambda one: one.start[:2], lambda one: _said(one, drawn))
+    layers += way_layers(drawn.by_reach, _LOOKS, lambda one: one.start[:2], lambda one: _glide_text(one, drawn))
     down = np.array([one.own.at for one in glides.each if one.own.end == "ground"])
     if len(down):
         name = "where ArduPlane's own return comes down"
@@ -47,14 +47,14 @@ def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
     )
 
 
-def _said(one: Glide, drawn: DrawnReturns) -> str:
+def _glide_text(one: Glide, drawn: DrawnReturns) -> str:
     spare = drawn.glides.spare(one)
     left = f", {spare:.0f} m left over" if spare >= 0.0 else ""
     return f"{one.time:.0f} s: {reached_text(one.reach)}{left}"
 
 
 def footprint_layers(drawn: DrawnReturns, extent: Extent) -> list[Layer]:
-    """Return bands of the least height above ground to reach a chosen place, and flat ground.
+    """Return layers for bands of the minimum height above ground to reach a chosen place, and for flat ground.
 
     The list is empty without a map.
     """

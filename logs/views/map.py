@@ -141,7 +141,7 @@ def map_chart(
         centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
         labels += fail_labels(failed, route[:, :2], centres)
     labels += end_labels(scenario, route, None if route is None else stops)
-    labels += [] if route is None else _numbers(scenario, route, stops, failed)
+    labels += [] if route is None else _waypoint_labels(scenario, route, stops, failed)
     extent = map_extent(scenario, route, [drawn.track.position for drawn in tracks])
     return world_map(scenario, subject, layers, labels, extent, route=route, entered=frozenset(entered), winds=winds)
 
@@ -169,7 +169,7 @@ def world_map(
     origin = scenario.origin
     return MapChart(
         f"{shorten(scenario.name, 60)}: {subject}",
-        Panel("north", "km", (*around, *layers, *_ends(scenario)), span=north, labels=(*labels, *names)),
+        Panel("north", "km", (*around, *layers, *_end_markers(scenario)), span=north, labels=(*labels, *names)),
         east,
         north,
         position_text(origin.lat_deg, origin.lon_deg),
@@ -263,7 +263,7 @@ def _waypoints(route: Floats, stops: Sequence[int], failed: Failures, words: Seq
     return layers
 
 
-def _ends(scenario: Scenario) -> list[Layer]:
+def _end_markers(scenario: Scenario) -> list[Layer]:
     return [
         Layer("dots", name, name, point[:1], point[1:2], words=(name,))
         for name, point in (("start", scenario.start), ("destination", scenario.destination))
@@ -277,27 +277,27 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int] | 
     """
     labels = []
     for point, row, name in ((scenario.start, 0, "start"), (scenario.destination, -1, "destination")):
-        at_end = route is not None and _same(route[row], point)
+        at_end = route is not None and _are_close(route[row], point)
         text = name
         if at_end and route is not None:
             text = f"{row % len(route) if stops is None else stops[row]} {name}"
         labels.append(Label(text, float(point[0]), float(point[1]), "end"))
     start, destination = labels
-    if not _same(scenario.start, scenario.destination):
+    if not _are_close(scenario.start, scenario.destination):
         return labels
     return [replace(start, text=f"{start.text}, {destination.text}")]
 
 
-def _same(a: Floats, b: Floats) -> bool:
+def _are_close(a: Floats, b: Floats) -> bool:
     """Return True if two points lie within 50 m on the ground, so that one marker stands for both."""
     return float(np.hypot(*(a[:2] - b[:2]))) < 50.0
 
 
-def _numbers(scenario: Scenario, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
+def _waypoint_labels(scenario: Scenario, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
     first = stop_rows(stops)
     step = max(1, -(-len(first) // _MAX_NUMBERS))
     last = len(route) - 1
-    hidden = {k for k, end in ((0, scenario.start), (last, scenario.destination)) if _same(route[k], end)}
+    hidden = {k for k, end in ((0, scenario.start), (last, scenario.destination)) if _are_close(route[k], end)}
     shown = {k for n, k in enumerate(first) if n % step == 0} | set(failed.waypoints)
     return [
         Label(str(stops[k]), float(route[k, 0]), float(route[k, 1]), "number", "waypoint")

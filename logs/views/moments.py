@@ -64,7 +64,8 @@ def leg_names(setup: FlightSetup) -> list[str]:
     items = setup.route.items.tolist()
     numbers = setup.route.leg_numbers.tolist()
     return [
-        place_text(Place("leg", k, to_item=_known(items[k + 1]), number=numbers[k])) for k in range(setup.route.legs)
+        place_text(Place("leg", k, to_item=_item_or_none(items[k + 1]), number=numbers[k]))
+        for k in range(setup.route.legs)
     ]
 
 
@@ -72,12 +73,12 @@ def waypoint_names(setup: FlightSetup) -> list[str]:
     """Return the name of each waypoint, with its mission item and altitude."""
     heights, numbers = setup.shown_waypoints[:, 2].tolist(), setup.route.stops.tolist()
     return [
-        f"{place_text(Place('waypoint', k, item=_known(item), number=numbers[k]))}\n{heights[k]:.0f} m AMSL"
+        f"{place_text(Place('waypoint', k, item=_item_or_none(item), number=numbers[k]))}\n{heights[k]:.0f} m AMSL"
         for k, item in enumerate(setup.route.items.tolist())
     ]
 
 
-def _known(item: int) -> int | None:
+def _item_or_none(item: int) -> int | None:
     return item if item >= 0 else None
 
 

@@ -46,7 +46,7 @@ _MARKERS = ("o", "s", "^", "D", "v", "P")
 
 @dataclass(frozen=True, slots=True)
 class PaperPath:
-    """One path: waypoints (w, 3) m, its length ratio, and whether it is safe at the paper's sample points."""
+    """One path: its waypoints, m, (w, 3), its length ratio, and True if it is safe at the paper's sample points."""
 
     waypoints: Floats
     length_ratio: float
@@ -162,7 +162,7 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
             upper = figure.add_subplot(grid[0, column])
             lower = figure.add_subplot(grid[1, column], sharex=upper)
             for (name, searches), look in zip(groups.items(), _LOOKS, strict=False):
-                _converge(upper, lower, searches, look)
+                _draw_progress(upper, lower, searches, look)
                 names = names if name in names else [*names, name]
             most = max(len(searches) for searches in groups.values())
             upper.set(ylim=(-0.04 * most, 1.06 * most), title=f"{threats} threats")
@@ -194,7 +194,7 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
     return figure
 
 
-def _converge(upper: Any, lower: Any, histories: Sequence[Floats], look: Mapping[str, Any]) -> None:
+def _draw_progress(upper: Any, lower: Any, histories: Sequence[Floats], look: Mapping[str, Any]) -> None:
     """Draw one algorithm on one problem; a search that ended early keeps its last value."""
     length = max(len(history) for history in histories)
     stacked = np.stack(

@@ -69,8 +69,8 @@ def profile_chart(
     distance, points = route_samples(route, max(float(at[-1]) / _SAMPLES, 1.0))
     ground = ground_under(scenario, points)
     if above_ground is not None and ground is not None and len(above_ground) == len(route):
-        points[:, 2] = _over_ground(at, route, above_ground, distance, points[:, 2], ground, scenario)
-    low, high = _span(scenario, route, track, ground)
+        points[:, 2] = _planned_altitudes(at, route, above_ground, distance, points[:, 2], ground, scenario)
+    low, high = _altitude_limits(scenario, route, track, ground)
     plane = PathPlane(distance / 1000.0, points, ground, low, high)
     failed = failures(verdict, len(route))
     stops = range(len(route)) if stops is None else stops
@@ -85,7 +85,7 @@ def profile_chart(
     if not straight:
         dots = "waypoint" if len(first) <= _MAX_DOTS else "waypoint-small"
         layers.append(Layer("dots", "waypoint, numbered", dots, at[first] / 1000.0, route[first, 2], quiet=True))
-        labels = _numbers(at, route, stops, failed)
+        labels = _waypoint_labels(at, route, stops, failed)
     layers += _failing_waypoints(at, route, failed)
     corners = np.column_stack([at / 1000.0, route[:, 2]])
     labels = [*fail_labels(failed, corners, entered), *labels, *cut_names, *zone_names]
@@ -117,17 +117,18 @@ def _chart(scenario: Scenario, at: Floats, first: list[int], panel: Panel, *, st
 
 
 def _leg_begins(first: list[int], count: int) -> list[int]:
-    """Return the waypoints at which the displayed legs begin: each at the end of the stop before it."""
+    """Return the waypoints at which the displayed legs begin; each leg begins at the end of the stop before it."""
     return [0, *(k - 1 for k in first[2:])] if count > 1 else []
 
 
-def _over_ground(
+def _planned_altitudes(
     at: Floats, route: Floats, above: Floats, distance: Floats, up: Floats, ground: Floats, scenario: Scenario
 ) -> Floats:
-    """Return the planned altitudes (s,) m; legs that follow the ground are drawn above the ground.
+    """Return the planned altitude at each route sample, m AMSL, (s,); terrain-following legs keep above the ground.
 
-    at: distance of each waypoint along the route, m.  above: (w,) m, NaN at the end of a straight leg.
-    distance, up, ground: (s,) m, samples of the route.
+    at: distance of each waypoint along the route, m.
+    above: height above ground at the end of each leg, m, (w,); NaN if the leg does not follow the terrain.
+    distance, up, ground: distance, straight-line altitude and ground altitude of each sample, m, (s,).
     """
     begins = ground_under(scenario, route)
     starts = route[:, 2] - (0.0 if begins is None else begins)
@@ -145,10 +146,12 @@ def ground_under(scenario: Scenario, points: Floats) -> Floats | None:
     return heights if np.isfinite(heights).any() else None
 
 
-def _span(scenario: Scenario, route: Floats, track: Track | None, ground: Floats | None) -> tuple[float, float]:
-    """Return an altitude range that holds ground, plan and flight.
+def _altitude_limits(
+    scenario: Scenario, route: Floats, track: Track | None, ground: Floats | None
+) -> tuple[float, float]:
+    """Return the limits of the altitude axis, m AMSL, which contain ground, plan and flight.
 
-    Height limit and ceiling are included if they do not flatten the others.
+    Height limit and ceiling are included unless they would compress the rest too much.
     """
     heights = [route[:, 2]] + ([] if track is None else [track.position[:, 2]])
     if ground is not None:
@@ -221,7 +224,7 @@ def _failing_waypoints(at: Floats, route: Floats, failed: Failures) -> list[Laye
     return [Layer("rings", "waypoint that fails a rule", "fail", at[rows] / 1000.0, route[rows, 2], quiet=True)]
 
 
-def _numbers(at: Floats, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
+def _waypoint_labels(at: Floats, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
     first = stop_rows(stops)
     step = max(1, -(-len(first) // _MAX_NUMBERS))
     shown = {k for n, k in enumerate(first) if n % step == 0 or n == len(first) - 1} | set(failed.waypoints)

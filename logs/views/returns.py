@@ -1,4 +1,4 @@
-"""Chart returns to launch: path by outcome, profiles of the worst returns, and least start heights."""
+"""Chart returns to launch: path by outcome, profiles of the worst returns, and minimum start heights."""
 
 from collections.abc import Callable, Sequence
 from typing import TypeVar
@@ -151,7 +151,7 @@ def _profile(scenario: Scenario, one: WorstReturn, number: int, span: tuple[floa
 
 
 def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track | None) -> Chart | None:
-    """Return flown altitudes over time by outcome of a return, least altitudes, and margins of glides.
+    """Chart flown altitudes by outcome of a return, minimum safe altitudes, and margins of glides, over time.
 
     None if no returns were judged.
     """
@@ -172,7 +172,7 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
     ]
     panels = [Panel("height", "m AMSL", tuple(layers), span=span)]
     if drawn.glides.each:
-        panels.append(_left_over(drawn.glides))
+        panels.append(_glide_margin_panel(drawn.glides))
     return Chart(
         f"{shorten(scenario.name, 60)}: called home, or without its engine",
         "time since the start",
@@ -186,7 +186,7 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
 
 
 def _flown_places(drawn: DrawnReturns, track: Track | None) -> tuple[Floats, Floats]:
-    """Return times (t,) and positions (t, 3) of the path: from the track, or from the starts of returns."""
+    """Return times, s, (t,), and positions, m, (t, 3), of the path, from the track or from the starts of returns."""
     first, last = drawn.returns.each[0].time, max(one.time for one in drawn.returns.each)
     if track is not None and drawn.returns.flown:
         whole = np.isfinite(track.position).all(axis=1) & (track.time >= first) & (track.time <= last)
@@ -198,8 +198,8 @@ def _flown_places(drawn: DrawnReturns, track: Track | None) -> tuple[Floats, Flo
     return np.array([one.time for one in ones]), np.array([one.start for one in ones])
 
 
-def _left_over(glides: Glides) -> Panel:
-    """Return the height margin over time for destinations within reach without the engine."""
+def _glide_margin_panel(glides: Glides) -> Panel:
+    """Return a panel of the height margin over time for destinations within reach without the engine."""
     time = np.array([one.time for one in glides.each])
 
     def line(name: str, role: str, values: list[float]) -> Layer:

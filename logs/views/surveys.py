@@ -60,7 +60,7 @@ def _panel(
     step = -(-len(survey.lines) // _MAX_NUMBERED_LINES)
     for number, (line, measure) in enumerate(zip(survey.lines, measured, strict=True), 1):
         corners = laid(requirements.points[line.first : line.last + 1])
-        for to, stretches in ((lost, _lost(measure)), (used, _used(measure))):
+        for to, stretches in ((lost, _lost_stretches(measure)), (used, _used(measure))):
             for low, high in stretches:
                 to.append(_part(corners, low, high))
         if (number - 1) % step == 0:
@@ -74,7 +74,7 @@ def _panel(
     return Panel(f"{name}: to the left of its first line", "m", layers, labels=tuple(labels))
 
 
-def _lost(measure: LineMeasure | None) -> tuple[tuple[float, float], ...]:
+def _lost_stretches(measure: LineMeasure | None) -> tuple[tuple[float, float], ...]:
     """Return the lost stretches of a line, m; a line that was not flown is lost as a whole."""
     return ((0.0, np.inf),) if measure is None else measure.lost
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from aircraft.catalog import load_aircraft
-from aircraft.contacts import Gear, _centre, _own_contacts, contacts_of, usual_contacts, with_contacts
+from aircraft.contacts import Gear, _center_of_gravity, _own_contacts, contacts_of, usual_contacts, with_contacts
 from flight.dynamics.fdm import Fdm
 
 START = (46.0, 8.0)
@@ -53,7 +53,7 @@ def test_the_centre_of_gravity_is_that_of_the_loaded_aircraft_as_jsbsim_has_it()
     fdm = Fdm(cessna)
     fdm.release((*START, 900.0), (0.0, 0.0, 0.0), (50.0, 0.0, 0.0))
     stated = [fdm.properties.getter(f"inertia/cg-{axis}-in")() * 0.0254 for axis in "xyz"]
-    assert _centre(cessna.model_file.read_bytes()) == pytest.approx(stated, abs=0.002)
+    assert _center_of_gravity(cessna.model_file.read_bytes()) == pytest.approx(stated, abs=0.002)
     assert (stated[0] - 41.0 * 0.0254, 36.5 * 0.0254 - stated[2]) == pytest.approx((0.114, 0.027), abs=0.003)
 
 

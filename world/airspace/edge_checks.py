@@ -1,4 +1,4 @@
-"""Bound the work on the outline of a zone before it is checked or repaired: corners, near edges, crossings.
+"""Limit corners, near edges and crossings of a zone's outline before it is checked or repaired.
 
 A repair stores every crossing: a star of 2,000 corners, 80 kB in a file, has 2,000,000 crossings and took 1.7 GB.
 """

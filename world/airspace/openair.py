@@ -38,7 +38,7 @@ _ABOVE_GROUND = ("AGL", "AAGL", "ASFC", "GND", "SFC")
 
 @dataclass(slots=True)
 class _Block:
-    """Airspace that is being read: the contents of its lines up to the current one."""
+    """Airspace that is being read, with the contents of its lines up to the current line."""
 
     line: int
     airspace_class: str
@@ -60,7 +60,7 @@ def is_openair(text: str) -> bool:
     >>> is_openair("* Slovenia\nAC D\nAN CTR"), is_openair("QGC WPL 110")
     (True, False)
     """
-    lines = (line for line in map(_command, text.splitlines()) if line)
+    lines = (line for line in map(_clean_line, text.splitlines()) if line)
     return next(lines, "").upper().startswith(("AC ", "AN "))
 
 
@@ -76,12 +76,12 @@ def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] 
     """
     block: _Block | None = None
     for number, raw in enumerate(text.splitlines(), 1):
-        line = _command(raw)
+        line = _clean_line(raw)
         word, _, rest = line.partition(" ")
         word, rest = word.upper(), rest.strip()
         if word == "AC":
             if block is not None:
-                yield _finished(block, source)
+                yield _finish_block(block, source)
             block = _Block(number, rest.upper())
         elif word in _COMMANDS:
             if block is None:
@@ -99,10 +99,10 @@ def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] 
             message = f"{source}: line {number}: {word[:10]!r}: unknown; shapes are {known}"
             raise ScenarioError(message, file=source, field=word, allowed=known)
     if block is not None:
-        yield _finished(block, source)
+        yield _finish_block(block, source)
 
 
-def _command(line: str) -> str:
+def _clean_line(line: str) -> str:
     """Return a line without its comment, and with a space between V and its variable.
 
     In drawing commands a semicolon also begins a comment, as in some countries' files; a name may contain one.
@@ -113,7 +113,7 @@ def _command(line: str) -> str:
     return re.sub(r"^V(?=[DXWZ]\s*=)", "V ", line, flags=re.IGNORECASE)
 
 
-def _finished(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
+def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
     name = "".join(character for character in block.name if character.isprintable())[:80]
     where = f"line {block.line}" + (f" ({name})" if name else "")
     label = ", ".join(part for part in (block.airspace_class, block.kind) if part)
@@ -154,7 +154,7 @@ def _airway_rings(block: _Block, source: str) -> list[list[_Place]]:
 # Commands.  Each adds its contents to the airspace, and raises ValueError with the allowed values.
 
 
-def _times(block: _Block, text: str) -> None:
+def _read_times(block: _Block, text: str) -> None:
     if text.upper() == "NONE":
         block.times.append(BY_NOTAM)
         return
@@ -163,7 +163,7 @@ def _times(block: _Block, text: str) -> None:
     block.times.append(BY_NOTAM if found is None else found.text())
 
 
-def _limit(key: str) -> Callable[[_Block, str], None]:
+def _limit_reader(key: str) -> Callable[[_Block, str], None]:
     def read(block: _Block, text: str) -> None:
         if key in block.limits:
             raise ValueError("an airspace has one lower limit (AL) and one upper limit (AH)")
@@ -189,7 +189,7 @@ def _altitude(text: str, key: str) -> dict[str, Any] | None:
     return {"value": value, "unit": "M" if unit == "M" else "FT", "referenceDatum": reference}
 
 
-def _variable(block: _Block, text: str) -> None:
+def _read_variable(block: _Block, text: str) -> None:
     name, _, value = (part.strip() for part in text.partition("="))
     if name.upper() == "X":
         block.centre = _place(value)
@@ -201,11 +201,11 @@ def _variable(block: _Block, text: str) -> None:
         block.width = _length(value)
 
 
-def _corner(block: _Block, text: str) -> None:
+def _read_corner(block: _Block, text: str) -> None:
     _add_corners(block.corners, [_place(text)])
 
 
-def _circle(block: _Block, text: str) -> None:
+def _read_circle(block: _Block, text: str) -> None:
     if block.circle is not None:
         raise ValueError("an airspace has one circle")
     block.circle = _centre(block), _length(text)
@@ -230,7 +230,7 @@ def _arc_by_points(block: _Block, text: str) -> None:
     _add_corners(block.corners, [found[0], *arc[1:-1], found[1]])
 
 
-def _airway(block: _Block, text: str) -> None:
+def _read_airway(block: _Block, text: str) -> None:
     _add_corners(block.airway, [_place(text)])
 
 
@@ -240,7 +240,7 @@ def _add_corners(corners: list[_Place], more: list[_Place]) -> None:
     corners += more
 
 
-def _text(name: str) -> Callable[[_Block, str], None]:
+def _text_reader(name: str) -> Callable[[_Block, str], None]:
     def read(block: _Block, text: str) -> None:
         setattr(block, name, text if name == "name" else text.upper())
 
@@ -248,17 +248,17 @@ def _text(name: str) -> Callable[[_Block, str], None]:
 
 
 _COMMANDS: dict[str, Callable[[_Block, str], None]] = {
-    "AN": _text("name"),
-    "AY": _text("kind"),
-    "AA": _times,
-    "AL": _limit("lowerLimit"),
-    "AH": _limit("upperLimit"),
-    "V": _variable,
-    "DP": _corner,
+    "AN": _text_reader("name"),
+    "AY": _text_reader("kind"),
+    "AA": _read_times,
+    "AL": _limit_reader("lowerLimit"),
+    "AH": _limit_reader("upperLimit"),
+    "V": _read_variable,
+    "DP": _read_corner,
     "DA": _arc_by_bearings,
     "DB": _arc_by_points,
-    "DC": _circle,
-    "DY": _airway,
+    "DC": _read_circle,
+    "DY": _read_airway,
 }
 
 

@@ -58,7 +58,7 @@ def _zone_properties(properties: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
-    """Yield for each volume its place in the file and its [[zones]] entries, or the reason why it restricts no flight.
+    """Yield each volume's place in the file and its [[zones]] entries, or the reason why it restricts no flight.
 
     Raises ScenarioError for an invalid volume.
     """
@@ -67,10 +67,10 @@ def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
         where = f"{key}[{k}]"
         volumes = feature.get("geometry") if isinstance(feature, dict) else None
         if not isinstance(volumes, list) or not volumes:
-            raise _refused(source, where, "geometry", "a list of volumes is expected")
+            raise _value_error(source, where, "geometry", "a list of volumes is expected")
         name = _name(feature.get("name")) or _name(feature.get("identifier")) or f"zone {k + 1}"
         where += f" ({name})"
-        if (restriction := _word(feature.get("restriction"))) == _NO_RESTRICTION:
+        if (restriction := _upper_word(feature.get("restriction"))) == _NO_RESTRICTION:
             yield where, restriction
             continue
         stated = {"times": times} if (times := _times(feature.get("applicability"), f"{source}: {where}")) else {}
@@ -86,19 +86,19 @@ def _features(data: Mapping[str, Any]) -> Any:
 def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
     shape = volume.get("horizontalProjection") if isinstance(volume, dict) else None
     if not isinstance(shape, dict):
-        raise _refused(source, "", "horizontalProjection", "a polygon or a circle is expected")
+        raise _value_error(source, "", "horizontalProjection", "a polygon or a circle is expected")
     unit = volume.get("uomDimensions")
     limits = {
         f"{side}Limit": _limit(volume.get(f"{side}Limit"), unit, volume.get(f"{side}VerticalReference"), side, source)
         for side in ("lower", "upper")
     }
     entries = published_entries(limits, source)
-    kind = _word(shape.get("type"))
+    kind = _upper_word(shape.get("type"))
     if kind == "POLYGON":
         return entries | {"rings_deg": _rings(shape.get("coordinates"), source)}
     if kind == "CIRCLE":
         return entries | _circle(shape.get("center"), shape.get("radius"), source)
-    raise _refused(source, "", "horizontalProjection.type", "allowed Polygon, Circle")
+    raise _value_error(source, "", "horizontalProjection.type", "allowed Polygon, Circle")
 
 
 def ed318_zones(feature: Mapping[str, Any], where: str, number: int, source: str) -> Iterator[_FoundZone]:
@@ -109,7 +109,7 @@ def ed318_zones(feature: Mapping[str, Any], where: str, number: int, source: str
     properties = _zone_properties(feature["properties"])
     name = _name(properties.get("name")) or _name(properties.get("identifier")) or f"zone {number + 1}"
     where = f"{where} ({name})"
-    if (restriction := _word(properties["type"])) == _NO_RESTRICTION:
+    if (restriction := _upper_word(properties["type"])) == _NO_RESTRICTION:
         yield where, restriction
         return
     applicability = properties.get("limitedApplicability")
@@ -158,11 +158,11 @@ def _ed318_layer(geometry: Any, default_layer: Mapping[str, Any], source: str) -
     elif kind == "Point":
         extent = geometry.get("extent")
         extent = extent if isinstance(extent, dict) else {}
-        if _word(extent.get("subType")) != "CIRCLE":
-            raise _refused(source, "", "geometry.extent", "a point is the centre of a Circle")
+        if _upper_word(extent.get("subType")) != "CIRCLE":
+            raise _value_error(source, "", "geometry.extent", "a point is the centre of a Circle")
         yield entries | _circle(coordinates, extent.get("radius"), source)
     else:
-        raise _refused(source, "", "geometry.type", "allowed Polygon, MultiPolygon, Point, GeometryCollection")
+        raise _value_error(source, "", "geometry.type", "allowed Polygon, MultiPolygon, Point, GeometryCollection")
 
 
 # ----------------------------------------------------------------------
@@ -179,14 +179,14 @@ def _limit(value: Any, unit: Any, datum: Any, side: str, source: str) -> dict[st
         height = math.nan
     # An infinite upper limit means no limit.
     if not height > -math.inf:
-        raise _refused(source, "", f"{side} limit", "a number is expected")
+        raise _value_error(source, "", f"{side} limit", "a number is expected")
     if side == "upper" and height >= _UNLIMITED_VALUE:
         return None
-    if _word(unit) not in _UNITS:
-        raise _refused(source, "", "unit of its limits", f"allowed {', '.join(_UNITS)}")
-    if _word(datum) not in _DATUMS:
-        raise _refused(source, "", f"vertical reference of its {side} limit", f"allowed {', '.join(_DATUMS)}")
-    return {"value": height, "unit": _UNITS[_word(unit)], "referenceDatum": _word(datum)}
+    if _upper_word(unit) not in _UNITS:
+        raise _value_error(source, "", "unit of its limits", f"allowed {', '.join(_UNITS)}")
+    if _upper_word(datum) not in _DATUMS:
+        raise _value_error(source, "", f"vertical reference of its {side} limit", f"allowed {', '.join(_DATUMS)}")
+    return {"value": height, "unit": _UNITS[_upper_word(unit)], "referenceDatum": _upper_word(datum)}
 
 
 def _rings(coordinates: Any, source: str) -> list[list[list[float]]]:
@@ -194,9 +194,9 @@ def _rings(coordinates: Any, source: str) -> list[list[list[float]]]:
     try:
         rings = [[[float(corner[1]), float(corner[0])] for corner in ring] for ring in coordinates]
     except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
-        raise _refused(source, "", "coordinates", "lists of [longitude, latitude] are expected") from error
+        raise _value_error(source, "", "coordinates", "lists of [longitude, latitude] are expected") from error
     if not rings:
-        raise _refused(source, "", "coordinates", "at least one ring is expected")
+        raise _value_error(source, "", "coordinates", "at least one ring is expected")
     return rings
 
 
@@ -204,11 +204,13 @@ def _circle(centre: Any, radius: Any, source: str) -> dict[str, float]:
     try:
         return {"lat_deg": float(centre[1]), "lon_deg": float(centre[0]), "radius_m": float(radius)}
     except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
-        raise _refused(source, "", "circle", "a centre [longitude, latitude] and a radius, m, are expected") from error
+        raise _value_error(
+            source, "", "circle", "a centre [longitude, latitude] and a radius, m, are expected"
+        ) from error
 
 
 def _name(value: Any) -> str:
-    """Return a name in one line: the text, or of several texts the first English one, or else the first."""
+    """Return a name in one line; of several texts, the first English text, or else the first text."""
     if isinstance(value, list):
         texts = [one for one in value if isinstance(one, dict) and isinstance(one.get("text"), str)]
         english = [one for one in texts if str(one.get("lang")).startswith("en")]
@@ -218,7 +220,7 @@ def _name(value: Any) -> str:
     return "".join(character for character in value if character.isprintable()).strip()[:80]
 
 
-def _word(value: Any) -> str:
+def _upper_word(value: Any) -> str:
     return value.strip().upper() if isinstance(value, str) else ""
 
 
@@ -227,19 +229,19 @@ def _times(applicability: Any, source: str) -> list[str]:
     if applicability is None:
         return []
     if not isinstance(applicability, list) or not all(isinstance(one, dict) for one in applicability):
-        raise _refused(source, "", "applicability", "a list of periods is expected")
+        raise _value_error(source, "", "applicability", "a list of periods is expected")
     periods: list[Period] = []
     for one in applicability:
         try:
             start = _moment(one.get("startDateTime"), _EARLIEST_UTC_SHIFT)
             end = _moment(one.get("endDateTime"), _LATEST_UTC_SHIFT)
-            if _word(one.get("permanent")) == "YES":
+            if _upper_word(one.get("permanent")) == "YES":
                 start = end = None
             schedule = one.get("schedule") or one.get("dailyPeriod") or [{}]
             periods += [_daily(start, end, daily) for daily in schedule]
         except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
             allowed = "dates and times by ISO 8601, and days MON to SUN or ANY, are expected"
-            raise _refused(source, "", "applicability", allowed) from error
+            raise _value_error(source, "", "applicability", allowed) from error
     if any(period == Period() for period in periods):
         return []
     return [period.text() for period in periods]
@@ -259,7 +261,7 @@ def _daily(start: datetime | None, end: datetime | None, daily: Mapping[str, Any
     Sunrise and sunset, and hours without a UTC offset, give the whole day.
     """
     stated_days = daily.get("day") or []
-    named = [_word(day) for day in ([stated_days] if isinstance(stated_days, str) else stated_days)]
+    named = [_upper_word(day) for day in ([stated_days] if isinstance(stated_days, str) else stated_days)]
     days = frozenset() if "ANY" in named else frozenset(WEEKDAYS.index(day) for day in named)
     stated = [daily.get(key) for key in ("startTime", "endTime")]
     first, last = _minutes(stated[0]), _minutes(stated[1], up=True)
@@ -289,6 +291,6 @@ def _minutes(value: Any, *, up: bool = False) -> int | None:
     return found.hour * 60 + found.minute + bool(begun) - int(offset.total_seconds() // 60)
 
 
-def _refused(source: str, where: str, field: str, allowed: str) -> ScenarioError:
+def _value_error(source: str, where: str, field: str, allowed: str) -> ScenarioError:
     label = f"{source}: {where}" if where else source
     return ScenarioError(f"{label}: {field}: {allowed}", file=source, field=field, allowed=allowed)

@@ -57,7 +57,7 @@ _FAA_NOT_APPLICABLE = -9998.0
 
 
 def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Convert a zone's properties to entries of a [[zones]] table; an exclusion if no kind is stated.
+    """Convert a zone's properties to entries of a [[zones]] table; the zone is an exclusion if no kind is stated.
 
     A flight level or a height above the ellipsoid bounds an exclusion with a margin on the safe side:
     `FLIGHT_LEVEL_ERROR`, and the range of the geoid.  Raises ScenarioError for an invalid limit, for either of these

@@ -155,7 +155,7 @@ _NUMERIC_KEYS = ("floor_amsl_m", "floor_agl_m", "ceiling_amsl_m", "ceiling_agl_m
 
 
 def kml_zones(text: str, source: str) -> Iterator[Found]:
-    """Yield for each zone its place in a KML file and its [[zones]] entries.
+    """Yield each zone's place in a KML file and its [[zones]] entries.
 
     An extruded polygon is a zone up to its height, with the datum of `altitudeMode`; a polygon clamped to the ground
     has no ceiling.  ExtendedData states kind, floors, ceilings and radii by the keys of a scenario file.  Raises
@@ -186,7 +186,7 @@ def _tag(element: _Element) -> str:
     return element.tag.rpartition("}")[2]
 
 
-def _all(element: _Element, tag: str) -> list[_Element]:
+def _descendants(element: _Element, tag: str) -> list[_Element]:
     return [child for child in element.iter() if _tag(child) == tag]
 
 
@@ -196,8 +196,8 @@ def _kml_text(element: _Element, tag: str) -> str:
 
 
 def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
-    entries = zone_entries(_extended(placemark, source), source)
-    polygons, points = _all(placemark, "Polygon"), _all(placemark, "Point")
+    entries = zone_entries(_extended_data(placemark, source), source)
+    polygons, points = _descendants(placemark, "Polygon"), _descendants(placemark, "Point")
     if not polygons:
         if len(points) != 1 or "radius_m" not in entries:
             raise ScenarioError(
@@ -208,7 +208,7 @@ def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
     rings, ceilings = [], set()
     for polygon in polygons:
         corners = []
-        for boundary in (*_all(polygon, "outerBoundaryIs"), *_all(polygon, "innerBoundaryIs")):
+        for boundary in (*_descendants(polygon, "outerBoundaryIs"), *_descendants(polygon, "innerBoundaryIs")):
             ring = _coordinates(boundary, source)
             rings.append([[lat, lon] for lon, lat, _ in ring])
             corners += ring
@@ -243,7 +243,7 @@ def _ceiling(polygon: _Element, ups: list[float], source: str) -> tuple[str, flo
 def _coordinates(element: _Element, source: str) -> list[tuple[float, float, float]]:
     """Return longitude, latitude and height of an element's positions."""
     out = []
-    for coordinates in _all(element, "coordinates"):
+    for coordinates in _descendants(element, "coordinates"):
         for position in (coordinates.text or "").split():
             try:
                 lon, lat, *rest = (float(part) for part in position.split(","))
@@ -257,10 +257,10 @@ def _coordinates(element: _Element, source: str) -> list[tuple[float, float, flo
     return out
 
 
-def _extended(placemark: _Element, source: str) -> dict[str, Any]:
+def _extended_data(placemark: _Element, source: str) -> dict[str, Any]:
     """Return the entries of a placemark's ExtendedData: Data with a value, and SimpleData."""
-    stated = {str(one.get("name")): _kml_text(one, "value") for one in _all(placemark, "Data")}
-    stated |= {str(one.get("name")): (one.text or "").strip() for one in _all(placemark, "SimpleData")}
+    stated = {str(one.get("name")): _kml_text(one, "value") for one in _descendants(placemark, "Data")}
+    stated |= {str(one.get("name")): (one.text or "").strip() for one in _descendants(placemark, "SimpleData")}
     found: dict[str, Any] = {}
     for key, value in stated.items():
         if key in _NUMERIC_KEYS:
@@ -300,7 +300,7 @@ MAX_FILE_CORNERS = 1_500_000
 
 @dataclass(slots=True)
 class FileZones:
-    """Zones of a file, and one line for each kind of change or omission on reading it."""
+    """Zones of a file, and one line for each kind of change or omission made when the file was read."""
 
     zones: list[ZoneTable] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -356,7 +356,7 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
     read, free = FileZones(), Counter[str]()
     mended: dict[str, list[str]] = {_CROSSED: [], _TURNED: [], _NO_BAND: [], _EMPTY: []}
     corners = crossings = 0
-    for where, entries in _found(path, suffix, source):
+    for where, entries in _read_format(path, suffix, source):
         if isinstance(entries, str):
             free[entries] += 1
             continue
@@ -388,7 +388,7 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
     return read
 
 
-def _mend(entries: dict[str, Any], most: int, source: str) -> tuple[list[str], int]:
+def _repair_outline(entries: dict[str, Any], most: int, source: str) -> tuple[list[str], int]:
     """Repair the outline of an authority's zone; return the notes about it and the number of its crossings.
 
     Leave other zones as they are.  most: maximum number of crossings; more raise ScenarioError.
@@ -407,7 +407,7 @@ def _mend(entries: dict[str, Any], most: int, source: str) -> tuple[list[str], i
     return [*words, _CROSSED if entries["rings_deg"] else _EMPTY], crossings
 
 
-def _found(path: Path, suffix: str, source: str) -> Iterator[Found]:
+def _read_format(path: Path, suffix: str, source: str) -> Iterator[Found]:
     """Yield the zones of a file in the format of its suffix."""
     if suffix == GEOPACKAGE:
         _check_size(path, source)

@@ -56,7 +56,7 @@ class Period:
 
 
 def parse_period(text: str) -> Period | None:
-    """Parse the period of a line of text; None for `BY_NOTAM`.  Raises ValueError for an invalid period.
+    """Parse the period in a line of text; return None for `BY_NOTAM`.  Raises ValueError for an invalid period.
 
     >>> parse_period("2026-05-01T00:00Z/.. SAT,SUN 07:00/20:00").days == {5, 6}
     True
@@ -69,7 +69,7 @@ def parse_period(text: str) -> Period | None:
     if len(ends) != 2 or len(rest) > 2:
         raise ValueError(f"{text[:60]!r}: {allowed}")
     try:
-        start, end = (None if one == OPEN else _part(one) for one in ends)
+        start, end = (None if one == OPEN else _parse_part(one) for one in ends)
         days: frozenset[int] = frozenset()
         if rest and ":" not in rest[0]:
             days = frozenset(WEEKDAYS.index(day) for day in rest.pop(0).upper().split(","))
@@ -109,7 +109,7 @@ def parse_time(text: str) -> datetime:
         raise ValueError("out of range") from error
 
 
-def _part(text: str) -> datetime:
+def _parse_part(text: str) -> datetime:
     """Parse a time within a longer text; the error message names this part."""
     try:
         return parse_time(text)
@@ -127,8 +127,8 @@ def parse_span(text: str) -> tuple[datetime, datetime]:
     ['08:00', '09:00']
     """
     start, slash, end = text.partition("/")
-    begin = _part(start) if slash else parse_time(start)
-    finish = _part(end) if slash else begin + DEFAULT_SPAN
+    begin = _parse_part(start) if slash else parse_time(start)
+    finish = _parse_part(end) if slash else begin + DEFAULT_SPAN
     if not begin <= finish <= begin + LONGEST_SPAN:
         raise ValueError(f"allowed an end from the start on, at most {LONGEST_SPAN.days} days later")
     return begin, finish

@@ -92,7 +92,7 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
     """
     if not rings:
         raise ValueError("no corners: at least three are needed")
-    cleaned = [_cleaned(ring) for ring in rings]
+    cleaned = [_clean_ring(ring) for ring in rings]
     check_edges(cleaned)
     shapes = [shapely.Polygon(ring) for ring in cleaned]
     for shape in shapes:
@@ -103,12 +103,12 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
         return Polygon((cleaned[0] if shapes[0].exterior.is_ccw else cleaned[0][::-1],))
     tree = shapely.STRtree(shapes)
     for first, second in tree.query(shapes, predicate="intersects").T:
-        if first < second and _cross(shapes[first], shapes[second]):
+        if first < second and _rings_cross(shapes[first], shapes[second]):
             raise ValueError("its rings cross each other, or share an edge")
     # Minus 1, as a ring is within itself.
     depths = [len(tree.query(shape, predicate="within")) - 1 for shape in shapes]
     _check_area(sum(shape.area * (1 if depth % 2 == 0 else -1) for shape, depth in zip(shapes, depths, strict=True)))
-    return Polygon(tuple(_turned(ring, depth) for ring, depth in zip(cleaned, depths, strict=True)))
+    return Polygon(tuple(_orient_ring(ring, depth) for ring, depth in zip(cleaned, depths, strict=True)))
 
 
 def _check_area(inside: float) -> None:
@@ -116,12 +116,12 @@ def _check_area(inside: float) -> None:
         raise ValueError(f"nothing inside: {inside:.3g} m2; at least {MIN_AREA:g} m2 are needed")
 
 
-def _cross(one: shapely.Polygon, other: shapely.Polygon) -> bool:
+def _rings_cross(one: shapely.Polygon, other: shapely.Polygon) -> bool:
     """Return True if two rings cross or share a stretch of an edge; touching at a corner is allowed."""
     return bool(one.overlaps(other)) or float(one.exterior.intersection(other.exterior).length) > 0.0
 
 
-def _cleaned(ring: Sequence[tuple[float, float]]) -> Ring:
+def _clean_ring(ring: Sequence[tuple[float, float]]) -> Ring:
     if not all(math.isfinite(value) for corner in ring for value in corner):
         raise ValueError("a corner is not a number")
     corners = [(float(east), float(north)) for east, north in ring]
@@ -133,8 +133,8 @@ def _cleaned(ring: Sequence[tuple[float, float]]) -> Ring:
     return tuple(kept)
 
 
-def _turned(ring: Ring, depth: int) -> Ring:
-    """Return the ring anticlockwise, or clockwise if it bounds a hole: if an odd number of other rings contain it."""
+def _orient_ring(ring: Ring, depth: int) -> Ring:
+    """Return the ring anticlockwise, or clockwise if it bounds a hole, which an odd number of other rings contain."""
     anticlockwise = shapely.LinearRing(ring).is_ccw
     return ring if anticlockwise == (depth % 2 == 0) else ring[::-1]
 
@@ -155,7 +155,7 @@ def make_cylinder(east: float, north: float, radius: float) -> Cylinder:
 
 
 def is_hole(ring: Ring) -> bool:
-    """Return True if a ring of a `Polygon` bounds a hole: it runs clockwise.
+    """Return True if a ring of a `Polygon` bounds a hole, and so runs clockwise.
 
     >>> is_hole(((0.0, 0.0), (0.0, 90.0), (90.0, 90.0)))
     True
@@ -187,7 +187,7 @@ MENDED_BY = 1e-6
 def mended_rings(
     rings: Sequence[Sequence[Sequence[float]]], most: int = MAX_CROSSINGS
 ) -> tuple[list[list[list[float]]], int] | None:
-    """Repair rings that cross: return the rings of the enclosed area, and the number of crossings of their edges.
+    """Repair rings that cross; return the rings of the enclosed area and the number of edge crossings.
 
     The rings are empty for an outline of no area.
 

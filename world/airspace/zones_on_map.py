@@ -26,7 +26,7 @@ MAX_MAP_CORNERS = 2_000_000
 
 
 def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
-    """Convert a ring of (latitude, longitude) degrees to corners (east, north) m.
+    """Convert a ring of corners (latitude, longitude), degrees, to corners (east, north), m.
 
     Between two corners a ring is straight in degrees, as in GeoJSON (RFC 7946, 3.1.1) and in the fences of autopilots;
     where that is not straight on the map, corners are inserted.  The longitude takes the shorter direction.
@@ -232,8 +232,8 @@ def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
         return [zone_rings(zone)]
     rings = list(zip(zone_rings(zone), map(is_hole, zone.shape.rings), strict=True))
     # Smallest first: a hole belongs to the smallest outline around it.
-    outlines = sorted((ring for ring, hole in rings if not hole), key=_area)
-    shapes = zone_records([Zone("", "exclusion", Polygon((_open(ring),))) for ring in outlines])
+    outlines = sorted((ring for ring, hole in rings if not hole), key=_ring_area)
+    shapes = zone_records([Zone("", "exclusion", Polygon((_without_last(ring),))) for ring in outlines])
     parts: list[list[Floats]] = [[ring] for ring in outlines]
     for ring, hole in rings:
         if hole:
@@ -242,11 +242,11 @@ def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
     return [tuple(part) for part in parts]
 
 
-def _open(ring: Floats) -> Ring:
+def _without_last(ring: Floats) -> Ring:
     return tuple((east, north) for east, north in ring[:-1].tolist())
 
 
-def _area(ring: Floats) -> float:
+def _ring_area(ring: Floats) -> float:
     return abs(float((ring[:-1, 0] * ring[1:, 1] - ring[1:, 0] * ring[:-1, 1]).sum()))
 
 

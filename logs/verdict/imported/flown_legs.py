@@ -26,10 +26,11 @@ from world.arrays import Floats
 class FlownLegs:
     """Legs of one stretch.
 
-    stretch: its times, and how it ended.
-    first, last: waypoints between which it was flown.
-    partial: True if the last of them was not reached.
-    requirements, aligned: for the route between them alone, and the rows flown on it.
+    stretch: times of the stretch, and how it ended.
+    first, last: waypoints between which the stretch was flown.
+    partial: True if the last waypoint was not reached.
+    requirements: requirements of the route between these waypoints alone.
+    aligned: rows flown on that route.
     """
 
     stretch: MissionStretch
@@ -41,11 +42,11 @@ class FlownLegs:
 
 
 def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> FlownLegs | None:
-    """Find the legs of a stretch, or return None without any.
+    """Find the legs that a stretch flew, or return None if it flew none.
 
-    A stretch has no legs if it reached at most one waypoint, or has fewer than two rows.  A flight begins with the
-    first waypoint that it passed: the path to that waypoint is no leg.  It ends with the last waypoint that it
-    passed, or on the leg from there, which was then flown in part.
+    A stretch has no legs if it reached at most one waypoint, or has fewer than two rows.  A flight begins at the first
+    waypoint that it passed, because the path to that waypoint is not a leg.  It ends at the last waypoint that it
+    passed, or on the next leg, which was then flown in part.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -87,7 +88,7 @@ def gaps_between(legs: FlownLegs, start: float, end: float) -> list[Gap]:
 
 
 def stretch_end_text(stretch: MissionStretch) -> str:
-    """Return how a stretch ended, in words."""
+    """Describe how a stretch ended."""
     if stretch.ended == "mode":
         return f"{stretch.mode} was left for {stretch.next_mode} at {stretch.end:.1f} s"
     if stretch.ended == "landed":
@@ -98,9 +99,9 @@ def stretch_end_text(stretch: MissionStretch) -> str:
 def _earliest_lap(
     setup: FlightSetup, rows: Track, aligned: AlignedTrack, met: NDArray[np.intp]
 ) -> tuple[AlignedTrack, NDArray[np.intp]]:
-    """Align rows with the first laps of a route that repeats its items, if those laps explain the flight.
+    """Align rows with the first laps of a route that repeats its items, if these laps explain the flight.
 
-    A flight that ended within a lap was as near to the waypoints of any later lap.
+    A flight that ended within a lap was equally near to the waypoints of any later lap.
     """
     items, last = setup.route.items, int(met[-1])
     if len(met) == last - met[0] + 1:
@@ -118,7 +119,7 @@ def _earliest_lap(
 
 
 def between(track: Track, start: float, end: float) -> Track:
-    """Return the rows of a track from one time to another, s."""
+    """Return the rows of a track between two times, s."""
     low, high = np.searchsorted(track.time, [start, end + 1e-6])
     return track.rows(int(low), int(high))
 
@@ -143,7 +144,7 @@ _MAX_NAMED = 6
 
 @dataclass(frozen=True, slots=True)
 class PlanMismatch:
-    """Reason why a flight did not follow a plan.
+    """The reason why a flight did not follow a plan.
 
     kind: "place" if it came near none of the plan's waypoints, "order" if it passed them in another order.
     distance: m, to the nearest waypoint, for "place".
@@ -156,7 +157,7 @@ class PlanMismatch:
 
     @property
     def text(self) -> str:
-        """Reason in words."""
+        """Text of the reason."""
         if self.kind == "place":
             far = f"{self.distance / 1000.0:.1f} km" if self.distance >= 1000.0 else f"{self.distance:.0f} m"
             return f"another place: the flight comes no nearer than {far} to any of its waypoints"
@@ -164,7 +165,7 @@ class PlanMismatch:
 
 
 def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
-    """Return why the mission stretches of a flight followed another mission than the setup's, or None.
+    """Return the reason if the mission stretches of a flight followed another mission than the setup's, or None.
 
     >>> from dataclasses import replace
     >>> from flight.simulation.setup import ImportedLog, MissionStretch
@@ -183,7 +184,7 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     points = setup.route.waypoints
     if not flown:
         return None
-    nearest, when = _closest(points, flown)
+    nearest, when = _closest_distances(points, flown)
     if nearest.min() > PLAN_MISMATCH_DISTANCE_M:
         return PlanMismatch("place", distance=float(nearest.min()))
     near = min(MAX_NEAR_WAYPOINT_M, max(MIN_NEAR_WAYPOINT_M, setup.corridor))
@@ -206,8 +207,8 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     return PlanMismatch("order", order=tuple(int(setup.route.items[k]) for k in order[:_MAX_NAMED]))
 
 
-def _closest(points: Floats, flown: list[Track]) -> tuple[Floats, Floats]:
-    """Return the least horizontal distance of each waypoint (w,) from the flight, m, and its time, s."""
+def _closest_distances(points: Floats, flown: list[Track]) -> tuple[Floats, Floats]:
+    """Return each waypoint's minimum horizontal distance from the flight, m, (w,), and its time, s, (w,)."""
     nearest, when = np.full(len(points), np.inf), np.zeros(len(points))
     for rows in flown:
         for k, point in enumerate(points):

@@ -1,7 +1,8 @@
-"""Judge an imported flight: its stretches that followed the mission, as far as its log permits.
+"""Judge the stretches of an imported flight that followed the mission, as far as its log permits.
 
-The rules are the same as for planfly's own flights.  A log may lack what a rule needs, have pauses, and end before the
-flight does.  What it cannot show is not judged, with the reason; a violation that it shows is a violation all the same.
+The rules are the same as for planfly's own flights.  A log may lack data that a rule needs, have pauses, and end before
+the flight.  Parts that the log does not show are not judged, and the reason is given; a violation that the log shows
+counts in any case.
 """
 
 from collections.abc import Sequence
@@ -112,7 +113,7 @@ def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
 
 
 def heights_text(source: ImportedLog) -> str:
-    """Return which height was used, its datum, and how far off the others were at the start.
+    """Describe which height was used, its datum, and the offsets of the other heights at the start.
 
     >>> from flight.simulation.setup import HeightOffset, Heights
     >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
@@ -124,7 +125,7 @@ def heights_text(source: ImportedLog) -> str:
 
 
 def rows_text(faults: RowFaults, gaps: int) -> str:
-    """Return the faults of a log's rows, in words.
+    """Describe the faults of a log's rows.
 
     >>> rows_text(RowFaults(doubled=2, clock_jumps=(12.5,)), 1)
     '1 gap, 2 doubled, 1 jump of the clock (at 12.5 s)'
@@ -151,7 +152,7 @@ _MAX_RUNS = 6
 
 
 def missing_text(missing: MissingItems) -> str:
-    """Return which part of a mission is not judged, and which of its items the log lacks, in words.
+    """Describe which part of a mission is not judged, and which of its items the log lacks.
 
     >>> missing_text(MissingItems(tuple(range(7, 14)), total=14, first=1, last=6, end=13))
     'not judged beyond item 6: items 7 to 13 of 14 are not in the log or left out'
@@ -180,7 +181,7 @@ def missing_text(missing: MissingItems) -> str:
 
 
 def damage_text(damage: Damage) -> str:
-    """Return which parts of a file could not be read, in words.
+    """Describe which parts of a file could not be read.
 
     >>> damage_text(Damage(places=2, size=40, cut=True))
     '2 places in the file (40 bytes) cannot be read; it ends within a message'
@@ -223,9 +224,10 @@ _UNNAMED_TEXT = "the aircraft is not named (--aircraft)"
 
 
 def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: bool) -> Verdict:
-    """Judge the stretches of a flight that followed its mission: level "flown".
+    """Judge the stretches of a flight that followed its mission, at the level "flown".
 
-    setup: with the source of the flight.  log_complete: True if planfly's own log of it has its end.
+    setup: flight setup with the source of the flight.
+    log_complete: True if planfly's own log of the flight has its end.
     """
     source = setup.source
     if source is None:
@@ -262,7 +264,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
 
 
 def _missing_part_text(findings: Sequence[Finding], missing: MissingItems | None) -> str:
-    """Return which part of the mission, items or flight, is not in the log, in words; "" for none."""
+    """Describe which items or which part of the flight the log lacks; return "" if it lacks none."""
     if missing is not None:
         return missing_text(missing)
     parts = [item.reason for item in findings if item.rule == "completion" and item.ok is None]
@@ -270,7 +272,7 @@ def _missing_part_text(findings: Sequence[Finding], missing: MissingItems | None
 
 
 def _unseen_text(flown: Sequence[FlownLegs]) -> str:
-    """Return when the log pauses for too long to know where the aircraft was, in words; "" for never."""
+    """Describe pauses of the log that are too long to know where the aircraft was; return "" if there are none."""
     long = []
     for legs in flown:
         time = legs.aligned.track.time
@@ -289,7 +291,7 @@ def _judged_times(legs: FlownLegs) -> tuple[float, float]:
 
 
 def _uncertainty_text(findings: Sequence[Finding]) -> str:
-    """Return what is undecided because of uncertainty about the aircraft, in words; "" for nothing."""
+    """Describe which findings an uncertain aircraft leaves undecided; return "" if there are none."""
     text = undecided_text(findings)
     return f"not judged in full: {text}" if text else ""
 
@@ -298,15 +300,15 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     """Return the findings of one stretch, at the places of the whole route."""
     out = []
     for item in track_findings(legs.requirements, legs.aligned):
-        judged = _checked_for_gaps(_without_missing_data(setup, legs, item), legs)
+        judged = _check_gaps(_check_data(setup, legs, item), legs)
         if legs.partial:
-            judged = _partly_flown(judged, legs)
+            judged = _check_unreached(judged, legs)
         out.append(_at_route_place(judged, legs.first, setup))
     return [*out, *_findings_without_data(setup, {item.rule for item in out})]
 
 
 def _findings_without_data(setup: FlightSetup, found: set[str]) -> list[Finding]:
-    """Return findings for listed rules that found nothing because the log lacks what they need."""
+    """Return findings for rules with `LogNeeds.listed` that found nothing because the log lacks their data."""
     out = []
     for rule in RULES.values():
         lacking = [one for one in rule.log.quantities if setup.source is not None and one not in setup.source.holds]
@@ -317,8 +319,8 @@ def _findings_without_data(setup: FlightSetup, found: set[str]) -> list[Finding]
     return out
 
 
-def _without_missing_data(setup: FlightSetup, legs: FlownLegs, item: Finding) -> Finding:
-    """Return a finding, or mark it as not judged if the log lacks what it needs."""
+def _check_data(setup: FlightSetup, legs: FlownLegs, item: Finding) -> Finding:
+    """Return a finding, marked as not judged if the log lacks the data that its rule needs."""
     source = setup.source
     if source is None:
         return item
@@ -335,14 +337,14 @@ def _without_missing_data(setup: FlightSetup, legs: FlownLegs, item: Finding) ->
         if reason:
             break
     if reason:
-        return _unjudged(item, reason)
+        return _mark_unjudged(item, reason)
     if not source.aircraft_known and needs.aircraft and item.limit_source != "scenario":
-        return _unjudged(item, _UNNAMED_TEXT, measured=bool(item.ok))
+        return _mark_unjudged(item, _UNNAMED_TEXT, measured=bool(item.ok))
     return item
 
 
 def _missing_values_text(legs: FlownLegs, quantity: Quantity) -> str:
-    """Return when a stretch lacks values of a quantity that the log has elsewhere, in words; "" for never."""
+    """Describe when a stretch lacks values of a quantity that the log has elsewhere; return "" if it lacks none."""
     values = getattr(legs.aligned.track, _COLUMNS[quantity])
     bad = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
     if not bad.any():
@@ -351,14 +353,14 @@ def _missing_values_text(legs: FlownLegs, quantity: Quantity) -> str:
     return f"the log holds no {_LABELS[quantity]} at {int(bad.sum())} rows from {time[0]:.1f} s to {time[-1]:.1f} s"
 
 
-def _unjudged(item: Finding, why: str, *, measured: bool = False) -> Finding:
-    """Return a finding marked as not judged, with the reason; measured: keep what was measured."""
+def _mark_unjudged(item: Finding, why: str, *, measured: bool = False) -> Finding:
+    """Return a finding marked as not judged, with the reason; keep its measurements if `measured`."""
     reason = f"{why}; {item.reason}" if measured else why
     facts = item.facts if measured else ()
     return replace(item, ok=None, reason=reason, brief=why, placed=False, margin=None, facts=facts, suggestions=())
 
 
-def _checked_for_gaps(item: Finding, legs: FlownLegs) -> Finding:
+def _check_gaps(item: Finding, legs: FlownLegs) -> Finding:
     """Mark a passed finding as not judged if the log has a pause in its leg."""
     if item.ok is not True or item.place.index is None or item.place.kind not in ("leg", "waypoint"):
         return item
@@ -369,19 +371,21 @@ def _checked_for_gaps(item: Finding, legs: FlownLegs) -> Finding:
     for gap in gaps_between(legs, start, end):
         if item.place.kind == "leg" or RULES[item.rule].log.no_gap:
             why = f"the log has no rows from {gap.start:.1f} s to {gap.end:.1f} s"
-            return _unjudged(item, why, measured=True)
+            return _mark_unjudged(item, why, measured=True)
     return item
 
 
-def _partly_flown(item: Finding, legs: FlownLegs) -> Finding:
+def _check_unreached(item: Finding, legs: FlownLegs) -> Finding:
     """Mark the unreached last waypoint as not judged, and findings on the leg before it as partial."""
     leg, waypoint = legs.requirements.legs - 1, legs.requirements.legs
     unreached = item.place.kind == "waypoint" and item.place.index == waypoint
     of_leg = item.place.kind == "leg" and item.place.index == leg
     if unreached:
-        return _unjudged(item, stretch_end_text(legs.stretch))
+        return _mark_unjudged(item, stretch_end_text(legs.stretch))
     if of_leg and RULES[item.rule].log.full_leg:
-        return _unjudged(item, f"flown in part: {stretch_end_text(legs.stretch)}") if item.ok is not False else item
+        return (
+            _mark_unjudged(item, f"flown in part: {stretch_end_text(legs.stretch)}") if item.ok is not False else item
+        )
     return item
 
 

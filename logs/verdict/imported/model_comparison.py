@@ -15,16 +15,19 @@ from logs.verdict.measures.turns import CornerPass, corner_passes, measure_turn
 from world.arrays import Floats
 from world.errors import LogError
 
-# Spacing along a leg of the places at which the flights are compared, m.
+# Spacing of the places along a leg at which the flights are compared, m.
 STEP = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """Flight along its route, at n places; NaN where it was not flown.
+    """Measurements of a flight at n places along its route; NaN where the route was not flown.
 
-    cross_track, height_error: m, right of and above the legs.  ground_speed: m/s.  bank: rad.
-    energy: Wh used since the first place.
+    cross_track: distance to the right of the legs, m.
+    height_error: height above the legs, m.
+    ground_speed: m/s.
+    bank: rad.
+    energy: energy used since the first place, Wh.
     """
 
     cross_track: Floats
@@ -130,10 +133,11 @@ def compare_with_model(
     distance = np.concatenate([begin + along for begin, along in zip(begins, places, strict=True)])
     counts = np.concatenate([[0], np.cumsum([len(along) for along in places])])
     legs = tuple(
-        _leg(flown.first + k, slice(int(counts[k]), int(counts[k + 1])), profiles) for k in range(requirements.legs)
+        _leg_pair(flown.first + k, slice(int(counts[k]), int(counts[k + 1])), profiles)
+        for k in range(requirements.legs)
     )
     corners = [corner_passes(one, track) for one, track in pairs]
-    turns = tuple(_turn(flown.first, k, pairs, corners) for k in range(1, requirements.legs))
+    turns = tuple(_turn_pair(flown.first, k, pairs, corners) for k in range(1, requirements.legs))
     flown_profile, model_profile = profiles
     return Reflight(
         stretch=flown.stretch,
@@ -182,9 +186,9 @@ def _profile(requirements: RouteRequirements, aligned: AlignedTrack, places: Seq
     return Profile(*table)
 
 
-def _leg(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
+def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
     def pair(name: str, reduce: str) -> tuple[float, float]:
-        one, other = (_reduced(getattr(profile, name)[rows], reduce) for profile in profiles)
+        one, other = (_reduce_values(getattr(profile, name)[rows], reduce) for profile in profiles)
         return one, other
 
     flown_bank, model_bank = pair("bank", "size")
@@ -198,7 +202,7 @@ def _leg(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
     )
 
 
-def _reduced(values: Floats, reduce: str) -> float:
+def _reduce_values(values: Floats, reduce: str) -> float:
     known = values[np.isfinite(values)]
     if not known.size:
         return math.nan
@@ -212,7 +216,7 @@ def _reduced(values: Floats, reduce: str) -> float:
     return float(known[np.argmax(np.abs(known))])
 
 
-def _turn(
+def _turn_pair(
     first: int,
     k: int,
     pairs: Sequence[tuple[RouteRequirements, AlignedTrack]],

@@ -32,7 +32,7 @@ from world.arrays import Floats
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """Condition for having reached a waypoint.
+    """Condition under which a waypoint counts as reached.
 
     radius: m.
     source: "mission" for a stated acceptance radius, "autopilot" for the autopilot's acceptance radius, "fly-over", or
@@ -46,7 +46,7 @@ class Reach:
 
 
 def reach(requirements: RouteRequirements, i: int) -> Reach:
-    """Return the condition for having reached waypoint i.
+    """Return the condition under which waypoint i counts as reached.
 
     The mission's own radius applies, otherwise the autopilot's radius.  ArduPlane turns to the next leg at WP_RADIUS
     for a right angle or a sharper corner and at a fraction of it for a gentler corner.  At the mission's end, and where
@@ -65,12 +65,12 @@ def reach(requirements: RouteRequirements, i: int) -> Reach:
 
 
 def position_error(setup: FlightSetup) -> float:
-    """Return the distance (m) by which the navigation may be off: three sigmas of one axis."""
+    """Return the largest assumed navigation error, m, which is three sigmas of one axis."""
     return NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
 
 
 def corner_depths(requirements: RouteRequirements) -> Floats:
-    """Return the distance from the legs to which the turn at each waypoint leads by itself, (w,) m.
+    """Return how far the turn at each waypoint deviates from the legs by itself, m, (w,).
 
     A fly-by arc passes R (1 - cos(turn / 2)) inside the legs.  A fly-over waypoint is passed on the course of the leg
     before it, and the arc from there swings R (1 - cos(turn)) beyond the next leg.
@@ -81,7 +81,7 @@ def corner_depths(requirements: RouteRequirements) -> Floats:
 
 
 def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
-    """Return the half width of the corridor along a leg, m, and the source of that width.
+    """Return the half width of the corridor along a leg, m, and the name of its source.
 
     A corridor that the scenario does not state is wide enough for the planned turns at the leg's ends.  At a loiter
     that the autopilot joins and leaves by its center, the corridor includes the whole loiter and a turn back next to
@@ -114,7 +114,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
 
 
 def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
-    """Return the greatest horizontal distance of points from their nearest leg, m, and that point's row.
+    """Return the maximum horizontal distance of any point from its nearest leg, m, and that point's row.
 
     points: (n, 3).  legs: (k + 1, 3), the ends of k legs in a row.
 
@@ -140,7 +140,7 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 
 
 def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
-    """Return how near (m) a flyable path without the corner passes the waypoint, or None without one.
+    """Return how closely a flyable path without the corner passes the waypoint, m, or None if there is no such path.
 
     The path leaves out the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours, passes each of them within
     """

@@ -1,9 +1,8 @@
 """Find hazards within reach of a loiter that is flown wider than drawn.
 
-An autopilot that steers to the loiter's center and then orbits it as wide as it can may be anywhere within
-`LOITER_SWING_RADII`
-radii of the bank limit from the center if the loiter is too tight for its bank; the direction of arrival decides where.
-A circle drawn around the center says nothing about the hazards next to it.
+If a loiter is too tight for the bank limit, an autopilot that steers to its center and then orbits as tightly as it can
+may be anywhere within `LOITER_SWING_RADII` radii of the bank limit from the center, depending on the direction of
+arrival.  The drawn circle therefore does not tell which hazards are within reach.
 """
 
 import math
@@ -22,33 +21,35 @@ from world.arrays import Floats
 from world.kernels import Records
 from world.threats import threat_label
 
-# Least number of rings along which a disc is checked; between the limits there is one per step of the terrain raster.
+# Minimum number of rings along which a disc is checked; between the limits there is one per step of the terrain raster.
 _MIN_RINGS = 24
-# Greatest number of rings along which a disc is checked.
+# Maximum number of rings along which a disc is checked.
 _MAX_RINGS = 120
 # Altitude step in which a climbing spiral is checked, m.
 _STEP_M = 20.0
-# Greatest number of altitudes at which a climbing spiral is checked.
+# Maximum number of altitudes at which a climbing spiral is checked.
 _MAX_LEVELS = 12
 
 
 def hazards_within(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
-    """Return the hazards that a flight within a distance of a place could come too close to, in words.
+    """Describe the hazards to which a flight within a distance of a place could come too close.
 
-    middle: (2,) east and north, m.  low, high: its least and greatest altitude, m AMSL.  reach: m.
+    middle: east and north of the place, m, (2,).
+    low, high: minimum and maximum altitude of the flight, m AMSL.
+    reach: distance from the place, m.
     """
     return [
-        *_ground(requirements, middle, low, high, reach),
-        *_missiles(requirements, middle, low, high, reach),
-        *_zones(requirements, middle, low, high, reach),
-        *_edges(requirements, middle, reach),
+        *_ground_hazards(requirements, middle, low, high, reach),
+        *_missile_hazards(requirements, middle, low, high, reach),
+        *_zone_hazards(requirements, middle, low, high, reach),
+        *_area_hazards(requirements, middle, reach),
     ]
 
 
 def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str]] | None:
-    """Return the reach (m) of the loiter at a mission's end and the hazards within it, in words.
+    """Return the reach of the loiter at a mission's end, m, and descriptions of the hazards within reach.
 
-    None if the autopilot does not loiter there, or if the mission continues.
+    Return None if the autopilot does not loiter there, or if the mission continues.
     """
     setup, rules = requirements.setup, requirements.setup.autopilot.loiter_rules
     if not rules.ends_in_circle or not ends_at_plain_waypoint(setup.route, setup.mission):
@@ -61,11 +62,13 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
     return reach, hazards_within(requirements, requirements.points[-1, :2], up, up, reach)
 
 
-def _ground(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
+def _ground_hazards(
+    requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float
+) -> list[str]:
     ground, limits = requirements.setup.scenario.terrain, requirements.setup.scenario.limits
     if ground is None:
         return []
-    rings = _rings(middle, reach, ground.spacing)
+    rings = _ring_points(middle, reach, ground.spacing)
     above, _ = path_clearance(ground.heights, ground.to_pixel.record, _points_at(rings, low))
     found = []
     # Points outside the known terrain are NaN.
@@ -83,7 +86,9 @@ def _ground(requirements: RouteRequirements, middle: Floats, low: float, high: f
     return found
 
 
-def _missiles(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
+def _missile_hazards(
+    requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float
+) -> list[str]:
     scenario = requirements.setup.scenario
     if scenario.external:
         return []
@@ -96,12 +101,12 @@ def _missiles(requirements: RouteRequirements, middle: Floats, low: float, high:
     return found
 
 
-def _zones(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
+def _zone_hazards(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
     airspace = requirements.airspace
     if not airspace.zones:
         return []
     terrain = requirements.setup.scenario.terrain
-    rings, found = _rings(middle, reach, 0.0), set[int]()
+    rings, found = _ring_points(middle, reach, 0.0), set[int]()
     levels = 1 if high - low < ROUNDING_M else min(_MAX_LEVELS, 2 + int((high - low) / _STEP_M))
     for up in np.linspace(low, high, levels):
         visits = path_zones(_moves(_points_at(rings, float(up))), airspace.records, terrain)
@@ -109,7 +114,7 @@ def _zones(requirements: RouteRequirements, middle: Floats, low: float, high: fl
     return [f"{airspace.zones[z].kind} zone {airspace.zones[z].name or z} is not kept" for z in sorted(found)]
 
 
-def _edges(requirements: RouteRequirements, middle: Floats, reach: float) -> list[str]:
+def _area_hazards(requirements: RouteRequirements, middle: Floats, reach: float) -> list[str]:
     scenario = requirements.setup.scenario
     if scenario.external:
         return []
@@ -117,8 +122,8 @@ def _edges(requirements: RouteRequirements, middle: Floats, reach: float) -> lis
     return ["the area ends"] if inside < reach - ROUNDING_M else []
 
 
-def _rings(middle: Floats, reach: float, spacing: float) -> Floats:
-    """Return points (n, 2) m on rings about a center out to the reach, about a raster step apart."""
+def _ring_points(middle: Floats, reach: float, spacing: float) -> Floats:
+    """Return points on rings around a center out to the reach, about a raster step apart, m, (n, 2)."""
     count = min(_MAX_RINGS, max(_MIN_RINGS, math.ceil(reach / spacing) if spacing > 0.0 else _MIN_RINGS))
     # A polygon circumscribed about its circle leaves no gap between the last ring and the reach.
     last = Cylinder(float(middle[0]), float(middle[1]), reach / math.cos(math.pi / CIRCLE_CORNERS))

@@ -1,4 +1,4 @@
-"""The energy that a route takes by prediction: steady flight on each leg, from the aircraft's envelope."""
+"""Predict the energy that a route takes in steady flight on each leg, from the aircraft's envelope."""
 
 import math
 
@@ -40,7 +40,7 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
 
 
 def air_angle(requirements: RouteRequirements, leg: int, speed: float, up: float) -> float:
-    """Return the path angle to the air of a leg's slope over the ground in the mean wind at a height (m), rad."""
+    """Return the path angle relative to the air on a leg, in the mean wind at an altitude (m AMSL), rad."""
     tail, cross = requirements.setup.scenario.wind.along(float(requirements.courses[leg]), up)
     rise, angle = math.tan(float(requirements.slopes[leg])), 0.0
     for _ in range(4):

@@ -1,4 +1,4 @@
-"""Phases of a flight that includes the ground: take-off, airborne part, landing.
+"""Split a flight that includes ground phases into take-off, airborne part and landing.
 
 The usual rules judge the airborne part.  Its route begins where the take-off ended, like the autopilot's own first leg,
 and ends at the last waypoint before the landing point.  Phases are found from positions and altitudes alone.
@@ -43,7 +43,7 @@ def flown_phases(whole: RouteRequirements, track: Track) -> tuple[RouteRequireme
 
 
 def _takeoff_end_row(track: Track, ways: GroundWays) -> int:
-    """Return the row where the take-off ended: 0 without a take-off, the last row if it did not end."""
+    """Return the row where the take-off ended; 0 without a take-off, the last row if the take-off did not end."""
     if ways.take_off is None:
         return 0
     above = track.position[:, 2] > ways.take_off.top
@@ -51,7 +51,7 @@ def _takeoff_end_row(track: Track, ways: GroundWays) -> int:
 
 
 def by_the_ground(track: Track, ways: GroundWays) -> Flags:
-    """Return the mask (t,) of rows that belong to a flown take-off or to the leg of a flown landing.
+    """Return a mask of the rows that belong to a flown take-off or to the leg of a flown landing, (t,).
 
     >>> from logs.recording.example_log import example_log
     >>> bool(by_the_ground(example_log().track, GroundWays()).any())
@@ -64,10 +64,7 @@ def by_the_ground(track: Track, ways: GroundWays) -> Flags:
 
 
 def leg_ends(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[float, ...]:
-    """Return the end time of each leg of the whole route but the last, s.
-
-    Includes the start of the landing.
-    """
+    """Return the end time of each leg of the whole route except the last, s, including the start of the landing."""
     ground, ends = requirements.ground, aligned.leg_ends()
     if ground is None or ground.ways.approach is None:
         return ends

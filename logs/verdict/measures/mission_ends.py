@@ -1,4 +1,4 @@
-"""The takeoff and the landing that PX4 requires of a mission."""
+"""Check a mission for the takeoff and the landing that PX4 requires."""
 
 from flight.autopilots.autopilot import MissionChecks
 from flight.mission.items import LANDINGS, TAKEOFFS, Mission
@@ -8,7 +8,7 @@ _REQUIRED = {1: "a takeoff", 2: "a landing", 3: "a takeoff and a landing", 4: "b
 
 
 def missing_ends_text(mission: Mission, limits: MissionChecks) -> str:
-    """Return what PX4 says about a missing takeoff or landing, as a sentence, or "" if nothing is missing.
+    """Describe PX4's objection to a missing takeoff or landing; return "" if nothing is missing.
 
     >>> missing_ends_text(Mission(None, ()), MissionChecks(requires=2))
     "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"

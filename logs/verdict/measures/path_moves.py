@@ -1,6 +1,6 @@
-"""Represent a path as moves: straight pieces and arcs whose altitude is a parabola over the run.
+"""Represent a path as moves, which are straight pieces and arcs whose altitude is a parabola over the run.
 
-The moves of a planned path are its pieces themselves, not chords of them; the moves of a flown track are the straight
+The moves of a planned path are its exact pieces, not their chords; the moves of a flown track are the straight
 lines from row to row.  Code that judges moves judges both.
 """
 
@@ -63,9 +63,9 @@ def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | N
 
 
 def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -> Records:
-    """Return the moves of a fly-by path's pieces on some legs; times start at 0 at the first of them.
+    """Return the moves of a fly-by path's pieces on some legs; times start at 0 at the first move.
 
-    speeds: (legs,) m/s, at which the path is flown.
+    speeds: speed at which each leg is flown, m/s, (legs,).
     """
     nodes = path.nodes
     breaks = np.concatenate([nodes["distance"] - nodes["half_length"], nodes["distance"] + nodes["half_length"]])
@@ -142,10 +142,10 @@ def straight_moves(points: Floats, time: Floats) -> Records:
 
 
 # ----------------------------------------------------------------------
-# Blocks of consecutive moves, compiled: if a block stays clear of something, its moves need not be checked.
+# Blocks of consecutive moves, compiled: if a block stays clear of a zone, its moves need not be checked.
 
 
-# Bounding box of a block on the map, its least and greatest altitude, and the steepest ground below it, m per m.
+# Bounding box of a block on the map, its minimum and maximum altitude, and the steepest ground below it, m per m.
 BLOCK = record_dtype("west", "east", "south", "north", "low", "high", "steepest")
 # Number of moves in a block.
 BLOCK_MOVES = 64
@@ -153,7 +153,7 @@ BLOCK_MOVES = 64
 
 @inner
 def move_blocks(moves: Records, heights: Heights, to_pixel: PolyMapRecord, pitch: float, above_ground: bool) -> Records:
-    """Return blocks, (b,) of `BLOCK`; the ground is read only if a zone limit is given above ground."""
+    """Group moves into blocks of dtype `BLOCK`, (b,); read the ground only if a zone limit is given above ground."""
     blocks = np.zeros((moves.shape[0] + BLOCK_MOVES - 1) // BLOCK_MOVES, BLOCK)
     for b in range(blocks.shape[0]):
         block = blocks[b]
@@ -175,10 +175,7 @@ def move_blocks(moves: Records, heights: Heights, to_pixel: PolyMapRecord, pitch
 
 @inner
 def _steepest(block: Record, heights: Heights, to_pixel: PolyMapRecord, pitch: float) -> float:
-    """Return the steepest slope that the bilinear ground can have under a block, m per m.
-
-    NaN adds nothing.
-    """
+    """Return the steepest slope that the bilinear ground can have under a block, m per m, ignoring NaN."""
     rows, cols = heights.shape
     west, south = polymap(to_pixel, block.west, block.south)
     east, north = polymap(to_pixel, block.east, block.north)

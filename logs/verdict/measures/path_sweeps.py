@@ -24,9 +24,9 @@ _JOINED_SEGMENTS = 16
 
 
 def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return the smallest height above ground on each segment and its fraction there, (n - 1,) each.
+    """Return the minimum height above ground on each segment, m, and its fraction of the segment, (n - 1,) each.
 
-    NaN if a segment leaves the raster or its data.
+    Both are NaN if a segment leaves the raster or its data.
     """
     low, at = _path_clearance(read_only(heights), to_pixel, read_only(np.ascontiguousarray(points)))
     return low, at
@@ -45,8 +45,8 @@ class SphereVisits(NamedTuple):
     """Visits of a path to m spheres, (m,) each.
 
     inside: s.
-    exposure: s, the integral over that time of (scale/d)^4.
-    closest: m, least distance to the center; inf for a sphere of radius 0.
+    exposure: integral of (scale/d)^4 over the time inside, s.
+    closest: minimum distance to the center, m; inf for a sphere of radius 0.
     closest_time: s.
     entry_time: s, of the first entry; NaN if the path never enters.
     """
@@ -59,7 +59,7 @@ class SphereVisits(NamedTuple):
 
 
 class _Boxes(NamedTuple):
-    """Least and greatest corner of each block of segments, (blocks, 3) m, and its diagonal, (blocks,) m."""
+    """Minimum and maximum corner of each block of segments, m, (blocks, 3), and its diagonal, m, (blocks,)."""
 
     low: Floats
     high: Floats
@@ -67,7 +67,7 @@ class _Boxes(NamedTuple):
 
 
 def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
-    """Return the visits of a path to m spheres.  A radius of 0 means no sphere.
+    """Return the visits of a path to m spheres; a radius of 0 means that there is no sphere.
 
     points: (n, 3) m.  time: (n,) s.  centres: (m, 3) m.  radii, scales: (m,) m.
 
@@ -127,7 +127,7 @@ def _boxes(points: Floats) -> _Boxes:
 
 @inner
 def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, float]:
-    """Return the least and the greatest distance of a block's box from a point."""
+    """Return the minimum and the maximum distance of a block's bounding box from a point."""
     low2 = 0.0
     high2 = 0.0
     for axis in range(3):
@@ -141,7 +141,7 @@ def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, fl
 
 @inner
 def _closest(points: Floats, time: Floats, block: int, centre: Floats, m: int, out: SphereVisits) -> None:
-    """Update the closest distance to sphere m and its time with one block."""
+    """Update the minimum distance to sphere m and its time in `out` with one block."""
     for k in range(block * _BLOCK_SEGMENTS, min(points.shape[0] - 1, (block + 1) * _BLOCK_SEGMENTS)):
         length2 = 0.0
         along = 0.0
@@ -168,7 +168,7 @@ def _inside(
     m: int,
     out: SphereVisits,
 ) -> None:
-    """Add one block's time and exposure inside sphere m."""
+    """Add one block's time and exposure inside sphere m to `out`."""
     last = min(points.shape[0] - 1, (block + 1) * _BLOCK_SEGMENTS)
     k = block * _BLOCK_SEGMENTS
     while k < last:
@@ -194,7 +194,7 @@ def _inside(
 class Passage:
     """One stay inside a sphere.
 
-    start, end: s.  closest: m from its center.  whole: True if it was left again before the track's end.
+    start, end: s.  closest: minimum distance from the center, m.  whole: True if the track left the sphere again.
     """
 
     start: float
@@ -205,7 +205,7 @@ class Passage:
 
 
 def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floats]:
-    """Return the smallest height above ground on each segment of a track, m, and its fraction there.
+    """Return the minimum height above ground on each segment of a track, m, and its fraction of the segment.
 
     position: (t, 3).  Returns (t - 1,) twice; NaN if the segment leaves the terrain's data or is not a number.
     """
@@ -217,7 +217,7 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
 
     time: (t,) s.  position: (t, 3).  centre: (3,).  A point on the surface is inside.
     """
-    if not radius > 0.0 or _is_outside(position, centre, radius):
+    if not radius > 0.0 or _boxes_are_disjoint(position, centre, radius):
         return []
     track, middle = read_only(np.ascontiguousarray(position)), read_only(np.ascontiguousarray(centre))
     closest, enter, leave = _windows(track, middle, float(radius))
@@ -236,8 +236,8 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
     return found
 
 
-def _is_outside(position: Floats, centre: Floats, radius: float) -> bool:
-    """Return True if the box around the track stays outside the sphere's box."""
+def _boxes_are_disjoint(position: Floats, centre: Floats, radius: float) -> bool:
+    """Return True if the track's bounding box does not overlap the sphere's."""
     good = position[np.isfinite(position).all(axis=1)]
     if not len(good):
         return True

@@ -1,4 +1,4 @@
-"""Measure how much of a photo line was flown as photos need it, and how much its photos overlap."""
+"""Measure how much of a photo line was flown usably for photos, and how much its photos overlap."""
 
 import math
 from collections.abc import Sequence
@@ -26,10 +26,10 @@ from world.arrays import Flags, Floats
 
 @dataclass(frozen=True, slots=True)
 class LineMeasure:
-    """One photo line as flown; all shares are shares of its length, and add up to 1.
+    """One photo line as flown; all shares are fractions of its length, and add up to 1.
 
     length: m.
-    good: share that can be used.  The rest is divided by the first requirement that it fails:
+    good: usable share.  The other shares are divided by the first requirement that they fail:
     away: not flown along, or too far to the side of the line.  banked, high, dark: along the line, but banked too much;
         then too far off its height above ground; then without the camera.
     late, early: m from the line's start to the first good place, and from the last good place to its end.
@@ -57,7 +57,7 @@ class LineMeasure:
 
 
 def allowed_aside(requirements: RouteRequirements, survey: Survey) -> float:
-    """Return how far to the side of its line a photo may be taken, m."""
+    """Return the distance to the side of its line at which a photo may still be taken, m."""
     return PHOTO_OFFSET_FRACTION * survey.spacing + position_error(requirements.setup)
 
 
@@ -81,9 +81,9 @@ class _Rows:
     needed: dict[str, Flags]
 
 
-def _rows(requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine) -> _Rows | None:
+def _line_rows(requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine) -> _Rows | None:
     axis = LineAxis(requirements.points[line.first : line.last + 1])
-    window = _window(requirements, aligned, line)
+    window = _row_window(requirements, aligned, line)
     if window.stop - window.start < 2 or not aligned.passed[line.begins]:
         return None
     position = aligned.track.position[window]
@@ -103,8 +103,8 @@ def _rows(requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey
 def measure_line(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> LineMeasure | None:
-    """Measure a photo line on a flown track; return None if no row was flown between its neighbours."""
-    rows = _rows(requirements, aligned, survey, line)
+    """Measure a photo line on a flown track; return None if no row lies between the neighbouring waypoints."""
+    rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
     length, along, ahead = rows.axis.length, rows.along, rows.ahead
@@ -112,12 +112,14 @@ def measure_line(
     for name, fulfilled in rows.needed.items():
         state = state & fulfilled
         before = float(good.mean()) if good.size else 1.0
-        good = _cells(along, state, length)
+        good = _line_steps(along, state, length)
         lost[name] = before - float(good.mean())
     found = np.flatnonzero(good)
     step = length / len(good)
     over = ahead & (along >= 0.0) & (along <= length)
-    photos, missed = _photos(line, _cells(along, ahead & rows.needed["away"] & rows.needed["dark"], length), length)
+    photos, missed = _count_photos(
+        line, _line_steps(along, ahead & rows.needed["away"] & rows.needed["dark"], length), length
+    )
     return LineMeasure(
         length=length,
         good=float(good.mean()),
@@ -130,17 +132,17 @@ def measure_line(
         missed=missed,
         allowed_aside=allowed_aside(requirements, survey),
         allowed_off=float(rows.allowed.min(initial=math.inf)),
-        lost=_stretches(~good, step),
+        lost=_set_runs(~good, step),
     )
 
 
-def _stretches(cells: Flags, step: float) -> tuple[tuple[float, float], ...]:
-    """Return runs of cells that are set, each from and to, m."""
+def _set_runs(cells: Flags, step: float) -> tuple[tuple[float, float], ...]:
+    """Return the start and end of each run of set cells, m."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], cells.astype(int), [0]]))) * step
     return tuple((float(low), float(high)) for low, high in zip(edges[::2], edges[1::2], strict=True))
 
 
-def _window(requirements: RouteRequirements, aligned: AlignedTrack, line: PhotoLine) -> slice:
+def _row_window(requirements: RouteRequirements, aligned: AlignedTrack, line: PhotoLine) -> slice:
     """Return the rows from the waypoint before the line's straight run to the waypoint after it."""
     first, last = max(0, line.begins - 1), min(requirements.legs, line.ends + 1)
     return slice(int(aligned.rows[first]), int(aligned.rows[last]) + 1)
@@ -149,16 +151,16 @@ def _window(requirements: RouteRequirements, aligned: AlignedTrack, line: PhotoL
 def _height_errors(
     requirements: RouteRequirements, axis: LineAxis, position: Floats, along: Floats
 ) -> tuple[Floats, Floats]:
-    """Return each row's error from the planned height above ground, m, and its tolerance."""
+    """Return each row's error from the planned height above ground, and the tolerance of the error, m."""
     planned = over_ground(requirements, axis.at(along))
     allowed = np.maximum(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * planned)
     return over_ground(requirements, position) - planned, allowed
 
 
 def over_ground(requirements: RouteRequirements, places: Floats) -> Floats:
-    """Return heights (n,) m of places (n, 3) above ground.
+    """Return the heights of places (n, 3) above ground, m, (n,).
 
-    Without terrain, above home or the route's lowest waypoint.
+    Without terrain, heights are above home, or above the route's lowest waypoint if there is no home.
     """
     ground, home = requirements.setup.scenario.terrain, requirements.setup.mission.home
     if ground is not None:
@@ -169,10 +171,12 @@ def over_ground(requirements: RouteRequirements, places: Floats) -> Floats:
 def _camera_on(
     requirements: RouteRequirements, line: PhotoLine, position: Floats, along: Floats, ahead: Flags, length: float
 ) -> Flags:
-    """Return True for each row with the camera on.
+    """Return True for each row at which the camera is on.
 
-    It is on from reaching the line's first waypoint to reaching its last.  The camera is always on if the mission does
-    not switch it there.  ahead: True for each row that flies along the line.
+    ahead: True for each row that flies along the line.
+
+    The camera is on from reaching the line's first waypoint to reaching its last waypoint.  It is always on if the
+    mission does not switch it on this line.
     """
     follows, rows = requirements.setup.autopilot.follows_path, np.arange(len(along))
 
@@ -188,8 +192,8 @@ def _camera_on(
     return (rows >= begins) & (rows <= ends)
 
 
-def _cells(along: Floats, state: Flags, length: float) -> Flags:
-    """Return True for each step of a line that lies between two rows in a state."""
+def _line_steps(along: Floats, state: Flags, length: float) -> Flags:
+    """Return True for each step of a line that lies between two consecutive rows at which `state` is True."""
     count = max(1, math.ceil(length / PHOTO_STEP_M))
     both = state[:-1] & state[1:] & (np.diff(along) > 0.0)
     edges = np.clip(along / length * count, 0.0, count)
@@ -200,8 +204,8 @@ def _cells(along: Floats, state: Flags, length: float) -> Flags:
     return np.cumsum(marks[:-1]) > 0
 
 
-def _photos(line: PhotoLine, taken: Flags, length: float) -> tuple[int, int]:
-    """Return the number of photos on a line, and the number that fall on steps on which none is taken."""
+def _count_photos(line: PhotoLine, taken: Flags, length: float) -> tuple[int, int]:
+    """Return the number of planned photos on a line, and the number of photos that were missed."""
     if line.photo <= 0.0:
         return 0, 0
     count = int(length / line.photo) + 1
@@ -216,7 +220,7 @@ def _photos(line: PhotoLine, taken: Flags, length: float) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class OverlapMeasure:
-    """Least overlap of a survey's usable photos, as shares of a photo.
+    """Minimum overlap of a survey's usable photos, as fractions of a photo.
 
     camera: the camera that takes them.
     front: overlap with the next photo on the line; None if the distance between photos is not stated, or none is
@@ -240,7 +244,7 @@ class OverlapMeasure:
 
 
 class _Strip(NamedTuple):
-    """Points of a photo line, and whether they are usable.
+    """Points of a photo line, with a flag for usable points.
 
     places: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s.
     """
@@ -254,7 +258,7 @@ class _Strip(NamedTuple):
 def measure_overlap(
     requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey
 ) -> OverlapMeasure | None:
-    """Measure how much a survey's photos overlap as they are flown, or planned if ``aligned`` is None.
+    """Measure how much a survey's photos overlap, as flown, or as planned if ``aligned`` is None.
 
     Return None if no camera is known.
     """
@@ -277,7 +281,7 @@ def _line_strip(
         legs = np.clip(np.searchsorted(axis.along, along, "right") - 1, 0, len(axis.along) - 2) + line.first
         places, speeds = axis.at(along), requirements.ground_speed[legs]
         return _Strip(places, over_ground(requirements, places), speeds, np.ones(len(along), dtype=np.bool_))
-    rows = _rows(requirements, aligned, survey, line)
+    rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
     usable = rows.ahead & (rows.along >= 0.0) & (rows.along <= rows.axis.length)
@@ -288,7 +292,7 @@ def _line_strip(
 
 
 def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:
-    """Return the measure with the least overlap along the lines."""
+    """Return the measure with its fields for the minimum overlap along the lines filled in."""
     camera = measure.camera
     for number, (line, strip) in enumerate(zip(survey.lines, strips, strict=True)):
         if strip is None or line.photo <= 0.0 or not strip.usable.any():
@@ -308,7 +312,7 @@ def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequenc
 def _with_side_overlap(
     measure: OverlapMeasure, requirements: RouteRequirements, survey: Survey, strips: Sequence[_Strip | None]
 ) -> OverlapMeasure:
-    """Return the measure with the least overlap across the lines, step by step along the first line."""
+    """Return the measure with its fields for the minimum overlap across neighbouring lines filled in."""
     corners = [requirements.points[line.first : line.last + 1] for line in survey.lines]
     axis = LineAxis(corners[0])
     ends = [axis.of(places)[0] for places in corners]
@@ -325,7 +329,7 @@ def _with_side_overlap(
         if strip is not None and strip.usable.any():
             at, across, _ = axis.of(strip.places)
             forth = along[-1] >= along[0]
-            cells = _cells((at - low) if forth else length - (at - low), strip.usable, length)
+            cells = _line_steps((at - low) if forth else length - (at - low), strip.usable, length)
             used = here & (cells if forth else cells[::-1])
             order = np.argsort(at[strip.usable])
             for row, values in enumerate((across, strip.heights)):

@@ -1,8 +1,8 @@
-"""Lay a track along its route by positions alone: the progress made, and the rows along each leg.
+"""Match a track to its route by positions alone, to find its progress and the rows along each leg.
 
-A route that returns to its start, or flies the same round again, is near many of its waypoints at once.  So the whole
-track is laid along the whole route: both only go forward, and the track may end anywhere on the route.  What guidance
-recorded about itself is not read.
+A route that returns to its start, or repeats a lap, is near many of its waypoints at once.  The whole track is
+therefore matched to the whole route: both only go forward, and the track may end anywhere on the route.  Data that
+guidance recorded about itself is not read.
 """
 
 import math
@@ -25,7 +25,7 @@ _SAMPLE_SPACING_M = 20.0
 _MAX_CELLS = 16_000_000
 # The row nearest to a waypoint may lie this far before or after the rows along its two legs, m of track.
 _WINDOW_MARGIN_M = 300.0
-# Cost of a part of the route that has no part of the track, as a fraction of its squared distance.
+# Cost of a part of the route to which no part of the track is matched, as a fraction of its squared distance.
 _SKIP_FRACTION = 0.1
 # Distance that is squared and added to that cost, m.
 _SKIP_DISTANCE_M = 15.0
@@ -68,7 +68,7 @@ class _Samples:
 
 
 def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RouteProgress:
-    """Lay a track along a route.
+    """Match a track to a route.
 
     position: (t, 3) m, usable rows, at least two.
     anywhere: the track may begin anywhere on the route, like a part of an imported log; otherwise at its start.
@@ -82,7 +82,7 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
     run = np.concatenate([[0.0], np.cumsum(step)])
     length = float(np.hypot(*np.diff(route.waypoints[:, :2], axis=0).T).sum())
     spacing = max(_SAMPLE_SPACING_M, math.sqrt(max(1.0, length) * max(1.0, float(run[-1])) / _MAX_CELLS))
-    samples = _samples(route, spacing)
+    samples = _sample_route(route, spacing)
     rows = np.unique(np.searchsorted(run, np.append(np.arange(0.0, run[-1], spacing), run[-1])))
     ends = _lay(
         read_only(np.ascontiguousarray(position[rows, :2])),
@@ -111,7 +111,7 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
     return RouteProgress(first, last, target, samples.along[samples.of_waypoint] - samples.along[final])
 
 
-def _samples(route: Route, spacing: float) -> _Samples:
+def _sample_route(route: Route, spacing: float) -> _Samples:
     """Sample the legs of a route; a loiter is one sample, however many laps it has."""
     points = route.waypoints[:, :2]
     places, radii, along = [points[0]], [0.0], [0.0]
@@ -137,7 +137,7 @@ def _samples(route: Route, spacing: float) -> _Samples:
 
 
 def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> tuple[Floats, float]:
-    """Return the center of a loiter's corners, and the distance from it within which it is flown, m."""
+    """Return the center of a loiter's corners, and the distance from the center within which the loiter is flown, m."""
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     wide = float(np.hypot(*(corners - middle).T).max()) + _LOITER_MARGIN_M
     if 0 <= route.return_from < first < route.return_until:
@@ -147,7 +147,7 @@ def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> 
 
 @compiled
 def _lay(track: Floats, places: Floats, radii: Floats, capture: float, anywhere: bool) -> Numbers:
-    """Lay a track (n, 2) along places (m, 2), both forward only, with the least sum of costs.
+    """Match a track (n, 2) to places (m, 2), both forward only, with the minimum sum of costs.
 
     The cost of a row is min(distance, capture)^2; a place without a row of its own costs `_SKIP_FRACTION` of that and
     `_SKIP_DISTANCE_M`^2.  Return the first and the last row at each place, (m, 2); -1 for places before its start and

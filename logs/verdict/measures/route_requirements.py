@@ -1,4 +1,4 @@
-"""Work out what a route requires and the aircraft's limits: the planned side of every finding."""
+"""Compute the requirements of a route and the aircraft's limits, which are the planned side of every finding."""
 
 import functools
 import math
@@ -64,7 +64,7 @@ class Airspace:
         return Place(zone.kind, index, name=zone.name)
 
     def about(self, points: Floats) -> NDArray[np.int64]:
-        """Return the zones that a path (n, 3) m may violate: inclusions, and exclusions near a segment.
+        """Return the numbers of zones that a path (n, 3), m, may violate: inclusions, and exclusions near a segment.
 
         >>> from world.airspace.zones import Cylinder
         >>> zones = tuple(Zone(str(k), "exclusion", Cylinder(1000.0 * k, 0.0, 50.0)) for k in range(4))
@@ -83,7 +83,7 @@ class Airspace:
 
 
 def airspace_of(setup: FlightSetup) -> Airspace:
-    """Return the zones that a setup's flight has to stay out of or to stay in.
+    """Return the exclusion and inclusion zones that apply to a setup's flight.
 
     A fence that gives no zones, as in logs from before fences were judged, is left out and reported.
 
@@ -97,18 +97,15 @@ def airspace_of(setup: FlightSetup) -> Airspace:
     except MissionError as error:
         fault = str(error)
     zones = (*setup.scenario.zones, *own) if own else setup.scenario.zones
-    return Airspace(zones, _records_of(zones), fault, len(setup.scenario.zones))
+    return Airspace(zones, _cached_records(zones), fault, len(setup.scenario.zones))
 
 
-# The zones that were used last: writing down a thousand takes longer than judging them.
+# The zones that were used last, because converting a thousand zones takes longer than judging them.
 _last_records: list[tuple[tuple[Zone, ...], ZoneRecords]] = []
 
 
-def _records_of(zones: tuple[Zone, ...]) -> ZoneRecords:
-    """Return the records of zones.
-
-    For the same tuple as last time these are the same records, which must not be changed.
-    """
+def _cached_records(zones: tuple[Zone, ...]) -> ZoneRecords:
+    """Return the records of zones, cached for the last tuple; the records must not be changed."""
     for known, records in _last_records:
         if known is zones:
             return records
@@ -160,7 +157,7 @@ def performance_tables(route: Route, limits: Limits) -> dict[float, PerformanceT
 
 
 def turn_requirements(route: Route, tables: dict[float, PerformanceTable]) -> TurnRequirements:
-    """Work out the length that each turn uses, from the aircraft's performance at the route's airspeeds."""
+    """Compute the length that each turn uses, from the aircraft's performance at the route's airspeeds."""
     points = np.asarray(route.waypoints, dtype=np.float64)
     courses, runs, count = leg_courses(points), leg_runs(points), len(points)
     turns = np.zeros(count)
@@ -172,7 +169,7 @@ def turn_requirements(route: Route, tables: dict[float, PerformanceTable]) -> Tu
         tightest[i] = turn_radius_between(tables[speed], courses[i - 1], courses[i], points[i, 2])
         radius[i] = route.arcs[i] or tightest[i]
         before[i], after[i] = turn_lengths(abs(float(turns[i])), float(radius[i]), bool(route.fly_over[i]))
-    reversal = _reversals(route, tables, courses, turns, radius, points[:, 2])
+    reversal = _reversal_lengths(route, tables, courses, turns, radius, points[:, 2])
     limit = _sharpest_turns(route, runs, tightest, before, after, reversal)
     return TurnRequirements(turns, tightest, radius, before, after, reversal, limit)
 
@@ -192,12 +189,12 @@ def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, flo
     return tangent, tangent
 
 
-def _reversals(
+def _reversal_lengths(
     route: Route, tables: dict[float, PerformanceTable], courses: Floats, turns: Floats, radius: Floats, up: Floats
 ) -> Floats:
-    """Return the length of each leg used by the roll between opposite banks, (w - 1,) m.
+    """Return the length of each leg used by the roll between opposite banks, m, (w - 1,).
 
-    0 between turns to the same side.
+    The length is 0 between turns to the same side.
     """
     out = np.zeros(len(courses))
     for leg in range(1, len(courses) - 1):
@@ -379,11 +376,11 @@ class RouteRequirements:
 
         The autopilot decides its path.
         """
-        return waypoint in _turned_around(self.surveys)[0]
+        return waypoint in _turnaround_parts(self.surveys)[0]
 
     def leads_around(self, leg: int) -> bool:
         """Return True if a leg is part of a survey's turn-around."""
-        return leg in _turned_around(self.surveys)[1]
+        return leg in _turnaround_parts(self.surveys)[1]
 
     def leg_unit(self, leg: int) -> Floats:
         """Return the east and north components of a leg's course, (2,)."""
@@ -403,7 +400,7 @@ class RouteRequirements:
 
 
 def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteRequirements:
-    """Work out what a setup's route requires.
+    """Compute the requirements of a setup's route.
 
     envelope: False leaves the aircraft's limits out, for flown evidence alone.
     """
@@ -432,7 +429,7 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
         before=turning.before,
         after=turning.after,
         reversal=turning.reversal,
-        blend=_blends(setup, route, points, runs, turning),
+        blend=_blend_lengths(setup, route, points, runs, turning),
         fly_by_offset=_fly_by_offsets(route, turning),
         turn_limit=turning.limit if envelope else np.full(len(points), math.inf),
         climb=climb,
@@ -466,11 +463,8 @@ def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
 
 
 @functools.lru_cache(maxsize=8)
-def _turned_around(surveys: tuple[Survey, ...]) -> tuple[frozenset[int], frozenset[int]]:
-    """Return the waypoints and legs of all turn-arounds.
-
-    Includes the paths onto the first line and off the last.
-    """
+def _turnaround_parts(surveys: tuple[Survey, ...]) -> tuple[frozenset[int], frozenset[int]]:
+    """Return the waypoints and legs of all turnarounds, including the paths onto the first line and off the last."""
     ends = [pair for survey in surveys for pair in survey.ways_onto_lines()]
     return (
         frozenset(i for first, last in ends for i in range(first, last + 1)),
@@ -510,7 +504,7 @@ def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> Planne
 def _leg_limits(
     route: Route, tables: dict[float, PerformanceTable], points: Floats, courses: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return climb and dive over the ground, rad, and ground speed, m/s, available all along each leg."""
+    """Return climb and dive over the ground, rad, and ground speed, m/s, available along the whole of each leg."""
     legs = len(courses)
     climb, dive, speeds = np.zeros(legs), np.zeros(legs), np.zeros(legs)
     for leg in range(legs):
@@ -532,7 +526,7 @@ def _fly_by_offsets(route: Route, turning: TurnRequirements) -> Floats:
     return out
 
 
-def _blends(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turning: TurnRequirements) -> Floats:
+def _blend_lengths(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turning: TurnRequirements) -> Floats:
     """Return the length of leg next to each turn on which the slope still changes, (w,) m.
 
     A parabola about each end of the arc, or about the waypoint if there is no arc.
@@ -569,7 +563,7 @@ class SteepArc:
 
 
 def turn_limit(requirements: RouteRequirements, i: int) -> tuple[float, str]:
-    """Return the tighter of the scenario's and the aircraft's limit at a waypoint, rad, and its source."""
+    """Return the tighter of the scenario's and the aircraft's turn limits at a waypoint, rad, and its source."""
     return tighter_turn(requirements, i, float(requirements.turn_limit[i]))
 
 
@@ -596,10 +590,10 @@ def slope_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
 
 
 def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
-    """Return the fly-by arc at a leg's end if it is too steep.
+    """Return the fly-by arc at a leg's end if it is too steep, otherwise None.
 
-    None if the airspeed stays within `SPEED_TOLERANCE_MPS`: the climb or descent that the aircraft cannot make on the
-    arc changes its speed by g dh / V.
+    An arc is not too steep if the airspeed stays within `SPEED_TOLERANCE_MPS`; the climb or descent that the aircraft
+    cannot make on the arc changes its speed by g dh / V.
     """
     i = leg + 1
     if i == requirements.legs or requirements.setup.route.fly_over[i] or requirements.setup.route.arcs[i] > 0.0:

@@ -174,8 +174,7 @@ class SlopeMeasure:
     short: True if no part of the leg is clear of the blends.
     at_full, at_idle: s with the throttle at its limits.
     slow, fast: m/s, the largest mean airspeed error below and above the command over `SATURATED_TIME_S` seconds at
-    those
-        limits, without the part that a gust explains; 0 for none.
+        those limits, without the part that a gust explains; 0 for none.
     ability: the aircraft's ability at the throttle limit that the leg needs, if the flight reached that limit.
     finished: the leg was flown to its end.
     """
@@ -197,7 +196,7 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
         return SlopeMeasure()
     rows = aligned.leg_rows(leg)
     error, short = _height_error(requirements, leg, aligned.track.position[rows])
-    full, idle, slow, fast = _saturation(requirements, aligned, leg)
+    full, idle, slow, fast = _saturation_times(requirements, aligned, leg)
     return SlopeMeasure(
         slope=leg_slope(requirements, aligned, leg),
         height_error=error,
@@ -228,7 +227,7 @@ def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
-    """Return the rows of a leg after the time for taking up its commanded speed; may be empty."""
+    """Return the rows of a leg after the time needed to reach its commanded speed; may be empty."""
     rows = aligned.leg_rows(leg)
     speeds = requirements.route.airspeed
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
@@ -236,14 +235,16 @@ def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int
     return slice(max(rows.start, int(np.searchsorted(aligned.track.time, start))), rows.stop)
 
 
-def _saturation(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> tuple[float, float, float, float]:
+def _saturation_times(
+    requirements: RouteRequirements, aligned: AlignedTrack, leg: int
+) -> tuple[float, float, float, float]:
     """Return seconds at full and idle throttle, and the speed lost and gained, as in `SlopeMeasure`."""
     rows = steady_rows(requirements, aligned, leg)
     track = aligned.track
     if rows.stop - rows.start < 2:
         return 0.0, 0.0, 0.0, 0.0
     tick = aligned.tick
-    full, idle = _at_limits(requirements, aligned, rows)
+    full, idle = _rows_at_limits(requirements, aligned, rows)
     commanded = float(requirements.route.airspeed[leg])
     error = track.airspeed[rows].astype(np.float64) - commanded
     # A gust along the track changes the airspeed without any energy, so it has to be off without the gust as well.
@@ -259,8 +260,8 @@ def _saturation(requirements: RouteRequirements, aligned: AlignedTrack, leg: int
     return float(full.sum() * tick), float(idle.sum() * tick), slow, fast
 
 
-def _at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
-    """Return the rows that have the throttle at full, and those that have it at idle."""
+def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
+    """Return masks of the rows with full throttle and of the rows with idle throttle."""
     track = aligned.track
     throttle = track.controls[rows, THROTTLE]
     full = throttle >= FULL_THROTTLE_FRACTION
@@ -283,7 +284,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     track, sign = aligned.track, 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
     if rows.stop - rows.start < 3:
         return None
-    full, idle = _at_limits(requirements, aligned, rows)
+    full, idle = _rows_at_limits(requirements, aligned, rows)
     full &= track.controls[rows, THROTTLE] >= SATURATED_THROTTLE_FRACTION
     along, _ = along_across(requirements, leg, track.position[rows])
     low, high = straight_span(requirements, leg, 0.0)
@@ -343,9 +344,9 @@ def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, 
 
 @compiled
 def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) -> Floats:
-    """Return the airspeed gained from rising air (m/s) in rows 0..stop, as it fades.
+    """Return the airspeed gained from rising air in rows 0..stop by an aircraft that holds its path, m/s.
 
-    For an aircraft that holds its path.
+    The gain fades with time.
     """
     out = np.zeros(stop)
     for k in range(1, stop):
@@ -358,7 +359,7 @@ def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) ->
 
 
 def _largest_mean_within(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
-    """Return the largest mean of ``value`` over ``width`` rows mostly in ``mask``, or 0 without any."""
+    """Return the largest mean of ``value`` over ``width`` rows that are mostly in ``mask``; 0 if there are none."""
     if mask.size < width:
         return 0.0
     total = np.concatenate([[0.0], np.cumsum(value)])

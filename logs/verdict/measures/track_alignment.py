@@ -87,7 +87,7 @@ class AlignedTrack:
         return int(np.searchsorted(self.rows[1:-1], min(row, len(self.track) - 2), side="right"))
 
     def where(self, row: int, fraction: float = 0.0) -> str:
-        """Return the place of a row, or of a fraction of the segment to the next row, on the map, in words."""
+        """Describe the place of a row, or of a fraction of the segment to the next row, on the map."""
         position = self.track.position
         east, north = (position[row] + fraction * (position[min(row + 1, len(position) - 1)] - position[row]))[:2]
         return f"east {east:.0f} m, north {north:.0f} m"
@@ -101,7 +101,7 @@ class AlignedTrack:
 
 def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack | None:
     """Align a track with a route; return None if the track has fewer than two usable rows."""
-    good = _usable(track, own=requirements.setup.source is None)
+    good = _usable_rows(track, own=requirements.setup.source is None)
     if int(good.sum()) < 2:
         return None
     if good.all():
@@ -145,7 +145,7 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
 
 
 def _arrival_distances(requirements: RouteRequirements) -> Floats:
-    """Return the distance from each waypoint, (w,) m, within which a track that ends there has passed it."""
+    """Return the distance from each waypoint within which a track that ends has passed the waypoint, m, (w,)."""
     route, follows_path = requirements.setup.route, requirements.setup.autopilot.follows_path
     offsets = requirements.fly_by_offset if follows_path else np.zeros(len(route.waypoints))
     arrived = [
@@ -188,10 +188,10 @@ def _with_arrivals(
 def _begin_last_leg(
     requirements: RouteRequirements, track: Track, rows: RowNumbers, passed: NDArray[np.bool_], arrived: Floats
 ) -> None:
-    """Begin the track's last leg at the row that came within reach of its first waypoint.
+    """Begin the track's last leg, in ``rows``, at the row that came within reach of the leg's first waypoint.
 
-    Changes ``rows``.  Only if the track ends within that reach, before the waypoint: the autopilot is on the next leg
-    by then.
+    Change ``rows`` only if the track ends within that reach, before the waypoint, because the autopilot is on the next
+    leg by then.
     """
     k = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
     if not 0 < k < len(rows) - 1 or rows[k] < len(track) - 1 or requirements.setup.route.arcs[k] > 0.0:
@@ -202,14 +202,14 @@ def _begin_last_leg(
 
 
 def along_across(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[Floats, Floats]:
-    """Return distances along a leg from its start and to the right of its line, m, of positions (n, 3)."""
+    """Return the distances of positions (n, 3) along a leg from its start, and to the right of its line, m."""
     east, north = position[:, 0] - requirements.points[leg, 0], position[:, 1] - requirements.points[leg, 1]
     ux, uy = math.sin(requirements.courses[leg]), math.cos(requirements.courses[leg])
     return east * ux + north * uy, east * uy - north * ux
 
 
 def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
-    """Return each track segment's least horizontal distance from a target, m, and its fraction there.
+    """Return each track segment's minimum horizontal distance from a target, m, and its fraction of the segment.
 
     position: (n, 3).  target: (2,) or (3,).  Returns (n - 1,) twice.
     """
@@ -222,7 +222,7 @@ def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
     return np.hypot(rest[:, 0], rest[:, 1]), fraction
 
 
-def _usable(track: Track, *, own: bool) -> NDArray[np.bool_]:
+def _usable_rows(track: Track, *, own: bool) -> NDArray[np.bool_]:
     """Return the rows with finite, plausible numbers, later than every usable row before them.
 
     own: the flight is planfly's own, with all numbers in every row; of an imported log only positions and velocities
@@ -346,10 +346,10 @@ _IGNORED_COLUMNS = ("velocity", "attitude", "airspeed", "controls", "wind", "cur
 
 
 def find_leg_ends(setup: FlightSetup, track: Track) -> tuple[float, ...]:
-    """Return the end of each leg but the last, s, for a track without a verdict.
+    """Return the end time of each leg except the last, s, for a track without a verdict.
 
-    inf if its waypoint was not reached.  Only time and position are used.  Empty for a track with fewer than two usable
-    rows.
+    The time is inf if the leg's last waypoint was not reached.  Only time and position are used.  Return () for a track
+    with fewer than two usable rows.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -362,7 +362,7 @@ def find_leg_ends(setup: FlightSetup, track: Track) -> tuple[float, ...]:
 
 
 def with_legs(track: Track, leg_ends: Sequence[float]) -> Track:
-    """Return the track with its ``leg`` column computed again from the times at which legs end, s, rising.
+    """Return the track with its ``leg`` column computed again from the increasing end times of the legs, s.
 
     leg_ends: from a `logs.verdict.verdict.Verdict` or from `find_leg_ends`.  If empty, all rows are on leg 0.
     """

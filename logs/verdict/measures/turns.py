@@ -58,13 +58,13 @@ def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tup
         overshoot, beyond = None, 0.0
         if 0 < k < requirements.legs:
             later = next((other for other in times[k + 1 :] if other > time + tick), float(aligned.track.time[-1]))
-            overshoot, beyond = _measure_overshoot_of_next_leg(requirements, aligned, k, time, later)
+            overshoot, beyond = _corner_overshoot(requirements, aligned, k, time, later)
         out.append(CornerPass(time, nearest, overshoot, beyond))
     return tuple(out)
 
 
 def _nearest_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> list[tuple[float, float]]:
-    """Return time (s) and distance (m) of each waypoint's nearest pass, between the neighbouring passes."""
+    """Return the time (s) and distance (m) of each waypoint's nearest pass, in order of time."""
     time, rows = aligned.track.time, aligned.rows
     out: list[tuple[float, float]] = []
     begin = float(time[0])
@@ -80,16 +80,16 @@ def _nearest_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> l
 
 
 def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Floats]:
-    """Return moments (n,) s from one time to another, and the positions (n, 3) of the flight then."""
+    """Return times between `start` and `end`, s, (n,), and the positions of the flight at these times, m, (n, 3)."""
     time = aligned.track.time
     moments = np.concatenate([[start], time[(time > start) & (time < end)], [end]])
     return moments, np.column_stack([np.interp(moments, time, aligned.track.position[:, j]) for j in range(3)])
 
 
-def _measure_overshoot_of_next_leg(
+def _corner_overshoot(
     requirements: RouteRequirements, aligned: AlignedTrack, k: int, start: float, end: float
 ) -> tuple[float | None, float]:
-    """Return the overshoot (m, or None) at a waypoint, and how far past the leg's end it began (m)."""
+    """Return the overshoot at a waypoint (or None), and how far past the leg's end the flight was, m."""
     run = float(requirements.runs[k])
     along, across = along_across(requirements, k, _track_between(aligned, start, end)[1])
     if along[0] > run:
@@ -179,7 +179,7 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int)
         peak_bank=None if math.isnan(held) else float(np.abs(track.attitude[around, ROLL]).max()),
         held_bank=None if math.isnan(held) else held,
         radius=radius,
-        overshoot=_overshoot(requirements, i, position[watched], before[watched], along[watched], across[watched]),
+        overshoot=_arc_overshoot(requirements, i, position[watched], before[watched], along[watched], across[watched]),
         settled=_settled_distance(requirements, aligned, i, first, end, along, across),
         passed=float(approaches(position, requirements.points[i])[0].min()),
         full_circles=max(0, round((turned - abs(float(requirements.turns[i]))) / (2.0 * math.pi))),
@@ -203,7 +203,7 @@ def _course_change(
 
 
 def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
-    """Return the largest mean bank (rad) and the least radius (m; inf for no turn), each over a second."""
+    """Return the largest mean bank (rad) and the smallest radius (m; inf without a turn), each over a second."""
     time = aligned.track.time[rows]
     bank = np.abs(aligned.track.attitude[rows, ROLL].astype(np.float64))
     ticks = int(np.searchsorted(time, time[0] + 1.0))
@@ -217,10 +217,10 @@ def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
     return held, 1.0 / sharpest if sharpest > 1e-9 else math.inf
 
 
-def _overshoot(
+def _arc_overshoot(
     requirements: RouteRequirements, i: int, position: Floats, before: Floats, along: Floats, across: Floats
 ) -> float | None:
-    """Return the largest distance outside the arc and then outside the next leg, m; 0 if always within."""
+    """Return the largest distance outside the arc and then outside the next leg, m; 0 if it was never outside."""
     if requirements.setup.route.fly_over[i] or not math.isfinite(requirements.before[i]):
         return None
     side = math.copysign(1.0, requirements.turns[i])
@@ -241,9 +241,9 @@ def _overshoot(
 def _settled_distance(
     requirements: RouteRequirements, aligned: AlignedTrack, i: int, first: int, end: int, along: Floats, across: Floats
 ) -> float:
-    """Return the mean distance from the next leg's line in its last second before the next turn, m.
+    """Return the mean distance from the next leg's line in the last second before the next turn, m.
 
-    If the turn takes all of the leg, the distance at its end.
+    If the turn uses the whole leg, return the distance at the end of the leg.
     """
     time = aligned.track.time[first : first + end + 1]
     start = int(np.searchsorted(time, time[-1] - 1.0))

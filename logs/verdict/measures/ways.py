@@ -28,7 +28,7 @@ _PIECE_LENGTH_M = 100.0
 
 
 class Way(NamedTuple):
-    """Path of n points: (n, 3) m, and the run to each point, (n,) m."""
+    """Path of n points, m, (n, 3), and the run to each point, m, (n,)."""
 
     points: Floats
     run: Floats
@@ -55,9 +55,9 @@ def straight_way(begin: Sequence[float] | Floats, course: float, profile: Profil
 
 
 def way_clearance(ground: Terrain, way: Way) -> tuple[float, float]:
-    """Return the least height above ground on a path and the run at which it occurs, m.
+    """Return the minimum height above ground on a path and the run at which it occurs, m.
 
-    NaN if the ground is not known along the whole path and the path does not hit the ground that is known.
+    The height is NaN if part of the ground is not known, unless the path hits known ground.
     """
     first, last = float(way.run[0]), float(way.run[-1])
     cuts = np.linspace(first, last, max(2, math.ceil((last - first) / _PIECE_LENGTH_M) + 1))
@@ -111,7 +111,7 @@ def first_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None
 
 
 def landing_item(requirements: RouteRequirements) -> tuple[int, MissionItem] | None:
-    """Return the waypoint at which a mission lands by a glide and its item, or None without one."""
+    """Return the waypoint and item of the glide landing of a mission, or None if there is none."""
     lands = {item.seq: item for item in requirements.setup.mission.items if item.command == Command.NAV_LAND}
     found = [(k, lands[seq]) for k, seq in enumerate(requirements.setup.route.items.tolist()) if k and seq in lands]
     return found[-1] if found else None

@@ -85,7 +85,7 @@ def copy_part(source: Record, target: Record) -> None:
 
 @inlined
 def between_ends(exclusion: bool, part: Record, run: float, rise: float, farthest: float) -> tuple[float, float]:
-    """Return the least and greatest distance beyond a zone's limit between a part's ends, m.
+    """Return the minimum and maximum distance beyond a zone's limit between a part's ends, m.
 
     run: length of the part, m.  rise: the largest change of its height in the band.  farthest: upper bound of its
     distance beyond the zone's outline, m.
@@ -175,7 +175,7 @@ _MERGE_TIME_S = 1e-6
 
 
 def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) -> Records:
-    """Return how a path meets each of z zones: (z,) of `VISIT`.
+    """Return the visit of a path to each of z zones, with dtype `VISIT`, (z,).
 
     moves: (m,) of `logs.verdict.measures.path_moves.MOVE`.  terrain: None if unknown.
     """
@@ -212,13 +212,13 @@ def _path_zones(
         if -apart[z] < known:
             visits[z].depth = -apart[z]
             continue
-        _visit(moves, blocks, records, z, heights, to_pixel, known, parts, visits[z])
+        _fill_visit(moves, blocks, records, z, heights, to_pixel, known, parts, visits[z])
         known = max(known, min(0.0, visits[z].depth))
     return visits
 
 
 @inner
-def _visit(
+def _fill_visit(
     moves: Records,
     blocks: Records,
     records: ZoneRecords,
@@ -229,10 +229,12 @@ def _visit(
     parts: Records,
     visit: Record,
 ) -> None:
-    """Fill in how a path meets zone z; known: m, depths below it need not be exact.
+    """Fill `visit` with the visit of a path to zone z.
 
-    In three rounds: the moves' ends alone; the deepest place, which is near the best of those ends; and, if the zone is
-    violated, the times.
+    known: depth below which the result need not be exact, m.
+
+    Work in three rounds: check the moves' ends alone; find the deepest place, which is near the deepest end; and, if
+    the zone is violated, find the times.
     """
     zone = records.zones[z]
     above_ground = zone.floor_above_ground or zone.ceiling_above_ground
@@ -250,13 +252,13 @@ def _visit(
             if highest <= (0.0 if turn == 2 else max(known, visit.depth)) and not (above_ground and away < reach):
                 continue
             first, last = b * BLOCK_MOVES, min(moves.shape[0], (b + 1) * BLOCK_MOVES)
-            _visit_block(moves[first:last], turn, records, z, heights, to_pixel, steepest, known, parts, visit)
+            _add_block(moves[first:last], turn, records, z, heights, to_pixel, steepest, known, parts, visit)
         if turn == 1 and not visit.depth > 0.0:
             break
 
 
 @inner
-def _visit_block(
+def _add_block(
     moves: Records,
     turn: int,
     records: ZoneRecords,
@@ -268,7 +270,7 @@ def _visit_block(
     parts: Records,
     visit: Record,
 ) -> None:
-    """Add consecutive moves to a visit; turn: the round, numbered as in `_visit`."""
+    """Add consecutive moves to a visit; turn: the round, numbered as in `_fill_visit`."""
     part = parts[0]
     part.to_east, part.to_north, up = move_point(moves[0], 0.0)
     part.to_away, part.to_off, part.to_edge = look_at_zone(

@@ -1,4 +1,4 @@
-"""Prepare returns for drawing: the worst paths, and the least altitude from which a return is safe.
+"""Prepare returns for drawing: the worst paths, and the lowest altitude from which a return is safe.
 
 Neither is needed to judge returns, and both take as long as judging: they are computed only if a picture is wanted.
 """
@@ -114,7 +114,7 @@ def stretches(ones: Sequence[One], key: Callable[[One], Key]) -> list[tuple[Key,
 def drawn_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, glides: Glides = NOT_ASKED
 ) -> DrawnReturns:
-    """Return judged returns with all data for drawing them.
+    """Add all data for drawing to judged returns.
 
     starts: the places from which they were judged.
     """
@@ -123,12 +123,12 @@ def drawn_returns(
 
 
 def draw_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
-    """Return judged returns without glides and least altitudes, which take longest."""
+    """Add data for drawing to judged returns, without glides and minimum altitudes, which take longest to compute."""
     return DrawnReturns(returns, worst_returns(world, starts, returns), LeastHeights(np.zeros(0), np.zeros(0)))
 
 
 def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> tuple[WorstReturn, ...]:
-    """Return the worst of each kind of failure, then the next worst; the lowest return if all are safe."""
+    """Return the worst return of each kind of failure, then the next worst; the lowest return if all are safe."""
     unsafe = [one for one in returns.ranges if not one.worst.safe]
     firsts = {one.worst.kind: one for one in reversed(unsafe)}
     order = [one for one in unsafe if firsts[one.worst.kind] is one]
@@ -146,7 +146,7 @@ def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
 
 
 def _failure_place(world: ReturnWorld, one: ReturnFlown, way: Floats) -> Floats:
-    """Return where a return goes wrong, or is lowest."""
+    """Return the place where a return fails, or where it is lowest, m, (3,)."""
     if one.kind == "threat":
         away = np.linalg.norm(way - world.around.spheres[one.threat], axis=1)
         return np.asarray(way[int(np.argmin(away))])
@@ -174,22 +174,19 @@ def least_heights(world: ReturnWorld, starts: ReturnStarts) -> LeastHeights:
     going = np.isfinite(lowest)
     for step in range(1, _STEPS + 1):
         tried = np.maximum(direction * step * _STEP_M, lowest)
-        ok = _safe_from(world, chosen, tried, going)
+        ok = _safe_at_offset(world, chosen, tried, going)
         good, bad = np.where(going & ok, tried, good), np.where(going & ~ok, tried, bad)
         going &= (ok == safe) & (tried > lowest)
     for _ in range(_HALVINGS):
         both = np.isfinite(good) & np.isfinite(bad)
         middle = np.where(both, 0.5 * (good + bad), 0.0)
-        ok = _safe_from(world, chosen, middle, both)
+        ok = _safe_at_offset(world, chosen, middle, both)
         good, bad = np.where(both & ok, middle, good), np.where(both & ~ok, middle, bad)
     return LeastHeights(chosen.time, np.where(np.isfinite(lowest), chosen.rows["up"] + good, math.nan))
 
 
-def _safe_from(world: ReturnWorld, starts: ReturnStarts, above: Floats, asked: Flags) -> Flags:
-    """Return True for each return that is safe from an offset altitude, m.
-
-    Only the returns in ``asked`` are flown.
-    """
+def _safe_at_offset(world: ReturnWorld, starts: ReturnStarts, above: Floats, asked: Flags) -> Flags:
+    """Flag each return that is safe from a start ``above`` m higher, (n,); fly only those flagged in ``asked``."""
     found = np.zeros(len(starts), dtype=np.bool_)
     if asked.any():
         rows = starts.rows[asked].copy()

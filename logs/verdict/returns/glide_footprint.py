@@ -28,7 +28,7 @@ _MAX_CELLS = 200
 
 
 class Band(NamedTuple):
-    """Area where the least height above ground lies between two heights, m.  parts: of the map."""
+    """Area where the required height above ground lies between two heights, m.  parts: outlines on the map."""
 
     above: float
     up_to: float

@@ -1,4 +1,4 @@
-"""Compute for every cell the altitude that an aircraft needs to glide to a place.
+"""Compute the altitude from which an aircraft can glide to a place, for every cell of a map.
 
 The shortest paths over terrain are searched backwards.  One search begins at the places to be reached and runs
 against the direction of flight.  A cell's label is the least altitude from which the glide gets there: the label of
@@ -107,9 +107,9 @@ def glide_map(
 
 
 def _add_sphere(made: GlideMap, centre: Floats, radius: float) -> None:
-    """Widen the altitude range in which cells lie in a kill sphere.
+    """Widen the altitude ranges in which the cells of `made` lie in a kill sphere.
 
-    Each cell at its point nearest to the sphere's center.
+    Each cell is checked at its point nearest to the sphere's center.
     """
     row, column = made.cell_of(float(centre[0]), float(centre[1]))
     steps = math.ceil(radius / made.cell) + 1
@@ -148,9 +148,9 @@ def landable(made: GlideMap) -> Flags:
     # Heights relative to a mean, so that their squares keep their digits.
     z = ground - (np.nanmean(ground) if np.isfinite(ground).any() else 0.0)
     one = np.ones(taps.size)
-    total, squares = _patch(z, one, one), _patch(z * z, one, one)
+    total, squares = _patch_sums(z, one, one), _patch_sums(z * z, one, one)
     away = np.asarray(taps * made.cell, dtype=np.float64)
-    across, up = _patch(z, one, away), _patch(z, away, one)
+    across, up = _patch_sums(z, one, away), _patch_sums(z, away, one)
     spread = taps.size * float((taps**2).sum()) * made.cell**2
     left = squares - total**2 / count - (across**2 + up**2) / spread
     flat = np.hypot(across, up) / spread <= STEEPEST
@@ -158,7 +158,7 @@ def landable(made: GlideMap) -> Flags:
     return np.asarray(flat & ~((made.low < made.floor) & (made.floor < made.high)))
 
 
-def _patch(values: Floats, by_row: Floats, by_column: Floats) -> Floats:
+def _patch_sums(values: Floats, by_row: Floats, by_column: Floats) -> Floats:
     """Return weighted sums (n, e) over the square around each cell; NaN if the square leaves the map."""
     out = values
     for axis, weights in ((0, by_row), (1, by_column)):
@@ -365,7 +365,7 @@ def _search(
     heads: Codes,
     links: Codes,
 ) -> None:
-    """Settle cells by altitude, band after band.
+    """Fill `need`, `origin` and `onward` by settling cells in order of altitude, band after band.
 
     heads: (b,) the first cell of each band, -1 for none.  links: (cells, 2) a cell's neighbours in its band.
     """
@@ -412,14 +412,14 @@ def _step_start_altitude(
     here: float,
     loss: float,
 ) -> float:
-    """Return the least start altitude of a step that ends in a cell, above all cells between, or NaN."""
+    """Return the minimum start altitude of a step that ends in a cell and stays above all cells between, m, or NaN."""
     wanted = here + loss
     for k in range(move.first, move.last):
         cell = between[k]
         i, j = row + cell.north, column + cell.east
         # Height lost from the step's start to this cell.
         lost = (1.0 - cell.share) * loss
-        altitude = _out_of_spheres(max(wanted - lost, floor[i, j]), low[i, j], high[i, j])
+        altitude = _raise_above_spheres(max(wanted - lost, floor[i, j]), low[i, j], high[i, j])
         # NaN, for unknown ground, fails the comparison.
         if not floor[i, j] <= altitude:
             return math.nan
@@ -427,13 +427,13 @@ def _step_start_altitude(
     i, j = row - move.north, column - move.east
     if not floor[i, j] <= math.inf:
         return math.nan
-    wanted = _out_of_spheres(max(wanted, floor[i, j]), low[i, j], high[i, j])
+    wanted = _raise_above_spheres(max(wanted, floor[i, j]), low[i, j], high[i, j])
     return wanted
 
 
 @inner
-def _out_of_spheres(up: float, low: float, high: float) -> float:
-    """Return an altitude, or the top of the spheres that contain it."""
+def _raise_above_spheres(up: float, low: float, high: float) -> float:
+    """Return an altitude, or the top of the spheres if they contain the altitude, m."""
     return high if low < up < high else up
 
 

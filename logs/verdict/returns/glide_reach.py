@@ -1,4 +1,4 @@
-"""Compute what a flying aircraft can glide to.
+"""Compute the places to which a flying aircraft can glide.
 
 It flies on for a moment, turns to the path there, and glides.  The path comes from a backward search
 (`logs.verdict.returns.glide_map`) that ignores turns.  So the turn is flown first, to either side, in the mean wind:
@@ -37,7 +37,7 @@ _GLIDER = record_dtype("airspeed", "bank", "west", "south", "cell")
 def heights_left(
     starts: Records, needs: Needs, aircraft: PointMass, around: ReturnEnvironment, airspeed: float, bank: float
 ) -> tuple[Floats, Codes]:
-    """Return each start's altitude (n,) above the least from which a place is reached, m, and that place.
+    """Return each start's altitude above the minimum from which a place can be reached, m, (n,), and that place.
 
     starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.  airspeed: of the glide, equivalent, m/s.
     bank: of the turn, rad; limited to the bank that the airspeed allows.  The altitude left is negative if the place is
@@ -89,7 +89,7 @@ def _look_ahead(
     left: Floats,
     reached: Codes,
 ) -> None:
-    """Fill in the altitude left and the place reached, for each start by the better of both turns."""
+    """Fill `left` and `reached` for each start, with the better of the turns to both sides."""
     turnings = np.zeros(1, _TURNING)
     here = turnings[0]
     fastest = aircraft.slowest + (excess.shape[1] - 1) * aircraft.speed_step
@@ -157,7 +157,7 @@ def _is_clear(here: Record, floor: Floats, spheres: Floats, radii: Floats, glide
 
 @inner
 def _best_cell(here: Record, need: Floats, worst: float, glider: Record) -> tuple[float, int, int]:
-    """Return the best of a place's cell and its neighbours: altitude left, row and column.
+    """Return the remaining altitude, row and column of the best cell among a place's cell and its neighbours.
 
     A cell's center may lie in a sphere that the place itself is outside of.  worst: height lost per metre to a center.
     """
@@ -175,7 +175,7 @@ def _best_cell(here: Record, need: Floats, worst: float, glider: Record) -> tupl
 
 @inner
 def _remaining_turn(here: Record, i: int, j: int, side: float, onward: Codes, moves: Records, glider: Record) -> float:
-    """Return the rest of a turn to the path on from a cell, rad; negative beyond it, 0 at the path's end."""
+    """Return the remaining turn to the path's course at a cell, rad; negative if overshot, 0 at the path's end."""
     for _ in range(_LOOKAHEAD_STEPS):
         m = onward[i, j]
         if m < 0:

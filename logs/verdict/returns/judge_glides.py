@@ -1,4 +1,4 @@
-"""Judge what is in reach after an engine failure: by ArduPlane's own return, and by the best path.
+"""Judge which places are in reach after an engine failure, by ArduPlane's own return and by the best path.
 
 ArduPlane does not know that its engine has stopped: its return to launch is simulated without thrust by its control law
 (`flight.autopilots.arduplane.rtl_point_mass`), straight at its target and onto its slope.  What can be reached at all
@@ -152,7 +152,7 @@ class Glides:
         return None if not self.each or self.count("unknown") else True
 
     def best_site(self, one: Glide) -> int:
-        """Return home if it is in reach, otherwise the site with most altitude left, or -1 if none is."""
+        """Return the index of home if in reach, otherwise of the site with most altitude left; -1 if there is none."""
         if one.reach == "home":
             return 0
         return int(np.argmax(one.left)) if one.reach == "site" else -1
@@ -183,13 +183,13 @@ NOT_ASKED = Glides((), (), math.nan)
 
 
 def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
-    """Judge what can be reached without an engine from each start, except from low take-offs and landings.
+    """Judge which places each start can reach without an engine, except starts in low take-offs and landings.
 
     From a low start the aircraft descends straight ahead.
     """
     starts = starts.at(np.flatnonzero(~starts.low))
     parameters = world.parameters
-    sites, airspeed = _sites(world), float(parameters.airspeed_min)
+    sites, airspeed = _glide_sites(world), float(parameters.airspeed_min)
     fuel = world.setup.envelope.volts <= 0.0
     terrain, around = world.scenario.terrain, world.around
     if terrain is None:
@@ -236,7 +236,7 @@ def _best_reach(left: tuple[float, ...], flat: float) -> Reach:
     return "flat" if flat >= 0.0 else "nothing"
 
 
-def _sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
+def _glide_sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
     """Return home, rally points, and the mission's landing places."""
     mission, origin = world.setup.mission, world.scenario.origin
     return (

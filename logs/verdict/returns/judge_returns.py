@@ -250,14 +250,14 @@ def _report_key(one: ReturnFlown) -> tuple[object, ...]:
 
 
 def badness(one: ReturnFlown) -> tuple[int, float]:
-    """Return the sort key of a return, the worst first."""
+    """Return a sort key that puts the worst return first."""
     measure = one.outside if one.kind == "threat" else one.left if one.kind == "energy" else one.clearance
     return KINDS.index(one.kind), math.inf if math.isnan(measure) else measure
 
 
 @dataclass(frozen=True, slots=True)
 class ReturnWorld:
-    """Data that decides returns, except where they begin.
+    """Data on which the result of returns depends, except their starts.
 
     parameters: of ArduPlane.  home, rally: on the map.
     aircraft: as a point mass.  around: ground and spheres.
@@ -312,7 +312,7 @@ class ReturnWorld:
 
     @property
     def ways(self) -> tuple[Way, ...]:
-        """All ways in which returns end, RTL's first."""
+        """All kinds of ends of returns, RTL's first."""
         lands = any(cause.does == "land" for cause in self.causes) and self.way != "straight to land"
         return (self.way, "straight to land") if lands else (self.way,)
 
@@ -562,7 +562,7 @@ def _judge_return(
 
 
 def zone_met(world: ReturnWorld, way: Floats) -> int:
-    """Return the zone that a path (t, 3) violates most, -1 for none."""
+    """Return the index of the zone that a path (t, 3) violates most, or -1 if it violates none."""
     step = np.diff(way, axis=0)
     moves: Records = np.zeros(len(step), MOVE)
     run = np.hypot(step[:, 0], step[:, 1])
@@ -615,7 +615,7 @@ def _recheck_in_jsbsim(
 
 
 def _with_offsets(world: ReturnWorld, one: ReturnFlown, flown: Record, higher: float, farther: float) -> ReturnFlown:
-    """Return a copy that is higher and farther outside spheres by these differences, m."""
+    """Return a copy of a return that is higher and farther outside spheres by the given differences, m."""
     moved = flown.copy()
     moved["clearance"] += higher
     moved["outside"] += farther
@@ -629,7 +629,7 @@ def _with_offsets(world: ReturnWorld, one: ReturnFlown, flown: Record, higher: f
 
 
 def is_steady(world: ReturnWorld, row: Record) -> bool:
-    """Return True if a JSBSim flight can be led to a start: small bank, and fast enough to fly."""
+    """Return True if a JSBSim flight can be brought to a start: its bank is small, and its airspeed fast enough."""
     wind = world.scenario.wind
     over = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, float(row["up"]))
     east = float(row["velocity_east"]) + over * math.sin(wind.from_course)
@@ -639,7 +639,7 @@ def is_steady(world: ReturnWorld, row: Record) -> bool:
 
 
 def doubt(one: ReturnFlown) -> float:
-    """Return a return's distance, m, from what decides it: ground, required height, or a kill sphere."""
+    """Return how close a return came to a deciding limit (ground, required height or a kill sphere), m."""
     if one.kind in ("zone", "unknown"):
         # Neither depends on a distance.
         return math.inf

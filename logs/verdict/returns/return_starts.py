@@ -74,7 +74,7 @@ def flown_starts(setup: FlightSetup, track: Track, every: float) -> ReturnStarts
     velocity = _velocities(track, rows)
     roll = track.attitude[rows, ROLL].astype(np.float64)
     energy = track.energy[rows].astype(np.float64)
-    records = _records(track.position[rows], velocity, np.nan_to_num(roll))
+    records = _start_records(track.position[rows], velocity, np.nan_to_num(roll))
     return ReturnStarts(track.time[rows], records, energy, True, low, int(slow.sum()))
 
 
@@ -83,7 +83,7 @@ def _no_starts(*, flown: bool) -> ReturnStarts:
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
-    """Return which rows (n,) are low in a flown take-off or landing, and which are also too slow to fly."""
+    """Flag the rows that are low in a flown take-off or landing, and those that are also too slow to fly, (n,) each."""
     ways, terrain = setup.ground_ways, setup.scenario.terrain
     on_way = by_the_ground(track, ways)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)
@@ -96,7 +96,7 @@ def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp])
 
 
 def _velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
-    """Return velocities over the ground (n, 3) at rows; from nearby positions if the track has none."""
+    """Return velocities over the ground at some rows, m/s, (n, 3), from nearby positions if the track has none."""
     velocity = track.velocity[rows].astype(np.float64)
     for k in np.flatnonzero(~np.isfinite(velocity).all(axis=1)):
         near = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)
@@ -144,7 +144,7 @@ def planned_starts(setup: FlightSetup, every: float) -> ReturnStarts:
     velocity = np.stack([speed * east, speed * north, rise], axis=1)
     bank = np.arctan(speed * speed * move["curvature"] / GRAVITY)
     unknown, none_low = np.full(len(times), np.nan), np.zeros(len(times), dtype=np.bool_)
-    return ReturnStarts(times, _records(position, velocity, bank), unknown, False, none_low)
+    return ReturnStarts(times, _start_records(position, velocity, bank), unknown, False, none_low)
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:
@@ -161,7 +161,7 @@ def _ground_speeds(setup: FlightSetup) -> Floats:
     return np.array(found)
 
 
-def _records(position: Floats, velocity: Floats, roll: Floats) -> Records:
+def _start_records(position: Floats, velocity: Floats, roll: Floats) -> Records:
     rows: Records = np.zeros(len(position), RETURN_START)
     for k, name in enumerate(("east", "north", "up")):
         rows[name], rows[f"velocity_{name}"] = position[:, k], velocity[:, k]

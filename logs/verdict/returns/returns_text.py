@@ -123,10 +123,10 @@ def headline(returns: Returns) -> str:
         return f"not judged: {reasons}" if reasons else "no place to return from"
     landing = "; the landing is not judged" if returns.lands else ""
     low = f"; {returns.left_out} on or near the ground in take-off and landing left out" if returns.left_out else ""
-    return (f"not judged in full ({reasons}): " if reasons else "") + _judged(returns) + low + landing
+    return (f"not judged in full ({reasons}): " if reasons else "") + _judged_text(returns) + low + landing
 
 
-def _judged(returns: Returns) -> str:
+def _judged_text(returns: Returns) -> str:
     total, failures = len(returns.each), counts_text(returns)
     if failures:
         safe = returns.count("safe")
@@ -141,7 +141,7 @@ def _judged(returns: Returns) -> str:
 
 
 def no_return_text(returns: Returns) -> str:
-    """Return a line on the place from which the battery no longer lasts for a return with reserve.
+    """Describe the place from which the battery no longer permits a return with reserve.
 
     >>> no_return_text(Returns((), 1.0, (), 60.0, None, 0.0, True))
     'point of no return: not judged, for the energy in the battery is not known'
@@ -166,7 +166,7 @@ def no_return_text(returns: Returns) -> str:
 
 
 def causes_text(causes: tuple[Cause, ...]) -> list[str]:
-    """Return two lines: what makes the aircraft return, and what does not.
+    """Describe, in two lines, which events make the aircraft return and which do not.
 
     >>> from flight.autopilots.arduplane.failsafes import failsafe_causes
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -193,9 +193,9 @@ def causes_text(causes: tuple[Cause, ...]) -> list[str]:
 
 
 def landing_text(returns: Returns) -> list[str]:
-    """Return lines on how RTL_AUTOLAND ends a return, and on the landing sequence.
+    """Describe, in lines, how RTL_AUTOLAND ends a return, and the landing sequence.
 
-    Another autopilot has no such lines.
+    Return [] for another autopilot.
 
     >>> landing_text(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
     ['RTL_AUTOLAND 0: a return stays in its circle']
@@ -226,14 +226,14 @@ def landing_text(returns: Returns) -> list[str]:
 
 
 def range_text(found: ReturnRange, returns: Returns, scenario: Scenario) -> str:
-    """Return the text of a time range: destination and outcome of its returns, and the worst of them."""
+    """Describe a time range: destination and outcome of its returns, and its worst return."""
     one = found.worst
     when = f"{found.first:.0f} s" if found.count == 1 else f"{found.first:.0f} to {found.last:.0f} s"
     reason = f" ({one.target.reason})" if one.target.reason else ""
-    return f"{when}: to {one.target.name}{reason}: {_outcome(one, found, returns, scenario)}"
+    return f"{when}: to {one.target.name}{reason}: {_range_outcome_text(one, found, returns, scenario)}"
 
 
-def _outcome(one: ReturnFlown, found: ReturnRange, returns: Returns, scenario: Scenario) -> str:
+def _range_outcome_text(one: ReturnFlown, found: ReturnRange, returns: Returns, scenario: Scenario) -> str:
     worst = "" if found.count == 1 else f"at worst from {one.time:.0f} s, "
     east, north, up = one.clearance_at
     where = f"{east:.0f} m east, {north:.0f} m north"
@@ -264,7 +264,7 @@ def _outcome(one: ReturnFlown, found: ReturnRange, returns: Returns, scenario: S
 
 
 def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
-    """Return a suggestion and the outcome of the returns with it."""
+    """Describe a remedy and the outcome of the returns with it."""
     changed = [f"{name} {value:g}" for name, value in remedy.parameters.items()]
     if remedy.rally is not None:
         many = "rally point" if len(remedy.rally) == 1 else "rally points"

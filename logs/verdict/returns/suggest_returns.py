@@ -80,7 +80,7 @@ class _Needs:
 
 
 def _requirements(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _Needs:
-    """Return the limits plus their margin, or the start's own values less the loss of the turn if smaller."""
+    """Return the limits plus a margin, or, if smaller, the start's own values less the height lost in the turn."""
     rows = starts.rows
     outside = np.full(len(starts), math.inf)
     clear = np.nan_to_num(heights_above_ground(world, starts), nan=math.inf)
@@ -96,19 +96,19 @@ def _requirements(world: ReturnWorld, starts: ReturnStarts, margin: float = MARG
 
 
 def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
-    """Return True for each RTL return (n,) that keeps the limits themselves, by the point mass alone."""
+    """Flag each RTL return that stays within the limits, without margin, in the point-mass simulation alone, (n,)."""
     return _returns_meeting(world, starts, _requirements(world, starts, 0.0), _keeps_all)
 
 
 def _keeps_ground(_world: ReturnWorld, flown: Records, needs: _Needs) -> Flags:
-    """Return True for each return that keeps its required height above ground, and arrives."""
+    """Flag each return that stays above its required height above ground, and arrives, (n,)."""
     return np.asarray((flown["ended"] == RETURN_ARRIVED) & (flown["clearance"] >= needs.clearance))
 
 
 def _keeps_all(world: ReturnWorld, flown: Records, needs: _Needs) -> Flags:
-    """Return True for each return that also stays outside spheres.
+    """Flag each return that stays above its required height, arrives, and stays outside spheres, (n,).
 
-    Zones and energy are checked for the whole set.
+    `_targets_meeting` checks zones and energy.
     """
     return np.asarray(_keeps_ground(world, flown, needs) & (flown["outside"] >= needs.outside))
 
@@ -117,7 +117,7 @@ Keeps = Callable[[ReturnWorld, Records, _Needs], Flags]
 
 
 def _returns_meeting(world: ReturnWorld, starts: ReturnStarts, needs: _Needs, keeps: Keeps) -> Flags:
-    """Return True for each return that meets the requirements; with `_keeps_all` also zones and energy."""
+    """Flag each return that meets the requirements, (n,); with `_keeps_all`, check zones and energy too."""
     return _targets_meeting(world, starts, [world.target(row) for row in starts.rows], needs, keeps)
 
 
@@ -138,7 +138,7 @@ def _targets_meeting(
 
 
 class _ReturnTrial:
-    """Trial of a world from all starts, first those that failed before."""
+    """Trial of a world from all starts, which tries the starts that failed before first."""
 
     def __init__(self, starts: ReturnStarts, needs: _Needs) -> None:
         self._starts, self._needs = starts, needs
@@ -155,9 +155,9 @@ class _ReturnTrial:
 
 
 def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]:
-    """Return the least RTL_ALTITUDE that clears the ground, the least safe one, or a climb first.
+    """Suggest the lowest RTL_ALTITUDE that clears the ground, the lowest safe one, or a climb before the turn.
 
-    Altitudes are tried one by one: a higher one is not certain to be safer, because it may lead through a sphere.
+    Altitudes are tried one by one, because a higher altitude may lead through a sphere and so be less safe.
     """
     needs = _requirements(world, starts)
     trial = _ReturnTrial(starts, needs)
@@ -173,7 +173,7 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
     higher = [float(one) for one in altitudes]
 
     def least_altitude(least: float, keeps: Keeps) -> float | None:
-        """Return the least altitude from ``least`` on with which all returns meet the requirements, or None."""
+        """Return the lowest altitude, at least ``least``, with which all returns meet the requirements, or None."""
         return first_that_passes(
             (one for one in higher if one >= least),
             lambda altitude: trial.passes(world.with_parameters(RTL_ALTITUDE=altitude), keeps),
@@ -186,12 +186,12 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
     if clear is not None and clear not in (above, lowest):
         found.append(Remedy({"RTL_ALTITUDE": clear}))
     if clear is None:
-        found += _climbs(world, trial, above)
+        found += _suggest_climbs(world, trial, above)
     return found
 
 
-def _climbs(world: ReturnWorld, trial: _ReturnTrial, altitude: float | None) -> list[Remedy]:
-    """Return a climb before the turn, alone or with an altitude, that is good for all returns."""
+def _suggest_climbs(world: ReturnWorld, trial: _ReturnTrial, altitude: float | None) -> list[Remedy]:
+    """Suggest a climb before the turn, alone or with an altitude, with which all returns meet the requirements."""
     options = float(int(world.parameters.flight_options) | CLIMB_BEFORE_TURN)
     tried = [{"RTL_CLIMB_MIN": climb} for climb in _CLIMBS_M] + [{"FLIGHT_OPTIONS": options}]
     if altitude is not None:
@@ -228,9 +228,9 @@ _PAIR_SEEDS = 30
 
 
 def suggest_rally(world: ReturnWorld, starts: ReturnStarts) -> Remedy | None:
-    """Return the fewest rally points found that make most returns safe, or None if none help.
+    """Suggest the fewest rally points that make as many returns safe as possible, or None if no point helps.
 
-    Greedy by the autopilot's own choice, then swaps, then removal of superfluous points.
+    Add points greedily, given the autopilot's own choice between them, then swap points, then remove superfluous ones.
     """
     needs, total = _requirements(world, starts), len(starts)
     # Without the mission's own rally points, all returns go home.
@@ -284,9 +284,9 @@ def _search_in_rounds(
 
 
 def _candidates(world: ReturnWorld, starts: ReturnStarts, pitch: float, near: float) -> list[ReturnPlace]:
-    """Return places near the path whose loiter is above ground and outside spheres, low and 200 m higher.
+    """Return candidate rally points near the path whose loiters are clear of ground and spheres, low and 200 m higher.
 
-    pitch: grid spacing, m, increased if there are too many.  near: greatest distance from the path, m.
+    pitch: grid spacing, m, increased if there are too many candidates.  near: maximum distance from the path, m.
     """
     east, north = starts.rows["east"], starts.rows["north"]
     while True:
@@ -313,7 +313,7 @@ def _candidates(world: ReturnWorld, starts: ReturnStarts, pitch: float, near: fl
 
 
 def _highest_ground(world: ReturnWorld, east: float, north: float) -> float:
-    """Return the highest ground within the loiter about a place, m AMSL; NaN if some of it is unknown."""
+    """Return the highest ground within the loiter around a place, m AMSL; NaN if part of the ground is unknown."""
     if world.scenario.terrain is None:
         return world.home.up
     angles = np.arange(16) * (math.pi / 8.0)
@@ -330,9 +330,9 @@ def _sphere_clearance(world: ReturnWorld, place: tuple[float, float, float]) -> 
 
 
 class _Search:
-    """Search for rally points by which returns to each candidate are good.
+    """Search for rally points, based on which returns to each candidate meet the requirements.
 
-    These are simulated when first needed.
+    Returns to the candidates are simulated when first needed.
     """
 
     def __init__(
@@ -359,7 +359,7 @@ class _Search:
         return self._without_superfluous(asked, chosen)
 
     def _with_best_addition(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
-        """Return the set with the best point added; or the best two if one alone gains nothing."""
+        """Return the set with the best point added, or with the best pair if no single point is an improvement."""
         every = range(len(self.places))
         counts = [self._count(searched, [*chosen, c]) for c in every]
         if max(counts) > self._count(searched, chosen):
@@ -398,7 +398,7 @@ class _Search:
         return int(good.sum())
 
     def _with_swaps(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
-        """Return the same number of points, each swapped for a better one while there is one."""
+        """Return a set of the same size, after swapping points for better ones until no swap is an improvement."""
         best, improved = self._count(searched, chosen), True
         while improved:
             improved = False

@@ -1,4 +1,4 @@
-"""The bounds rule: the least distance inside the area's box, its floor and its ceiling."""
+"""The bounds rule: judge the minimum distance inside the area's box, its floor and its ceiling."""
 
 import math
 
@@ -18,19 +18,19 @@ from world.arrays import Floats
 def bounds_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the least distance inside the area's box, its floor and its ceiling: one finding."""
+    """Judge the minimum distance inside the area's box, its floor and its ceiling, with one finding."""
     scenario = requirements.setup.scenario
     if scenario.external:
         reason = "the mission came without a scenario, so there is no area to stay in"
         return [make_finding("bounds", FLIGHT, ok=None, reason=reason, unit="m")]
-    planned, side, k = _inside_box(requirements, requirements.points)
+    planned, side, k = _min_distance_inside(requirements, requirements.points)
     found, at = planned, f"at {place_text(requirements.waypoint(k))}"
     ok: bool | None = planned >= -ROUNDING_M
     flown_margin = math.nan
     if not geometric and aligned is None:
         ok, at = None, "nothing was flown"
     elif aligned is not None:
-        found, side, k = _inside_box(requirements, aligned.track.position)
+        found, side, k = _min_distance_inside(requirements, aligned.track.position)
         flown_margin, ok = found, found >= -ROUNDING_M
         at = f"at {aligned.track.time[k]:.1f} s"
     where = f"{abs(found):.0f} m {'inside' if found >= 0.0 else 'beyond'} the {side} {at}"
@@ -53,8 +53,8 @@ def bounds_findings(
     ]
 
 
-def _inside_box(requirements: RouteRequirements, points: Floats) -> tuple[float, str, int]:
-    """Return the least distance inside the box (negative: outside), the nearest side, and the row."""
+def _min_distance_inside(requirements: RouteRequirements, points: Floats) -> tuple[float, str, int]:
+    """Return the minimum distance inside the box, m (negative if outside), its side's name, and the row of `points`."""
     scenario = requirements.setup.scenario
     (west, east), (south, north) = scenario.bounds
     inside = {

@@ -1,4 +1,4 @@
-"""The clearance rule: the least height above ground on each leg, planned and flown."""
+"""The clearance rule: judge the minimum height above ground on each leg, planned and flown."""
 
 import math
 from typing import NamedTuple
@@ -28,7 +28,7 @@ from world.terrain import Terrain
 def clearance_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the least height above ground on each leg."""
+    """Judge the minimum height above ground on each leg."""
     ground = requirements.setup.scenario.terrain
     limit = requirements.limits.min_clearance
     if ground is None:
@@ -43,8 +43,8 @@ def clearance_findings(
             unit="m",
             at_least=True,
         )
-        return [unknown, *_below_home(requirements)]
-    near = _near_ground(requirements)
+        return [unknown, *_below_home_findings(requirements)]
+    near = _fields_by_leg(requirements)
     legs, points = requirements.path.legs, requirements.path.points
     low, _ = path_clearance(ground.heights, ground.to_pixel.record, points)
     out = []
@@ -57,11 +57,11 @@ def clearance_findings(
         else:
             short = planned < least - CLEARANCE_TOLERANCE_M
             out.append(_flown_clearance(requirements, aligned, leg, planned, requirement, planned_short=short))
-    return [*_home_above_ground(requirements, ground, out), *out]
+    return [*_home_above_ground_findings(requirements, ground, out), *out]
 
 
-def _below_home(requirements: RouteRequirements) -> list[Finding]:
-    """Report a lowest point below home as undecided.
+def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
+    """Report a route that goes below home as undecided.
 
     Without terrain the ground is assumed at home's altitude.
     """
@@ -78,8 +78,8 @@ def _below_home(requirements: RouteRequirements) -> list[Finding]:
     return [make_finding("clearance", place, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
 
 
-def _home_above_ground(requirements: RouteRequirements, ground: Terrain, legs: list[Finding]) -> list[Finding]:
-    """Report a route over home as undecided if it is too low once home is on the ground.
+def _home_above_ground_findings(requirements: RouteRequirements, ground: Terrain, legs: list[Finding]) -> list[Finding]:
+    """Report a route with heights above home as undecided if it becomes too low once home is on the ground.
 
     An autopilot sets home on the ground when it is armed there.
 
@@ -102,16 +102,17 @@ def _home_above_ground(requirements: RouteRequirements, ground: Terrain, legs: l
 
 
 class _Requirement(NamedTuple):
-    """Required height above ground on a leg: less near a flown take-off or landing.
+    """Required height above ground on a leg, which is reduced near a flown take-off or landing.
 
-    limit: m, elsewhere.  fields: east and north of nearby homes and landing points, m.
+    limit: required height away from these places, m.
+    fields: east and north of nearby homes and landing points, m.
     """
 
     limit: float
     fields: tuple[tuple[float, float], ...]
 
     def of(self, points: Floats) -> Floats:
-        """Return the requirement at places (n, 3), (n,) m."""
+        """Return the required height above ground at points (n, 3), (n,) m."""
         requirement = np.full(len(points), self.limit)
         for east, north in self.fields:
             away = np.hypot(points[:, 0] - east, points[:, 1] - north)
@@ -119,9 +120,11 @@ class _Requirement(NamedTuple):
         return requirement
 
     def worst(self, low: Floats, points: Floats) -> tuple[float, float]:
-        """Return the height above ground with the least margin, and its requirement, m.
+        """Return the height above ground with the smallest margin, and the required height there, m.
 
-        low: heights (n,) at places (n, 3).  NaN for the height if one is unknown, or without heights.
+        low: heights above ground at `points` (n, 3), m, (n,).
+
+        The returned height is NaN if any height is unknown, or if `low` is empty.
         """
         if not low.size or np.isnan(low).any():
             return math.nan, self.limit
@@ -129,7 +132,7 @@ class _Requirement(NamedTuple):
         return float(low[k]), requirement
 
     def least(self, low: Floats, points: Floats) -> tuple[int, float]:
-        """Return the index of the known height (n,) with the least margin, and the requirement there, m."""
+        """Return the index of the known height with the smallest margin, and the required height there, m."""
         if not self.fields:
             return int(np.nanargmin(low)), self.limit
         requirement = self.of(points)
@@ -137,11 +140,12 @@ class _Requirement(NamedTuple):
         return k, float(requirement[k])
 
 
-def _near_ground(requirements: RouteRequirements) -> dict[int, tuple[tuple[float, float], ...]]:
-    """Return homes and landing points, m, by the legs after a flown take-off and before a flown landing.
+def _fields_by_leg(requirements: RouteRequirements) -> dict[int, tuple[tuple[float, float], ...]]:
+    """Return the places (east, north), m, near which a leg needs less height above ground, by leg number.
 
-    The legs before a landing begin at DO_LAND_START, or else are the last two.  Of them the final is included, and the
-    legs from the last waypoint that meets the limit on height above ground.
+    The leg after a flown take-off has the home, and the legs before a flown landing have the landing point.  The legs
+    before a landing begin at DO_LAND_START, or are the last two legs if the mission has none.  Only the legs after the
+    last waypoint that meets the limit on height above ground count, and the final in any case.
     """
     setup, ground = requirements.setup, requirements.ground
     ways = setup.ground_ways if ground is None else ground.ways
@@ -162,9 +166,9 @@ def _near_ground(requirements: RouteRequirements) -> dict[int, tuple[tuple[float
 
 
 def _last_clear_waypoint(requirements: RouteRequirements, final: int) -> int:
-    """Return the last waypoint up to the final's start that meets the limit above ground.
+    """Return the last waypoint up to the start of the final that meets the limit on height above ground.
 
-    The final's start if none does.
+    Return the start of the final if no waypoint meets the limit.
     """
     terrain, waypoints = requirements.setup.scenario.terrain, requirements.setup.route.waypoints[: final + 1]
     if terrain is None:
@@ -175,12 +179,12 @@ def _last_clear_waypoint(requirements: RouteRequirements, final: int) -> int:
 
 
 def _source(requirements: RouteRequirements, limit: float) -> str:
-    """Return the source of a limit (m)."""
+    """Return the name of the source of a limit (m) on height above ground."""
     return "near the field" if limit < requirements.limits.min_clearance else requirements.limits_source
 
 
 def _terrain_error_text(clearance: float, limit: float, error: float | None) -> str:
-    """Return a clearance (m) less the terrain's stated error, in words; "" if none is stated."""
+    """Describe a clearance (m) reduced by the terrain's stated error; return "" if no error is stated."""
     if error is None or math.isnan(clearance):
         return ""
     short = f", less than the {limit:.0f} m required" if limit - CLEARANCE_TOLERANCE_M > clearance - error else ""
@@ -262,7 +266,7 @@ def _flown_clearance(
 
 
 def _when_and_where(aligned: AlignedTrack, k: int, fraction: float) -> str:
-    """Return when and where the aircraft was at this fraction of a segment, in words."""
+    """Describe when and where the aircraft was at a fraction of track segment `k`."""
     time = aligned.track.time
     return f"at {time[k] + fraction * (time[k + 1] - time[k]):.1f} s, {aligned.where(k, fraction)}"
 

@@ -1,4 +1,4 @@
-"""The completion rule: planned feasibly, flown to the last waypoint, recorded whole and consistently."""
+"""The completion rule: judge if a flight was planned feasibly, flown to its end and recorded completely."""
 
 from collections.abc import Iterable, Sequence
 
@@ -19,13 +19,13 @@ from logs.verdict.wording import place_text_within
 def completion_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge completion: planned feasibly, flown to the last waypoint, recorded whole and consistently."""
+    """Judge if a flight was planned feasibly, flown to the last waypoint, and recorded completely and consistently."""
     plan = requirements.setup.plan
     faults = []
     if plan is not None and not plan.feasible:
         faults.append(message("the plan is not feasible"))
     if ended != "completed":
-        faults.append(message(f"the flight ended early: {ended}", _ending_place(requirements, aligned)))
+        faults.append(message(f"the flight ended early: {ended}", _ending_place_text(requirements, aligned)))
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
     legs, numbers = 0, requirements.setup.route.leg_numbers
@@ -60,8 +60,8 @@ def completion_findings(
     ]
 
 
-def _ending_place(requirements: RouteRequirements, aligned: AlignedTrack | None) -> str:
-    """Return on which leg and at which place a flight ended before its last waypoint, in words."""
+def _ending_place_text(requirements: RouteRequirements, aligned: AlignedTrack | None) -> str:
+    """Describe the leg and place where a flight ended early; return "" if it reached the last waypoint."""
     if aligned is None or aligned.passed[-1]:
         return ""
     row = len(aligned.track) - 1
@@ -91,11 +91,11 @@ _RETURN_MODE = "RTL"
 
 
 def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_complete: bool) -> Finding:
-    """Judge how much of the mission the log shows; a log that ends en route says nothing about the rest."""
+    """Judge how much of the mission the log shows; a log that ends en route leaves the other legs undecided."""
     last_leg, faults, unknown, known = setup.route.legs - 1, [], [], []
     done = {leg for one in flown for leg in range(one.first, one.last - one.partial)}
     every = len(set(setup.route.leg_numbers.tolist()))
-    finished = every - len(_numbers(setup, set(range(setup.route.legs)) - done))
+    finished = every - len(_leg_numbers(setup, set(range(setup.route.legs)) - done))
     missing = None if setup.source is None else setup.source.missing
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
@@ -150,7 +150,7 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
 
 
 def _unflown_legs(setup: FlightSetup, flown: Sequence[FlownLegs], done: set[int]) -> tuple[list[int], list[str]]:
-    """Return legs that no stretch flew, and what the log does not show of others, in words."""
+    """Return the legs that no stretch flew, and a text for each group of legs that the log may not show completely."""
     absent = [leg for leg in range(setup.route.legs) if leg not in done]
     unseen = setup.source is not None and setup.source.begins_in_flight
     before = [leg for leg in absent if unseen and leg < flown[0].first]
@@ -161,7 +161,7 @@ def _unflown_legs(setup: FlightSetup, flown: Sequence[FlownLegs], done: set[int]
 
 
 def _gaps_text(flown: Sequence[FlownLegs]) -> list[str]:
-    """Return a line on the gaps between the rows of the judged stretches, if there are any."""
+    """Describe the gaps between the rows of the judged stretches in one line; return [] without gaps."""
     gaps = [gap for one in flown for gap in gaps_between(one, one.stretch.start, one.stretch.end)]
     if not gaps:
         return []
@@ -172,14 +172,14 @@ def _gaps_text(flown: Sequence[FlownLegs]) -> list[str]:
     ]
 
 
-def _numbers(setup: FlightSetup, legs: Iterable[int]) -> list[int]:
-    """Return the numbers of some legs, each once: all legs around a loiter have one number."""
+def _leg_numbers(setup: FlightSetup, legs: Iterable[int]) -> list[int]:
+    """Return the distinct numbers of some legs, sorted; all legs around a loiter share one number."""
     return sorted({int(setup.route.leg_numbers[leg]) for leg in legs})
 
 
 def _legs_text(setup: FlightSetup, legs: Iterable[int]) -> str:
-    """Return the numbers of legs in words: "leg 3 is", "legs 3 to 10 are", "8 legs from 1 to 12 are"."""
-    numbers = _numbers(setup, legs)
+    """Phrase the numbers of legs, such as "leg 3 is", "legs 3 to 10 are" or "8 legs from 1 to 12 are"."""
+    numbers = _leg_numbers(setup, legs)
     first, last = numbers[0], numbers[-1]
     if first == last:
         return f"leg {first} is"

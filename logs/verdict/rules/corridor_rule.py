@@ -1,4 +1,4 @@
-"""The corridor rule: the greatest distance of the flight from the legs, its turns included."""
+"""The corridor rule: judge the maximum distance of the flight, including its turns, from the legs."""
 
 import math
 
@@ -15,10 +15,11 @@ from logs.verdict.tolerances import ROUNDING_M, RUNWAY_COURSE_TOLERANCE_RAD
 def corridor_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the distance of each leg's flight, or of its planned turns (``geometric``), from the legs.
+    """Judge how far the flight of each leg, or its planned turns (``geometric``), deviates from the legs.
 
-    In a survey, and on the legs to it and from it, only an explicitly stated corridor applies: the survey rule judges
-    the distance from its lines, and the turns onto the first line and off the last are the autopilot's own.
+    In a survey, and on the legs that lead to the survey and away from it, only an explicitly stated corridor applies,
+    because the survey rule judges the distance from the photo lines, and the autopilot chooses its turns onto the first
+    line and off the last line.
     """
     stated = requirements.setup.scenario.limits.corridor_m is not None
     return [
@@ -66,10 +67,10 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
 
 
 def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, limit: float) -> slice:
-    """Return a leg's rows; after a take-off, from where the aircraft first flies along it.
+    """Return the rows of a leg; for the leg after a take-off, only the rows since the aircraft joined the leg.
 
-    That is on the leg's course and within the limit (m) of its line.  A take-off ends on its launch course, whatever
-    the course of the leg from there.
+    The aircraft has joined the leg once it flies on the leg's course and within the limit (m) of its line.  A take-off
+    ends on the launch course, which may differ from the course of the leg.
     """
     rows, ground = aligned.leg_rows(leg), requirements.ground
     if ground is None or ground.ways.take_off is None or ground.ways.take_off.waypoint != leg:

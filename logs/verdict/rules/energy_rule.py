@@ -1,4 +1,4 @@
-"""The energy rule: energy from battery or tank, predicted and flown, against the usable energy."""
+"""The energy rule: compare the energy from battery or tank, predicted and flown, with the usable energy."""
 
 import math
 
@@ -15,10 +15,10 @@ from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION, UNDECIDED_FRACTION
 def energy_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the energy used against the battery less its reserve.
+    """Compare the energy used with the battery's energy without its reserve.
 
-    An endless jump needs more than any battery.  A guessed battery is not judged, and energy that is not certainly
-    within the limit is undecided if the aircraft's power is uncertain; an imported log has it measured.
+    An endless jump exceeds any battery.  A guessed battery is not judged.  If the aircraft's power is uncertain, energy
+    that is not certainly within the limit is undecided, except in an imported log, which contains measured energy.
     """
     setup = requirements.setup
     usable = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
@@ -75,7 +75,7 @@ def energy_findings(
 
 
 def _endless_jump_message(requirements: RouteRequirements, usable: float) -> Message:
-    """Report that an endless jump is flown until the energy is used up, and how many rounds that lasts."""
+    """Report an endless jump, and the number of rounds after which the usable energy (Wh) is used up."""
     route = requirements.setup.route
     last = len(route.items) - 1
     begin = last
@@ -90,7 +90,7 @@ def _endless_jump_message(requirements: RouteRequirements, usable: float) -> Mes
 
 
 def _used_text(requirements: RouteRequirements, used: float, current: float) -> str:
-    """Return energy used (Wh) and the peak current (A), or the fuel used by an aircraft without a battery."""
+    """Describe the energy used (Wh) and the peak current (A), or the fuel used by an aircraft without a battery."""
     capacity = requirements.setup.battery
     if requirements.setup.envelope.power_level.size and not requirements.setup.envelope.volts:
         share = used / capacity

@@ -1,7 +1,7 @@
-"""The fence rule: how far planned path and flight go into exclusion zones, or out of inclusion zones.
+"""The fence rule: judge how far planned path and flight go into exclusion zones, or out of inclusion zones.
 
-The zones are the zones of the scenario and the mission's own fence.  The path's line is judged, including its arcs,
-loiters and jumps; a corridor that reaches into a zone is only reported.
+The zones are those of the scenario and of the mission's own fence.  The rule judges the path's line, including arcs,
+loiters and jumps; it only reports a corridor that reaches into a zone.
 """
 
 import math
@@ -28,7 +28,7 @@ _METHOD = "every point of each piece, arc and row"
 
 
 def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
-    """Return a test for whether a setup's planned path violates a zone beyond rounding.
+    """Return a function that tells if the setup's planned path violates a zone by more than rounding.
 
     >>> from logs.recording.example_log import example_log
     >>> from world.airspace.zones import Cylinder
@@ -47,7 +47,7 @@ def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
 def fence_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each zone that plan or flight violates, or report that all are kept; empty without zones."""
+    """Judge each zone that plan or flight touches, or report that no zone is violated; return [] without zones."""
     airspace = requirements.airspace
     out = []
     if airspace.fault:
@@ -58,7 +58,7 @@ def fence_findings(
         return [*out, make_finding("fence", FLIGHT, ok=None, reason="nothing was flown", unit="m", method=_METHOD)]
     terrain = requirements.setup.scenario.terrain
     if geometric and requirements.zones_on is not None:
-        return out + _violated_zones(requirements, *requirements.zones_on)
+        return out + _findings_on_legs(requirements, *requirements.zones_on)
     planned = path_zones(planned_moves(requirements), airspace.records, terrain)
     flown = None if aligned is None else path_zones(flown_moves(aligned), airspace.records, terrain)
     sides = [planned] if flown is None else [planned, flown]
@@ -72,8 +72,8 @@ def fence_findings(
     return out + touched
 
 
-def _violated_zones(requirements: RouteRequirements, first: int, last: int) -> list[Finding]:
-    """Return findings on zones that the planned path violates or touches on some legs, and on no others."""
+def _findings_on_legs(requirements: RouteRequirements, first: int, last: int) -> list[Finding]:
+    """Return findings for the zones that the planned path violates or touches on legs `first` to `last`."""
     airspace, path = requirements.airspace, requirements.path
     begin, end = np.searchsorted(path.legs, [first, last + 1]).tolist()
     numbers = airspace.about(path.points[begin : end + 1])
@@ -94,7 +94,7 @@ def _compliance_finding(requirements: RouteRequirements, planned: Records, flown
     if math.isfinite(margin) and not visits[nearest].unknown:
         facts = [Fact("nearest", margin, "m"), Fact("less the corridor", margin - corridor, "m")]
         name = place_text(airspace.place(nearest))
-        reason += f"; the nearest, {name}, is {margin:.1f} m away at {_where(requirements, visits[nearest], 'at')}"
+        reason += f"; the nearest, {name}, is {margin:.1f} m away at {_event_text(requirements, visits[nearest], 'at')}"
         if margin < corridor:
             reason += f", within the corridor of {corridor:.0f} m about the legs"
     return make_finding(
@@ -127,9 +127,9 @@ def _zone_finding(requirements: RouteRequirements, z: int, planned: Record, flow
         faults.append(
             message(
                 f"{visit.depth:.1f} m {side_text}",
-                f" at {_where(requirements, visit, 'at')}, for {visit.beyond:.1f} s in all:"
-                f" {stay} at {_where(requirements, visit, 'entry')}"
-                f" and is back at {_where(requirements, visit, 'exit')}"
+                f" at {_event_text(requirements, visit, 'at')}, for {visit.beyond:.1f} s in all:"
+                f" {stay} at {_event_text(requirements, visit, 'entry')}"
+                f" and is back at {_event_text(requirements, visit, 'exit')}"
                 + (f"; {visit.entries} times" if visit.entries > 1 else ""),
             )
         )
@@ -138,7 +138,9 @@ def _zone_finding(requirements: RouteRequirements, z: int, planned: Record, flow
     if visit.unknown:
         notes.append("the ground that it counts from is not known all along")
     if flown is not None and planned.depth > ROUNDING_M:
-        notes.append(f"the planned path is {planned.depth:.1f} m {side_text} at {_where(requirements, planned, 'at')}")
+        notes.append(
+            f"the planned path is {planned.depth:.1f} m {side_text} at {_event_text(requirements, planned, 'at')}"
+        )
     return make_finding(
         "fence",
         airspace.place(z),
@@ -153,12 +155,12 @@ def _zone_finding(requirements: RouteRequirements, z: int, planned: Record, flow
         margin=-visit.depth,
         unit="m",
         method=_METHOD,
-        facts=_facts(visit) if visit.depth > ROUNDING_M else (),
+        facts=_visit_facts(visit) if visit.depth > ROUNDING_M else (),
     )
 
 
-def _facts(visit: Record) -> list[Fact]:
-    """Return when and where a path violates a zone and complies again, in numbers."""
+def _visit_facts(visit: Record) -> list[Fact]:
+    """Return the time, place and leg at which a path first violates a zone and complies again."""
     facts = [Fact("time beyond", visit.beyond, "s"), Fact("entries", float(visit.entries), "1")]
     for event in ("entry", "exit"):
         for what, unit in (("time", "s"), ("east", "m"), ("north", "m"), ("up", "m"), ("leg", "1")):
@@ -167,17 +169,17 @@ def _facts(visit: Record) -> list[Fact]:
 
 
 def _source(requirements: RouteRequirements, z: int) -> str:
-    """Return the source of a zone.
+    """Return the name of the source of a zone: "mission", "scenario" or "fence".
 
-    For a mission without a scenario, "fence" is a zone given with the command.
+    Without a scenario, a zone given on the command line has the source "fence".
     """
     if z >= requirements.airspace.of_scenario:
         return "mission"
     return "fence" if requirements.setup.scenario.external else "scenario"
 
 
-def _where(requirements: RouteRequirements, visit: Record, event: str) -> str:
-    """Return when and where a path was at an event of a visit, in words."""
+def _event_text(requirements: RouteRequirements, visit: Record, event: str) -> str:
+    """Describe the time, place and leg of an event ("entry", "exit" or "at") of a visit to a zone."""
     leg = place_text(requirements.leg(int(visit[f"{event}_leg"])))
     time, east, north, up = (visit[f"{event}_{name}"] for name in ("time", "east", "north", "up"))
     return f"{time:.1f} s, east {east:.0f} m, north {north:.0f} m, {up:.0f} m AMSL ({leg})"

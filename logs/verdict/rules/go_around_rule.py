@@ -1,11 +1,11 @@
-"""The go-around rule: the path of an aborted landing by ArduPlane's control law.
+"""The go-around rule: judge the path of an aborted landing, flown by ArduPlane's control law.
 
-A go-around is no item of the mission: it can be commanded anywhere on the glide.  So it is simulated from several
-places of the glide that the autopilot lays out, by ArduPlane's law on a point mass
-(`flight.autopilots.arduplane.go_around_point_mass`), back to the last place before the glide, and judged as flown.  A
-go-around that never gets there fails, and one whose path is not fully known is undecided.  It climbs on the landing
-course to a height above home, whatever the altitude of the field, and only then turns: from a field higher than home it
-may turn into a hill at once.
+A go-around is not an item of the mission; it can be commanded anywhere on the glide.  The rule therefore simulates it
+from several places on the glide that the autopilot lays out, with ArduPlane's law on a point mass
+(`flight.autopilots.arduplane.go_around_point_mass`), back to the last place before the glide, and judges the simulated
+path.  A go-around that never gets back fails, and one whose path is not fully known is undecided.  A go-around climbs
+on the landing course to a height above home, regardless of the altitude of the field, and only then turns.  From a
+field higher than home it may therefore turn into a hill at once.
 """
 
 import math
@@ -41,13 +41,13 @@ from world.arrays import Floats
 from world.kernels import Record, Records
 from world.terrain import Terrain
 
-# Step of the heights above home that are tried, m.
+# Step between the climb heights above home that `_next_sufficient_height` tries, m.
 _HEIGHT_STEP_M = 5.0
-# Greatest height above home that is tried, m.
+# Maximum climb height above home that `_next_sufficient_height` tries, m.
 _MAX_HEIGHT_M = 1000.0
-# Distance between the places on a glide where it is aborted, m.
+# Distance between the simulated abort places on a glide, m.
 _ABORT_SPACING_M = 50.0
-# Largest number of such places.
+# Maximum number of simulated abort places.
 _MAX_ABORT_PLACES = 12
 _NO_HEIGHT_TEXT = "no height would do"
 # Pitch of the climb if the mission has no take-off, rad (`Plane::do_land`, ArduPlane/commands_logic.cpp).
@@ -58,11 +58,20 @@ _CLIMB_PITCH_RAD = math.radians(10.0)
 class _Landing:
     """Landing that may be aborted.
 
-    at: its waypoint.  glide: to the point (3,) m, at the mission's altitude; ground: m AMSL, under the point.
-    course: rad.  run: of the last leg, m.  high: altitude where the glide begins, m AMSL.  airspeed: on it, true, m/s.
-    pitch: of the climb, rad.  height: of the climb's end above home, m; home: m AMSL.
-    landings: the landing sequences to one of which the go-around flies, or else the place before.
-    item: of the landing.  open: why its go-around is unknown, "" if it is known.
+    at: waypoint of the landing.
+    glide: glide to the landing point.
+    point: landing point at the mission's altitude, m, (3,).
+    ground: altitude of the ground at the landing point, m AMSL.
+    course: landing course, rad.
+    run: length of the last leg, m.
+    high: altitude where the glide begins, m AMSL.
+    airspeed: true airspeed on the glide, m/s.
+    pitch: pitch angle of the climb, rad.
+    home: altitude of home, m AMSL.
+    height: height above home at which the climb ends, m.
+    landings: landing sequences to one of which the go-around flies, or else the place before the landing.
+    item: mission item of the landing.
+    open: reason why the path of the go-around is unknown, "" if it is known.
     """
 
     at: int
@@ -81,7 +90,7 @@ class _Landing:
     open: str
 
     def place(self, before: float) -> tuple[float, float, float]:
-        """Return east, north and up of the glide at a distance before the landing point, m."""
+        """Return the glide's east, north and up at a distance (m) before the landing point, m."""
         low = float(self.point[2])
         up = low + self.glide.flare_height + self.glide.slope * (before - self.glide.flare_distance)
         east = float(self.point[0]) - before * math.sin(self.course)
@@ -90,17 +99,19 @@ class _Landing:
 
 
 class _Aborted(NamedTuple):
-    """Aborted landing.
+    """Aborted landing and its go-around.
 
-    before: where, m before the landing point.  over: height above ground there, m.
-    at_once: True if it is already as high as its climb goes.
-    room: height above ground at the place with the least margin after the climb, or the least height anywhere if it
-        hits the ground; inf if unknown, m.  needed: required height there, m.
-    climb: least height above ground in its climb beyond the landing point, m; inf without one.
-    after: s from the abort to ground impact, NaN without one.
-    entered: the sphere or zone that it enters, "" for none.
-    lost: True if it does not get back to the line-up.
-    open: the unknown part, "" for none.
+    before: distance of the abort before the landing point, m.
+    over: height above ground at the abort, m.
+    at_once: True if the aircraft is already above the end of the climb.
+    room: height above ground where its margin after the climb is smallest, or the minimum height anywhere if the
+        go-around hits the ground, m; inf if unknown.
+    needed: required height at that place, m.
+    climb: minimum height above ground in the climb beyond the landing point, m; inf without a climb.
+    after: time from the abort to ground impact, s; NaN without impact.
+    entered: sphere or zone that the go-around enters, "" if it enters none.
+    lost: True if the go-around does not get back to the line-up.
+    open: text on the unknown part of the path, "" if all is known.
     """
 
     before: float
@@ -116,12 +127,12 @@ class _Aborted(NamedTuple):
 
     @property
     def is_free(self) -> bool:
-        """True if no known part of it is wrong."""
+        """True if no fault is known."""
         return math.isnan(self.after) and not self.entered and not self.lost and self.room >= self.needed
 
     @property
     def badness(self) -> tuple[bool, bool, bool, float]:
-        """Sort key, the worst last."""
+        """Sort key that puts the worst go-around last."""
         return not math.isnan(self.after), bool(self.entered), self.lost, self.needed - self.room
 
 
@@ -151,7 +162,7 @@ def go_around_findings(
 
 
 def _landing(requirements: RouteRequirements, ground: Terrain, at: int, item: MissionItem) -> _Landing | None:
-    """Return the landing at a waypoint, or None if its glide or its go-around is not known."""
+    """Return the landing at waypoint `at`, or None if its glide or the height of its go-around is not known."""
     setup, leg = requirements.setup, at - 1
     begin, end = requirements.points[leg], requirements.points[at]
     run, course = float(requirements.runs[leg]), float(requirements.courses[leg])
@@ -160,7 +171,7 @@ def _landing(requirements: RouteRequirements, ground: Terrain, at: int, item: Mi
     first, takeoff = first_item(requirements)
     climbed = 0.0 if takeoff is None else float(requirements.points[first, 2]) - home
     height = setup.autopilot.go_around_height(item.params[0], climbed)
-    landings = _landings(requirements, at)
+    landings = _go_around_destinations(requirements, at)
     low, under = setup.route.landing_ground, float(ground.height(float(end[0]), float(end[1])))
     if height is None or math.isnan(home + low + under) or run < MIN_LEG_LENGTH_M or begin[2] <= low:
         return None
@@ -184,8 +195,8 @@ def _landing(requirements: RouteRequirements, ground: Terrain, at: int, item: Mi
     )
 
 
-def _landings(requirements: RouteRequirements, at: int) -> tuple[LandingStart, ...]:
-    """Return the places to which a go-around flies: landing sequences, or the place before the landing."""
+def _go_around_destinations(requirements: RouteRequirements, at: int) -> tuple[LandingStart, ...]:
+    """Return the landing sequences to which a go-around may fly, or else the place before the landing."""
     setup = requirements.setup
     mission, origin, terrain = setup.mission, setup.scenario.origin, setup.scenario.terrain
     before = int(setup.route.items[at - 1])
@@ -194,7 +205,7 @@ def _landings(requirements: RouteRequirements, at: int) -> tuple[LandingStart, .
 
 
 def _unknown_path_text(requirements: RouteRequirements, item: MissionItem, landings: tuple[LandingStart, ...]) -> str:
-    """Return why the path of a go-around is not known; "" if it is known."""
+    """Explain why the path of a go-around is not known; return "" if it is known."""
     after = next((one for one in requirements.setup.mission.items if one.seq == item.seq + 1), None)
     # This takes precedence over landing sequences (`AP_Landing::restart_landing_sequence`).
     if after is not None and after.command == Command.NAV_CONTINUE_AND_CHANGE_ALT and int(after.params[0]) in (0, 1):
@@ -209,7 +220,11 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
     # A go-around flies to no rally point.
     setup = requirements.setup
     world = return_world(replace(setup, mission=replace(setup.mission, rally=())))
-    flown = [] if landing.open else _simulate(requirements, ground, world, landing, height, _abort_places(landing))
+    flown = (
+        []
+        if landing.open
+        else _simulate_go_arounds(requirements, ground, world, landing, height, _abort_places(landing))
+    )
     worst = max(flown, key=lambda one: one.badness, default=None)
     unknown = landing.open or next((one.open for one in flown if one.open), "")
     climb = Fact("climb above ground", min((one.climb for one in flown), default=math.inf), "m")
@@ -249,13 +264,13 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
 
 
 def _abort_places(landing: _Landing) -> Floats:
-    """Return where a glide is aborted: (n,) m before the landing point, up to its flare or touchdown."""
+    """Return the simulated abort places up to flare or touchdown, as distances before the landing point, m, (n,)."""
     last = min(landing.run, max(landing.glide.flare_distance, EARLY_TOUCHDOWN_DISTANCE_M))
     count = min(_MAX_ABORT_PLACES, max(2, math.ceil((landing.run - last) / _ABORT_SPACING_M) + 1))
     return np.linspace(landing.run, last, count)
 
 
-def _simulate(
+def _simulate_go_arounds(
     requirements: RouteRequirements,
     ground: Terrain,
     world: ReturnWorld,
@@ -263,9 +278,10 @@ def _simulate(
     height: float,
     places: Sequence[float] | Floats,
 ) -> list[_Aborted]:
-    """Simulate go-arounds from places on the glide that are above the ground.
+    """Simulate and judge go-arounds from the places on the glide that are above the ground.
 
-    height: above home, m.  places: m before the landing point.
+    height: height above home at which the climb ends, m.
+    places: distances before the landing point, m.
     """
     top = landing.home + height
     begins = [(float(before), landing.place(float(before))) for before in places]
@@ -298,10 +314,12 @@ def _judge_go_around(
     goal: LandingStart,
     top: float,
 ) -> _Aborted:
-    """Judge a simulated go-around.
+    """Return `state` completed with the judgement of its simulated go-around.
 
-    flown: of `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.  positions: (n, 3) m, a second apart.
-    goal: its destination.  top: altitude above which its climb is over, m AMSL.
+    flown: record with dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.
+    positions: one point a second, m, (n, 3).
+    goal: destination of the go-around.
+    top: altitude above which the climb is over, m AMSL.
     """
     rows, ended = climb_rows(positions, top), int(flown["ended"])
     state = state._replace(lost=ended == RETURN_TIMEOUT, open=_unknown_part_text(ended, climbs=rows < len(positions)))
@@ -335,9 +353,10 @@ def _judge_go_around(
 
 
 def _unknown_part_text(ended: int, *, climbs: bool) -> str:
-    """Return the unknown part of a go-around, "" for none.
+    """Describe the unknown part of a go-around; return "" if the path is known.
 
-    It follows from how it ended, and whether it climbs to its height.
+    ended: status with which the simulation ended.
+    climbs: True if the go-around reaches the height at which its climb ends.
     """
     if ended != RETURN_OFF_TERRAIN:
         return ""
@@ -345,9 +364,9 @@ def _unknown_part_text(ended: int, *, climbs: bool) -> str:
 
 
 def _required_heights(ground: Terrain, goal: LandingStart, points: Floats) -> Floats:
-    """Return the required height above ground (n,) at points (n, 3) of the path back, m.
+    """Return the required height above ground at points (n, 3) of the path back, m, (n,).
 
-    Less near lower goals.
+    Near a destination that is lower than `GO_AROUND_CLEARANCE_M`, the destination's own height is required.
     """
     minimum = np.full(len(points), GO_AROUND_CLEARANCE_M)
     for east, north, up in (one.place for one in (goal, *goal.onward)):
@@ -361,15 +380,17 @@ def _required_heights(ground: Terrain, goal: LandingStart, points: Floats) -> Fl
 def _next_sufficient_height(
     requirements: RouteRequirements, ground: Terrain, world: ReturnWorld, landing: _Landing, worst: float
 ) -> float:
-    """Return the next height above home (m) that is enough, in steps; NaN if none is.
+    """Return the next climb height above home at which all go-arounds are free, m; NaN if no height is sufficient.
 
-    worst: the place that is tried first, m before the landing point.
+    worst: distance before the landing point of the abort place to try first, m.
+
+    Heights are tried in steps of `_HEIGHT_STEP_M` up to `_MAX_HEIGHT_M`.
     """
     first = _HEIGHT_STEP_M * math.ceil(landing.height / _HEIGHT_STEP_M + 1e-9)
     order = [worst, *_abort_places(landing).tolist()]
     for up in np.arange(first, _MAX_HEIGHT_M + 1.0, _HEIGHT_STEP_M).tolist():
         for before in order:
-            flown = _simulate(requirements, ground, world, landing, up, [before])
+            flown = _simulate_go_arounds(requirements, ground, world, landing, up, [before])
             if not all(one.is_free and not one.open for one in flown):
                 # Try the next height first at the place where this one was not enough.
                 order[0] = before
@@ -380,7 +401,7 @@ def _next_sufficient_height(
 
 
 def _brief_outcome(worst: _Aborted) -> str:
-    """Return the outcome of the worst go-around, in a few words."""
+    """Describe the outcome of the worst go-around in a few words."""
     if not math.isnan(worst.after):
         return "a go-around meets the ground"
     if worst.entered:
@@ -389,7 +410,7 @@ def _brief_outcome(worst: _Aborted) -> str:
 
 
 def _outcome_text(worst: _Aborted) -> str:
-    """Return the outcome of the worst go-around, in words."""
+    """Describe the abort and the outcome of the worst go-around."""
     where = f"aborted {worst.before:.0f} m before the landing point, {worst.over:.0f} m above ground,"
     turns = " is so high already, turns at once" if worst.at_once else ""
     if not math.isnan(worst.after):

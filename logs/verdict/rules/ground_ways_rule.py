@@ -1,14 +1,13 @@
-"""The climb-out and approach rules: obstacles on the path up from home, and down to the landing point.
+"""The climb-out and approach rules: judge obstacles on the climb from home and on the glide to the landing point.
 
-A planfly flight begins and ends in the air, unless its scenario has a launch or a strip: the launch rule and the
-touchdown rule judge what is flown there.  Other departures and approaches are not flown: they are laid out from the
-mission's items and judged against ground, missile spheres and zones, whether the mission was flown or not.
+A planfly flight begins and ends in the air, unless its scenario has a launch or a strip; the launch rule and the
+touchdown rule judge these flown parts.  Other departures and approaches are not flown.  They are laid out from the
+mission's items and judged against ground, missile spheres and zones, whether or not the mission was flown.
 
-If a mission takes off, the aircraft climbs from the ground at home towards the next place, or on the course that the
-scenario's `[launch]` states.  An obstacle at its steepest climb fails; an obstacle only at `MIN_CLIMB_FRACTION` of
-that climb
-leaves the finding undecided.  If the mission does not take off, a pilot flies the aircraft to its first waypoint,
-perhaps on another path: an obstacle on the straight path leaves the finding undecided.
+If a mission takes off, the aircraft climbs from the ground at home towards the next place, or on the course in the
+scenario's `[launch]`.  An obstacle at the steepest climb fails; an obstacle that is met only at `MIN_CLIMB_FRACTION` of
+that climb leaves the finding undecided.  If the mission does not take off, a pilot flies the aircraft to its first
+waypoint, perhaps on another path, so an obstacle on the straight path leaves the finding undecided.
 
 The approach is the glide that the autopilot lays out (`Autopilot.landing_glide`).
 """
@@ -49,7 +48,7 @@ from logs.verdict.wording import place_text
 from world.frames import to_map
 from world.geometry import wrap
 
-# Step between the launch courses that are tried, deg.
+# Step between the launch courses that `_free_courses_text` tries, deg.
 _COURSE_STEP_DEG = 10
 
 
@@ -60,8 +59,9 @@ _COURSE_STEP_DEG = 10
 class _Obstacles(NamedTuple):
     """Obstacles on a path.
 
-    clearance: least height above ground, m; NaN if unknown.  at: the run at which it occurs, m.
-    entered: the sphere or zone that the path enters, "" for none.
+    clearance: minimum height above ground, m; NaN if unknown.
+    at: distance along the path at which the minimum occurs, m.
+    entered: sphere or zone that the path enters, "" if it enters none.
     """
 
     clearance: float
@@ -74,14 +74,14 @@ class _Obstacles(NamedTuple):
         return self.clearance >= 0.0 and not self.entered
 
     def obstacle_message(self, subject: str, where: str) -> Message:
-        """Return the obstacle in words.  where: the origin of its runs."""
+        """Describe the obstacle.  where: text that names the origin of the distance `at`."""
         if self.entered:
             return message(f"{subject} enters {self.entered}")
         return message(f"{subject} meets the ground", f", {-self.clearance:.0f} m into it {self.at:.0f} m {where}")
 
 
-def _climb(requirements: RouteRequirements, leg: int, course: float, amsl: float) -> tuple[float, float]:
-    """Return the steepest and the certain climb on a course (rad) at an altitude (m AMSL), m per m of run."""
+def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, amsl: float) -> tuple[float, float]:
+    """Return the nominal and the certain maximum climb slope on a course (rad) at an altitude (m AMSL), m per m."""
     speed, limits = float(requirements.route.airspeed[leg]), requirements.limits
     steepest, certain = (one.slopes(course, amsl, speed)[0] for one in (limits, limits.surely()))
     return math.tan(steepest), math.tan(certain)
@@ -94,9 +94,9 @@ def _climb(requirements: RouteRequirements, leg: int, course: float, amsl: float
 def climbout_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the path from the ground at home to the first place, for a mission with a home: one finding.
+    """Judge the path from the ground at home to the first place with one finding, if the mission has a home.
 
-    No finding if that place is over home, or the aircraft takes off vertically.
+    Return [] if the first place is over home, or if the aircraft takes off vertically.
     """
     home, ground = requirements.setup.mission.home, requirements.setup.scenario.terrain
     if not is_laid_out(requirements) or home is None or ground is None:
@@ -118,18 +118,18 @@ def climbout_findings(
         if run < SAME_PLACE:
             return []
     if math.isnan(low):
-        return [_unjudged("climbout", place, "the ground at home is not known", opens=takeoff is not None)]
-    steepest, certain = _climb(requirements, max(0, first - 1), course, low)
+        return [_unjudged_finding("climbout", place, "the ground at home is not known", opens=takeoff is not None)]
+    steepest, certain = _climb_slopes(requirements, max(0, first - 1), course, low)
     if not steepest > 0.0:
         reason = "the aircraft cannot climb there at this speed and in this wind"
-        return [_unjudged("climbout", place, reason, opens=takeoff is not None)]
+        return [_unjudged_finding("climbout", place, reason, opens=takeoff is not None)]
     if takeoff is None:
         way = straight_way(begin, course, _climb_profile(low, float(here[2]), run, steepest))
-        return [_unflown_start_finding(place, _find_obstacles(requirements, way))]
+        return [_air_start_finding(place, _find_obstacles(requirements, way))]
     up = float(requirements.points[0, 2])
     if up <= low:
         reason = f"the take-off's height is not above the ground at home, which is at {low:.0f} m AMSL"
-        return [_unjudged("climbout", place, reason, opens=True)]
+        return [_unjudged_finding("climbout", place, reason, opens=True)]
     met, least = (
         _find_obstacles(requirements, straight_way(begin, course, _takeoff_profile(low, up, run, slope, climb)))
         for climb in (steepest, max(1e-3, MIN_CLIMB_FRACTION * certain))
@@ -137,7 +137,7 @@ def climbout_findings(
     return [_launch_finding(requirements, launch.way, place, met, least, (begin, low, up), certain == steepest)]
 
 
-def _unjudged(rule: str, place: Place, reason: str, *, opens: bool) -> Finding:
+def _unjudged_finding(rule: str, place: Place, reason: str, *, opens: bool) -> Finding:
     """Return a finding on a path that is not judged.  opens: True if it leaves the verdict undecided."""
     title = "climb-out" if rule == "climbout" else rule
     fault = message(f"the {title} at {place_text(place)} is not judged: {reason}")
@@ -147,9 +147,12 @@ def _unjudged(rule: str, place: Place, reason: str, *, opens: bool) -> Finding:
 
 
 class _Launch(NamedTuple):
-    """Launch and its description.
+    """Launch course and the leg flown on it.
 
-    course: rad.  run: flown on it, m.  slope: of its leg, m per m.
+    course: rad.
+    run: distance flown on the course, m.
+    slope: slope of the leg, m per m.
+    way: description of the course, "" along the first leg.
     """
 
     course: float
@@ -159,9 +162,9 @@ class _Launch(NamedTuple):
 
 
 def _launch(requirements: RouteRequirements) -> _Launch:
-    """Return the launch along the first leg, or on the scenario's course.
+    """Return the launch on the scenario's course, or along the first leg if the scenario states no course.
 
-    The leg's run and slope apply if the leg is on that course.
+    The first leg's run and slope apply if the leg is on the launch course.
     """
     stated = requirements.setup.scenario.launch
     along = _Launch(
@@ -176,9 +179,12 @@ def _launch(requirements: RouteRequirements) -> _Launch:
 
 
 def _climb_profile(low: float, up: float, run: float, climb: float) -> Profile:
-    """Return the climb profile from the ground to a place: climb first, then straight on.
+    """Return the profile of a climb from the ground followed by a straight line to a place.
 
-    low: ground, up: place, m AMSL.  run: distance of the place, m.
+    low: altitude of the ground, m AMSL.
+    up: altitude of the place, m AMSL.
+    run: distance of the place, m.
+    climb: climb slope, m per m.
     """
     top = max(up, low + FIRST_CLIMB_HEIGHT_M)
     reached = (top - low) / climb
@@ -188,10 +194,13 @@ def _climb_profile(low: float, up: float, run: float, climb: float) -> Profile:
 
 
 def _takeoff_profile(low: float, up: float, run: float, slope: float, climb: float) -> Profile:
-    """Return the profile from the ground until the aircraft is on the first leg.
+    """Return the climb profile from the ground until the aircraft is on the first leg.
 
-    low: altitude of the ground, up: altitude where the leg begins over home, to which the take-off climbs, m AMSL.
-    run: of the leg, m.  slope: of the leg, climb: m per m.
+    low: altitude of the ground, m AMSL.
+    up: altitude at which the leg begins over home and to which the take-off climbs, m AMSL.
+    run: length of the leg, m.
+    slope: slope of the leg, m per m.
+    climb: climb slope, m per m.
     """
     reached = (up - low) / climb
     if reached < run:
@@ -201,7 +210,7 @@ def _takeoff_profile(low: float, up: float, run: float, slope: float, climb: flo
 
 
 def _find_obstacles(requirements: RouteRequirements, way: Way) -> _Obstacles:
-    """Return the obstacles on a path up from home, beyond `LAUNCH_RUN_M` of ground."""
+    """Return the obstacles on a path from home; the first `LAUNCH_RUN_M` of the path may be close to the ground."""
     ground, end = requirements.setup.scenario.terrain, float(way.run[-1])
     entered = first_obstacle_on(requirements, way)
     if ground is None or end <= LAUNCH_RUN_M:
@@ -209,13 +218,17 @@ def _find_obstacles(requirements: RouteRequirements, way: Way) -> _Obstacles:
     return _Obstacles(*way_clearance(ground, way.between(LAUNCH_RUN_M, end)), entered)
 
 
-def _unflown_start_finding(place: Place, met: _Obstacles) -> Finding:
-    """Return the finding for a mission that begins in the air: the path to its first waypoint."""
+def _air_start_finding(place: Place, met: _Obstacles) -> Finding:
+    """Judge the direct climb from home to the first waypoint, not simulated, of a mission that starts in the air."""
     subject = f"the way up from home to {_item_text(place)}"
     if math.isnan(met.clearance) and not met.entered:
         reason, check, ok = f"the ground below {subject} is not known", "", None
     elif met.free:
-        reason, check, ok = f"straight from home: {_room_text(met)}; not flown: the flight begins in the air", "", True
+        reason, check, ok = (
+            f"straight from home: {_clearance_text(met)}; not flown: the flight begins in the air",
+            "",
+            True,
+        )
     else:
         fault = met.obstacle_message(subject, "from home, at the steepest climb")
         return _finding("climbout", place, met, None, fault, GROUND_WAY)
@@ -231,11 +244,12 @@ def _launch_finding(
     launch: tuple[tuple[float, float], float, float],
     is_known: bool,
 ) -> Finding:
-    """Return the finding for a mission that takes off: the climb to its next place, or on a course.
+    """Judge the climb of a mission that takes off, towards its next place or on a launch course.
 
-    way: the launch course in words, "" along the first leg.
-    met, least: obstacles at the steepest climb, and at the least climb.
-    launch: place (east, north, m), altitude of the ground there and altitude at the end of the climb (m AMSL).
+    way: description of the launch course, "" along the first leg.
+    met: obstacles at the steepest climb.
+    least: obstacles at the minimum climb.
+    launch: launch place (east, north, m), altitude of the ground there and altitude at the end of the climb (m AMSL).
     is_known: True if the aircraft's climb is certain.
     """
     to_item = requirements.leg(0).to_item
@@ -246,7 +260,7 @@ def _launch_finding(
         return _finding("climbout", place, met, None, reason)
     if not met.free:
         fault = met.obstacle_message(subject, "from home, at the steepest climb")
-        other = _other_courses(requirements, *launch)
+        other = _free_courses_text(requirements, *launch)
         fault = message(fault.brief, fault.text[len(fault.brief) :] + other)
         return _finding("climbout", place, met, False if is_known else None, fault, "" if is_known else GROUND_WAY)
     at_least = f"{subject}, at {100.0 * MIN_CLIMB_FRACTION:.0f} % of the steepest,"
@@ -255,15 +269,15 @@ def _launch_finding(
     if not least.free:
         return _finding("climbout", place, met, None, least.obstacle_message(at_least, "from home"), GROUND_WAY)
     return _finding(
-        "climbout", place, met, True, message(f"{subject.removeprefix('the climb from home ')}: {_room_text(met)}")
+        "climbout", place, met, True, message(f"{subject.removeprefix('the climb from home ')}: {_clearance_text(met)}")
     )
 
 
-def _other_courses(requirements: RouteRequirements, begin: tuple[float, float], low: float, up: float) -> str:
-    """Return courses on which a launch climbs to the take-off's altitude without obstacles, in words."""
+def _free_courses_text(requirements: RouteRequirements, begin: tuple[float, float], low: float, up: float) -> str:
+    """Describe the widest range of courses on which a launch climbs to the take-off's altitude without obstacles."""
 
     def is_free(course: float) -> bool:
-        climb, _ = _climb(requirements, 0, course, low)
+        climb, _ = _climb_slopes(requirements, 0, course, low)
         if not climb > 0.0:
             return False
         return _find_obstacles(requirements, straight_way(begin, course, [(0.0, low), ((up - low) / climb, up)])).free
@@ -289,7 +303,7 @@ def _other_courses(requirements: RouteRequirements, begin: tuple[float, float], 
 def approach_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the glide from the last waypoint to the landing point, for a mission that lands: one finding."""
+    """Judge the glide from the last waypoint to the landing point with one finding, if the mission lands."""
     found, ground, setup = landing_item(requirements), requirements.setup.scenario.terrain, requirements.setup
     if found is None or ground is None or not is_laid_out(requirements):
         return []
@@ -302,10 +316,10 @@ def approach_findings(
     high, under = float(begin[2]), float(ground.height(float(point[0]), float(point[1])))
     if math.isnan(low) or math.isnan(under) or run < MIN_LEG_LENGTH_M:
         reason = "the height of the ground at the landing point is not known"
-        return [_unjudged("approach", place, reason, opens=True)]
+        return [_unjudged_finding("approach", place, reason, opens=True)]
     if high <= low:
         reason = "it begins no higher than the landing point"
-        return [_unjudged("approach", place, reason, opens=True)]
+        return [_unjudged_finding("approach", place, reason, opens=True)]
     glide = setup.autopilot.landing_glide(high - low, run, setup.scenario.wind.along(course, low)[0], low)
     flare = (run - glide.flare_distance, low + glide.flare_height)
     way = straight_way(begin, course, [(0.0, high), *([flare] if glide.flare_distance > 0.0 else []), (run, low)])
@@ -341,7 +355,7 @@ def approach_findings(
         reason += (
             f", flares {glide.flare_height:.1f} m over the landing point and {glide.flare_distance:.0f} m before it"
         )
-    reason += f"; {_room_text(met)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before it"
+    reason += f"; {_clearance_text(met)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before it"
     reason += "" if setup.ground_ways.approach is not None else "; not flown: the flight ends in the air"
     return [_finding("approach", place, met, True, message(reason))]
 
@@ -350,11 +364,11 @@ def approach_findings(
 
 
 def _item_text(place: Place) -> str:
-    """Return the item of a waypoint, in words."""
+    """Name the item of a waypoint."""
     return "the first place" if place.item is None else f"item {place.item}"
 
 
-def _room_text(met: _Obstacles) -> str:
+def _clearance_text(met: _Obstacles) -> str:
     return "nothing is in the way" if math.isinf(met.clearance) else f"{met.clearance:.0f} m above ground or more"
 
 

@@ -1,6 +1,6 @@
-"""The height rule: greatest height above ground on each leg, and the ceiling, planned and flown.
+"""The height rule: judge the maximum height above ground on each leg, and the ceiling, planned and flown.
 
-It applies if the scenario has a `max_height_m`; a ceiling alone is judged by the bounds rule.
+The rule applies if the scenario has a `max_height_m`; the bounds rule judges a ceiling alone.
 """
 
 import math
@@ -24,7 +24,7 @@ from world.terrain import Terrain
 def height_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the greatest height above ground on each leg; empty if the scenario does not limit it."""
+    """Judge the maximum height above ground on each leg; return [] if the scenario has no limit."""
     scenario = requirements.setup.scenario
     limit, ground = scenario.limits.max_height_m, scenario.terrain
     if limit is None:
@@ -38,7 +38,7 @@ def height_findings(
         ]
     path = requirements.path
     way = _Path(path.points, path.times, *greatest_heights(ground, path.points))
-    planned = [_highest(way, np.flatnonzero(path.legs == leg)) for leg in range(requirements.legs)]
+    planned = [_max_heights(way, np.flatnonzero(path.legs == leg)) for leg in range(requirements.legs)]
     if geometric:
         return [
             _finding(requirements, leg, limit, planned[leg], planned[leg], "fly-by path")
@@ -49,7 +49,7 @@ def height_findings(
         track = aligned.track
         way = _Path(track.position, track.time, *greatest_heights(ground, track.position))
         flown = [
-            _highest(way, _segments(requirements, aligned, leg)) if aligned.flew(leg) else None
+            _max_heights(way, _leg_segments(requirements, aligned, leg)) if aligned.flew(leg) else None
             for leg in range(requirements.legs)
         ]
     return [
@@ -58,10 +58,12 @@ def height_findings(
 
 
 def greatest_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Return the greatest height above ground on each segment, m, and its fraction; (n - 1,) each.
+    """Return the maximum height above ground on each segment, m, and its place as a fraction of the segment, (n - 1,).
 
-    points: (n, 3).  Exact for the bilinear ground, like the least height: it is the least height of the same world
-    upside down.  NaN if a segment leaves the raster or its data.
+    points: east, north and up, m, (n, 3).
+
+    The maximum is exact for bilinear ground, because it is the minimum height in the same world upside down.  It is NaN
+    if a segment leaves the raster or its data.
     """
     upside_down = points * np.array([1.0, 1.0, -1.0])
     low, at = path_clearance(-terrain.heights, terrain.to_pixel.record, upside_down)
@@ -70,7 +72,7 @@ def greatest_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True, slots=True)
 class _Path:
-    """Points (n, 3) m with times (n,) s; each segment's greatest height above ground, and its fraction."""
+    """Points, m, (n, 3), and times, s, (n,); maximum height above ground of each segment, m, and its fraction."""
 
     points: Floats
     times: Floats
@@ -80,9 +82,10 @@ class _Path:
 
 @dataclass(frozen=True, slots=True)
 class _Highest:
-    """Greatest height of a leg above ground, NaN if unknown, and greatest altitude AMSL, m.
+    """Maximum height of a leg above ground, NaN if unknown, and maximum altitude AMSL, m.
 
-    where: time and place of the first, in words.  known: True if the ground is known all along.
+    where: text with the time and place of the maximum height.
+    known: True if the ground is known along the whole leg.
     """
 
     height: float
@@ -91,8 +94,8 @@ class _Highest:
     known: bool
 
 
-def _highest(way: _Path, segments: NDArray[np.intp]) -> _Highest | None:
-    """Return the greatest heights on some segments of a path, or None without segments."""
+def _max_heights(way: _Path, segments: NDArray[np.intp]) -> _Highest | None:
+    """Return the maximum heights on some segments of a path, or None without segments."""
     if not segments.size:
         return None
     amsl = float(max(way.points[segments, 2].max(), way.points[segments + 1, 2].max()))
@@ -106,8 +109,8 @@ def _highest(way: _Path, segments: NDArray[np.intp]) -> _Highest | None:
     return _Highest(float(way.greatest[k]), amsl, where, bool(known.all()))
 
 
-def _segments(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> NDArray[np.intp]:
-    """Return the track's segments on a leg; the first and last legs include what is before and after."""
+def _leg_segments(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> NDArray[np.intp]:
+    """Return the track's segments on a leg; the first and last legs include the track before and after the route."""
     first = 0 if leg == 0 else int(aligned.rows[leg])
     last = len(aligned.track) - 1 if leg + 1 == requirements.legs else int(aligned.rows[leg + 1])
     return np.arange(first, last)

@@ -1,8 +1,9 @@
-"""The launch rule: a flown take-off, from rail, hand or runway to where the first leg begins.
+"""The launch rule: judge a flown take-off, from rail, hand or runway to the start of the first leg.
 
-It judges the launch acceleration against the one that starts the motor, the loss of height after the launch, the runway
-left at lift-off, and hazards to the climb on the course that the autopilot holds: ground, missile spheres and zones.  A
-take-off that is not flown is judged by the take-off and climb-out rules, from the mission's items.
+The rule compares the launch acceleration with the acceleration that starts the motor, and judges the height lost after
+the launch, the runway remaining at lift-off, and the hazards (ground, missile spheres and zones) to the climb on the
+course that the autopilot holds.  The take-off and climb-out rules judge a take-off that is not flown, from the
+mission's items.
 """
 
 import math
@@ -35,10 +36,10 @@ def launch_findings(
     ground = requirements.ground
     if ground is None or ground.ways.take_off is None:
         return []
-    return [_flown(requirements, ground, ground.ways.take_off)]
+    return [_launch_finding(requirements, ground, ground.ways.take_off)]
 
 
-def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeOff) -> Finding:
+def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_off: TakeOff) -> Finding:
     track = ground.launch
     way = track_way(track)
     position, run = way
@@ -54,7 +55,7 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
         faults.append(message(brief, f", short of {take_off.top - take_off.base:.0f} m"))
     if lost > MAX_LAUNCH_HEIGHT_LOSS_M:
         faults.append(message(f"sinks {lost:.1f} m after the launch", f"; {MAX_LAUNCH_HEIGHT_LOSS_M:g} m are allowed"))
-    left = _runway_left(requirements, take_off, position)
+    left = _remaining_runway(requirements, take_off, position)
     if left < RUNWAY_MARGIN_M:
         brief = f"leaves the ground {take_off.launch.run - left:.0f} m from home"
         runway_text = (
@@ -66,7 +67,7 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
     entered = first_obstacle_on(requirements, way)
     if entered:
         faults.append(message(f"the climb enters {entered}"))
-    known = _description(take_off, track, run, room)
+    known = _describe_take_off(take_off, track, run, room)
     open_ = []
     if not faults and LAUNCH_CLEARANCE_M <= room < LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M:
         brief = f"the launch passes {room:.1f} m above ground {where:.0f} m from home"
@@ -93,9 +94,9 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
 
 
 def _climb_clearance(requirements: RouteRequirements, way: Way) -> tuple[float, float]:
-    """Return the least height above ground beyond the launch itself, and its distance from home, m.
+    """Return the minimum height above ground after the launch run, m, and its distance from home along the path, m.
 
-    inf for a take-off that ends before that, NaN if the ground is unknown.
+    The height is inf if the take-off ends within the launch run, NaN if the ground is unknown.
     """
     terrain, (position, run) = requirements.setup.scenario.terrain, way
     if terrain is None:
@@ -113,8 +114,8 @@ def _climb_clearance(requirements: RouteRequirements, way: Way) -> tuple[float, 
     return way_clearance(terrain, way.between(first, float(run[-1])))
 
 
-def _runway_left(requirements: RouteRequirements, take_off: TakeOff, position: Floats) -> float:
-    """Return the runway left where the aircraft last stands on it, m; inf for a launch without a runway."""
+def _remaining_runway(requirements: RouteRequirements, take_off: TakeOff, position: Floats) -> float:
+    """Return the runway remaining at the aircraft's last contact with it, m; inf for a launch without a runway."""
     terrain = requirements.setup.scenario.terrain
     if take_off.launch.method != "runway" or terrain is None:
         return math.inf
@@ -126,8 +127,8 @@ def _runway_left(requirements: RouteRequirements, take_off: TakeOff, position: F
     return take_off.launch.run - math.dist(last[:2], take_off.home[:2])
 
 
-def _description(take_off: TakeOff, track: Track, run: Floats, room: float) -> list[str]:
-    """Describe the take-off in words."""
+def _describe_take_off(take_off: TakeOff, track: Track, run: Floats, room: float) -> list[str]:
+    """Describe the take-off in a list of phrases."""
     course, method = round(math.degrees(take_off.course)) % 360, take_off.launch.method
     known = [f"launched on a runway on {course}°"]
     if method != "runway":

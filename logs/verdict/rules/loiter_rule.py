@@ -1,7 +1,7 @@
-"""The loiter rule: whether a loiter can be held with this bank in this wind, and was flown to its end.
+"""The loiter rule: judge if a loiter can be held with this bank in this wind, and was flown to its end.
 
-A loiter is flown as corners around its circle.  Each is judged like any turn; their findings are merged into one per
-loiter, and the findings on the legs between them are reduced to the worst of each rule.
+A loiter is flown as corners around its circle, each judged like any turn.  The findings on its corners are merged into
+one for each loiter, and of the findings on the legs between the corners, only the worst of each rule is kept.
 """
 
 import math
@@ -33,8 +33,8 @@ from world.geometry import tangent_length
 class Circle:
     """One loiter of a route.
 
-    first, last: waypoints of its corners, not ends of the route: a loiter is joined and left there.
-    middle: (2,) m, its center.
+    first, last: waypoints of the first and last corner; neither is an end of the route.
+    middle: center, m, (2,).
     radius: m.
     turns: number of laps.
     """
@@ -64,7 +64,7 @@ def circles(requirements: RouteRequirements) -> list[Circle]:
 
 
 def _center(requirements: RouteRequirements, i: int) -> Floats:
-    """Return the center of the circle to which a corner's arc belongs, (2,) m."""
+    """Return the center of the circle to which the arc of corner `i` belongs, m, (2,)."""
     ux, uy = requirements.leg_unit(i - 1)
     side = math.copysign(1.0, requirements.turns[i])
     tangent = tangent_length(abs(float(requirements.turns[i])), float(requirements.radius[i]))
@@ -76,7 +76,7 @@ def _center(requirements: RouteRequirements, i: int) -> Floats:
 def fold_loiters(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Merge the findings at a loiter's corners into one, and keep the worst of each rule on its legs."""
+    """Merge the findings at each loiter's corners into one, and keep only each rule's worst finding on its legs."""
     at_once = requirements.setup.autopilot.loiter_rules.at_middle
     kept: list[Finding | None] = list(findings)
     # Indexed by rule and place: a mission of jumps has hundreds of loiters, and each thousands of findings.
@@ -85,7 +85,7 @@ def fold_loiters(
         positions.setdefault((item.rule, item.place), []).append(k)
 
     def left(rules: Sequence[str], places: Sequence[Place]) -> list[tuple[int, Finding]]:
-        """Return positions and findings of these rules at these places, in order, except replaced ones."""
+        """Return positions and findings of these rules at these places, in order, without replaced findings."""
         every = sorted(k for rule in rules for place in places for k in positions.get((rule, place), ()))
         return [(k, item) for k in every if (item := kept[k]) is not None and item.rule in rules]
 
@@ -118,9 +118,9 @@ def fold_loiters(
 def end_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge before a flight the hazards near the end of a mission where its autopilot loiters.
+    """Before a flight, judge the hazards near the end of a mission, where the autopilot loiters.
 
-    aligned: not read.
+    aligned: not used.
     """
     hazards = end_loiter_hazards(requirements) if geometric else None
     if hazards is None:
@@ -150,14 +150,14 @@ def _loiter_finding(
     bad = [item for item in at if item.ok is False]
     at_middle = requirements.setup.autopilot.loiter_rules.at_middle
     own = _uses_parameter_radius(requirements, circle)
-    if at_middle and (own if aligned is None else _reached(requirements, aligned, circle)):
+    if at_middle and (own if aligned is None else _has_reached(requirements, aligned, circle)):
         bad = []
-    faults = _too_small(requirements, circle, tightest) if known else []
+    faults = _small_radius_faults(requirements, circle, tightest) if known else []
     facts = [f"{circle.turns:.2f} turns with {circle.radius:.0f} m"]
     open_text, name = "", requirements.setup.autopilot.loiter_rules.radius_name
     if own and faults and math.isfinite(tightest):
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
-        bank = _bank_held(requirements, circle, tightest, at)
+        bank = _held_bank(requirements, circle, tightest, at)
         if bank <= requirements.limits.max_bank + BANK_TOLERANCE_RAD + 1e-9:
             facts.append(f"{name} asks for less than the {tightest:.0f} m of the bank limit: flown wider")
             faults = []
@@ -208,9 +208,9 @@ def _loiter_finding(
 
 
 def _flown_radii(aligned: AlignedTrack, circle: Circle) -> Floats:
-    """Return distances from a loiter's center from first to last corner, (n,) m.
+    """Return the distances from a loiter's center, flown from the first to the last corner, m, (n,).
 
-    Empty if the loiter was not flown to its end.
+    The array is empty if the loiter was not flown to its end.
     """
     first, last = int(aligned.rows[circle.first]), int(aligned.rows[circle.last])
     if not aligned.passed[circle.last] or last <= first:
@@ -220,20 +220,22 @@ def _flown_radii(aligned: AlignedTrack, circle: Circle) -> Floats:
 
 
 def _uses_parameter_radius(requirements: RouteRequirements, circle: Circle) -> bool:
-    """Return True if a loiter's radius is the autopilot's parameter.
+    """Return True if the autopilot takes a loiter's radius from its parameter.
 
-    The item then states none that the autopilot reads.
+    The mission item then has no radius that the autopilot reads.
     """
     rules, seq = requirements.setup.autopilot.loiter_rules, int(requirements.setup.route.items[circle.first])
     loiter = next((loiter_of(item) for item in requirements.setup.mission.items if item.seq == seq), None)
     return rules.lines_up and rules.radius != 0.0 and loiter is not None and rules.radius_of(loiter) == 0.0
 
 
-def _bank_held(requirements: RouteRequirements, circle: Circle, tightest: float, at: list[Finding]) -> float:
-    """Return the bank with which a loiter tighter than the bank limit's radius (m) was held, rad.
+def _held_bank(requirements: RouteRequirements, circle: Circle, tightest: float, at: list[Finding]) -> float:
+    """Return the bank with which a loiter tighter than the bank limit allows was held, rad.
 
-    The largest mean over a second.  Without a flight or a measurement, the bank needed to hold it, up to the
-    autopilot's limit.
+    tightest: radius at the bank limit, m.
+
+    The bank is the largest mean over a second.  Without a flight or a measurement, it is the bank needed to hold the
+    loiter, up to the autopilot's limit.
     """
     measured = [fact.value for item in at for fact in item.facts if fact.what == "bank"]
     if measured:
@@ -243,7 +245,7 @@ def _bank_held(requirements: RouteRequirements, circle: Circle, tightest: float,
 
 
 def _hazards_text(requirements: RouteRequirements, circle: Circle, tightest: float) -> str:
-    """Return the hazards too close to a loiter that is flown wider than drawn, in words; "" for none."""
+    """Describe the hazards too close to a loiter that is flown wider than drawn; return "" if there are none."""
     heights = requirements.points[circle.first : circle.last + 1, 2]
     reach = LOITER_SWING_RADII * tightest
     found = hazards_within(requirements, circle.middle, float(heights.min()), float(heights.max()), reach)
@@ -253,18 +255,18 @@ def _hazards_text(requirements: RouteRequirements, circle: Circle, tightest: flo
     return f"{near}, {', '.join(found)}: only a flight tells where it is"
 
 
-def _reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:
-    """Return True if the flight reached a loiter.
+def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:
+    """Return True if the flight came close enough to a loiter to count as having reached it.
 
-    A flight that leaves it when its time is over may miss all corners.
+    The corners do not tell, because a flight that leaves the loiter when its time is over may miss all of them.
     """
     away, _ = approaches(aligned.track.position, circle.middle)
     early = requirements.setup.autopilot.turn_distance(math.pi, float(requirements.points[circle.first, 2]))
     return bool(away.min() <= circle.radius + early + WAYPOINT_PASS_MARGIN_M)
 
 
-def _too_small(requirements: RouteRequirements, circle: Circle, tightest: float) -> list[Message]:
-    """Return a fault if a loiter is smaller than the bank limit's radius (m)."""
+def _small_radius_faults(requirements: RouteRequirements, circle: Circle, tightest: float) -> list[Message]:
+    """Return a fault if a loiter is smaller than the radius at the bank limit (m)."""
     if circle.radius >= tightest - RADIUS_TOLERANCE_FRACTION:
         return []
     speed, bank = float(requirements.route.airspeed[circle.first]), math.degrees(requirements.limits.max_bank)
@@ -275,7 +277,7 @@ def _too_small(requirements: RouteRequirements, circle: Circle, tightest: float)
 
 
 def _unheld_corners_message(circle: Circle, bad: list[Finding]) -> Message:
-    """Return the number of corners that were not held, and the worst of them."""
+    """Describe how many corners were not held, and the worst corner."""
     worst = min(bad, key=badness)
     corners = len({item.place for item in bad})
     count = f"{corners} of {circle.last - circle.first + 1} corners not held, as "
@@ -283,7 +285,7 @@ def _unheld_corners_message(circle: Circle, bad: list[Finding]) -> Message:
 
 
 def _corner_text(corner: Place) -> str:
-    """Return a corner's name for a headline, without the item that all corners of its loiter share."""
+    """Name a corner for a headline, without the mission item, which all corners of a loiter share."""
     return place_text(replace(corner, item=None))
 
 

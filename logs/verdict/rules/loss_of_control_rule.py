@@ -1,4 +1,4 @@
-"""The `departure` rule on loss of control: bad numbers, extreme bank, low airspeed, ground contact."""
+"""The `departure` rule: judge loss of control by bad numbers, extreme bank, low airspeed and ground contact."""
 
 import math
 
@@ -18,14 +18,14 @@ from world.arrays import Floats
 def departure_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flight for bad numbers, extreme bank, too low airspeed, or ground contact."""
+    """Judge if a flight has bad numbers, extreme bank, too low an airspeed, or ground contact."""
     if geometric:
         return []
     if aligned is None:
         return [make_finding("departure", FLIGHT, ok=None, reason="no usable rows", unit="deg")]
     track = aligned.track
     bank = np.abs(track.attitude[:, ROLL].astype(np.float64))
-    most, slow = _largest(bank), _too_slow(requirements, aligned)
+    most, slow = _max_finite(bank), _low_airspeed_faults(requirements, aligned)
     faults = []
     if aligned.bad_rows:
         faults.append(
@@ -44,7 +44,7 @@ def departure_findings(
                 f", {aligned.where(k, float(aligned.low_at[k]))}",
             )
         )
-    least = -_largest(-track.airspeed.astype(np.float64))
+    least = -_max_finite(-track.airspeed.astype(np.float64))
     known = [] if math.isnan(most) else [f"bank at most {math.degrees(most):.0f}°"]
     known += [] if math.isnan(least) else [f"airspeed at least {least:.1f} m/s"]
     steady = ", ".join(known) or "no ground contact; neither bank nor airspeed is known"
@@ -66,19 +66,19 @@ def departure_findings(
     ]
 
 
-def _largest(values: Floats) -> float:
-    """Return the largest finite number, or NaN without one."""
+def _max_finite(values: Floats) -> float:
+    """Return the largest finite value, or NaN if there is none."""
     finite = values[np.isfinite(values)]
     return float(finite.max()) if finite.size else math.nan
 
 
-def _too_slow(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Message]:
-    """Return a fault if the aircraft was too slow to fly; empty for an unknown aircraft."""
+def _low_airspeed_faults(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Message]:
+    """Return a fault if the aircraft was too slow to fly; return [] for an unknown aircraft."""
     source = requirements.setup.source
     if source is not None and not source.aircraft_known:
         return []
     track = aligned.track
-    slowest = _slowest(requirements, track.position[:, 2])
+    slowest = _min_flying_airspeed(requirements, track.position[:, 2])
     slow = np.flatnonzero(track.airspeed < slowest)
     if not slow.size:
         return []
@@ -90,8 +90,8 @@ def _time_text(time: float) -> str:
     return f"at {time:.1f} s" if math.isfinite(time) else "without a time"
 
 
-def _slowest(requirements: RouteRequirements, up: Floats) -> Floats:
-    """Return the airspeed below which the aircraft is considered out of flight, at each altitude."""
+def _min_flying_airspeed(requirements: RouteRequirements, up: Floats) -> Floats:
+    """Return the airspeed below which the aircraft no longer counts as flying, m/s, at each altitude `up` (m AMSL)."""
     if requirements.setup.aircraft == "aerosonde":
         return np.full(up.shape, MIN_CONTROLLED_AIRSPEED_MPS)
     envelope = requirements.setup.envelope

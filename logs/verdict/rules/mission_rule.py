@@ -1,12 +1,12 @@
-"""The mission rule: items that PX4's feasibility checker would refuse, by the names of its checks.
+"""The mission rule: report items that PX4's feasibility checker would refuse, under the names of PX4's checks.
 
-After `FeasibilityChecker` and `MissionFeasibilityChecker` of PX4's navigator for a fixed wing, with the parameters of
-PX4: NAV_ACC_RAD, FW_LND_ANG, MIS_TKO_LAND_REQ (its fixed-wing default requires a landing: 2), and MIS_DIST_1WP 10 km.
-These are PX4's own limits and say nothing about the aircraft: items that PX4 alone refuses are reported, and fail only
-if PX4 is to fly.  The landing that PX4 requires by default fails only if the user's parameter file requires it, because
-most missions have none and it takes one parameter to change that.  A command that neither PX4 nor ArduPlane supports
-fails for any autopilot, and so does a route beyond the mission's own fence.  Invalid latitudes, longitudes, frames and
-numbers of items were refused when the file was read.
+The checks follow `FeasibilityChecker` and `MissionFeasibilityChecker` of PX4's navigator for a fixed wing, with PX4's
+parameters: NAV_ACC_RAD, FW_LND_ANG, MIS_TKO_LAND_REQ (its fixed-wing default, 2, requires a landing), and MIS_DIST_1WP
+10 km.  These are PX4's own limits and say nothing about the aircraft, so items that only PX4 refuses are reported, and
+fail only if PX4 is to fly.  A missing landing, which PX4 requires by default, fails only if the user's parameter file
+requires a landing, because most missions have no landing and one parameter changes the requirement.  A command that
+neither PX4 nor ArduPlane supports fails for any autopilot, and so does a route beyond the mission's own fence.  Invalid
+latitudes, longitudes, frames and numbers of items were refused when the file was read.
 """
 
 import itertools
@@ -52,22 +52,22 @@ C = Command
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """Judge each check: one finding with the first item at fault, or without a fault."""
+    """Run each check, and return one finding for each, with the first item at fault if there is one."""
     mission, origin, limits = setup.mission, setup.scenario.origin, setup.autopilot.mission_checks
     checks = (
-        ("checkMissionItemValidity", _validity(mission)),
-        ("checkTakeoff", _takeoff(mission, limits)),
-        ("checkFixedWingLanding", _landing(mission)),
-        ("checkFixedWindLandApproach", _approach(mission, origin, limits)),
-        ("checkTakeoffLandAvailable", _takeoff_landing_required(mission, limits, setup.autopilot.refuses)),
-        ("checkDistanceToFirstWaypoint", _distance_to_first(mission, origin)),
-        ("checkDistancesBetweenWaypoints", _distances(mission, origin)),
-        ("checkIfBelowHomeAltitude", _below_home(mission)),
-        ("checkGeofence", _fence(setup)),
+        ("checkMissionItemValidity", _check_validity(mission)),
+        ("checkTakeoff", _check_takeoff(mission, limits)),
+        ("checkFixedWingLanding", _check_landing(mission)),
+        ("checkFixedWindLandApproach", _check_approach(mission, origin, limits)),
+        ("checkTakeoffLandAvailable", _check_required_ends(mission, limits, setup.autopilot.refuses)),
+        ("checkDistanceToFirstWaypoint", _check_first_distance(mission, origin)),
+        ("checkDistancesBetweenWaypoints", _check_distances(mission, origin)),
+        ("checkIfBelowHomeAltitude", _check_home_altitude(mission)),
+        ("checkGeofence", _check_fence(setup)),
     )
     refuses = setup.autopilot.refuses
     found = [_finding(name, list(remarks), refuses) for name, remarks in checks]
-    # No autopilot has a name for these checks: they report the parts of a mission that are not judged.
+    # No autopilot has a name for the last checks, which report the parts of a mission that are not judged.
     return [
         *found,
         *_arduplane_refusals(setup),
@@ -76,14 +76,14 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
     ]
 
 
-# Remark of a check: its verdict, the item (None: the whole mission), and the reason.  PX4's refusal is a verdict only
+# Remark of a check: verdict, item (None for the whole mission), and reason.  A refusal by PX4 is a verdict only
 # if PX4 is to fly.
 REFUSED: Literal["refused"] = "refused"
 _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
 
 
 def _finding(check: str, said: list[_Remark], refuses: bool) -> Finding:
-    """Return one finding for a check's remarks.  refuses: True if the autopilot refuses what PX4 does."""
+    """Merge the remarks of a check into one finding.  refuses: True if the autopilot refuses the same items as PX4."""
     verdict = False if refuses else None
     remarks = [(verdict if ok == REFUSED else ok, item, why) for ok, item, why in said]
     # A failure comes first, then PX4's refusals, then mere remarks.
@@ -104,7 +104,7 @@ def _finding(check: str, said: list[_Remark], refuses: bool) -> Finding:
 
 
 def _arduplane_refusals(setup: FlightSetup) -> list[Finding]:
-    """Return a finding on the items that ArduPlane refuses at upload but PX4 accepts, if ArduPlane flies."""
+    """Return a finding on the items that ArduPlane refuses at upload but PX4 does not, if ArduPlane flies."""
     refused = [
         item
         for item in setup.mission.items
@@ -129,9 +129,10 @@ def _arduplane_refusals(setup: FlightSetup) -> list[Finding]:
 
 
 def _unjoined_finding(setup: FlightSetup) -> Finding:
-    """Report that an autopilot leaves the route: to a place inside a loiter, or about another center.
+    """Report that an autopilot leaves the route, to a place inside a loiter or around another center.
 
-    For an imported flight this is no fault, and undecided: `logs.verdict.rules.completion_rule.imported_completion`.
+    For an imported flight this is undecided, not a fault; see
+    `logs.verdict.rules.completion_rule.imported_completion`.
     """
     first, *others = setup.route.unjoined
     autopilot = setup.autopilot.title
@@ -156,7 +157,7 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
 
 
 def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
-    """Return a finding for each item and setting that changes the flight path and is not flown."""
+    """Yield a finding for each item or setting that would change the flight path but is not simulated."""
     left = [(one.item, one.text) for one in setup.route.open_items]
     if not setup.autopilot.follows_ground:
         held = sorted(set(setup.route.items[np.isfinite(setup.route.above_ground)].tolist()))
@@ -191,11 +192,11 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
 
 
 def _flown_items(mission: Mission) -> list[MissionItem]:
-    """Return the items that PX4 flies to."""
+    """Return the items with a position to which PX4 flies."""
     return [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
 
 
-def _validity(mission: Mission) -> Iterator[_Remark]:
+def _check_validity(mission: Mission) -> Iterator[_Remark]:
     for item in mission.items:
         name, support = command_name(item.command), support_of(item.command)
         if support.px4 == Treatment.REFUSED:
@@ -222,13 +223,13 @@ def _validity(mission: Mission) -> Iterator[_Remark]:
 
 
 def _height_above_home(mission: Mission, item: MissionItem) -> float:
-    """Return an item's height above home, m; NaN if unknown."""
+    """Return an item's height above home, m; NaN if unknown.  A height above terrain counts as above home."""
     if item.frame in OVER_HOME | OVER_TERRAIN:
         return item.alt
     return item.alt - mission.home.alt if mission.home is not None else math.nan
 
 
-def _takeoff(mission: Mission, limits: MissionChecks) -> Iterator[_Remark]:
+def _check_takeoff(mission: Mission, limits: MissionChecks) -> Iterator[_Remark]:
     placed = False
     for item in mission.items:
         if item.command in TAKEOFFS:
@@ -244,7 +245,7 @@ def _takeoff(mission: Mission, limits: MissionChecks) -> Iterator[_Remark]:
         placed = placed or item.command in PLACES | TAKEOFFS | LANDINGS | {C.NAV_RETURN_TO_LAUNCH}
 
 
-def _landing(mission: Mission) -> Iterator[_Remark]:
+def _check_landing(mission: Mission) -> Iterator[_Remark]:
     commands = [item.command for item in mission.items]
     starts = [k for k, command in enumerate(commands) if command == C.DO_LAND_START]
     lands = [k for k, command in enumerate(commands) if command in LANDINGS]
@@ -260,7 +261,7 @@ def _landing(mission: Mission) -> Iterator[_Remark]:
         yield REFUSED, seq[starts[0]], "invalid land start: no landing follows"
 
 
-def _approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) -> Iterator[_Remark]:
+def _check_approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) -> Iterator[_Remark]:
     steepest = math.degrees(limits.landing_angle)
     for before, item in zip(mission.items, mission.items[1:], strict=False):
         if item.command != C.NAV_LAND or before.command not in PLACES | TAKEOFFS or not before.has_position:
@@ -288,7 +289,7 @@ def _approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) -> Ite
             yield REFUSED, item.seq, steep
 
 
-def _takeoff_landing_required(mission: Mission, limits: MissionChecks, refuses: bool) -> Iterator[_Remark]:
+def _check_required_ends(mission: Mission, limits: MissionChecks, refuses: bool) -> Iterator[_Remark]:
     lack = missing_ends_text(mission, limits)
     if not lack:
         yield True, None, "takeoff and landing are as MIS_TKO_LAND_REQ asks for them"
@@ -304,7 +305,7 @@ def _distance_between(a: MissionItem, b: MissionItem, origin: GeoOrigin) -> floa
     return float(math.hypot(float(np.diff(east)[0]), float(np.diff(north)[0])))
 
 
-def _distance_to_first(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
+def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     places = _flown_items(mission)
     if mission.home is None or not places:
         yield True, None, "no home, so no distance to the first waypoint"
@@ -320,8 +321,8 @@ def _distance_to_first(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]
         )
 
 
-def _gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield a remark on a condition gate at the place of the waypoint before or after it."""
+def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
+    """Yield a remark on each condition gate that is too close to the waypoint before or after the gate."""
     places = [
         item
         for item in mission.items
@@ -333,8 +334,8 @@ def _gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
             yield REFUSED, after.seq, "distance between waypoint and gate too close"
 
 
-def _distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    yield from _gates(mission, origin)
+def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
+    yield from _check_gates(mission, origin)
     places = _flown_items(mission)
     if len(places) < 2:
         return
@@ -346,7 +347,7 @@ def _distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
         yield True, places[k + 1].seq, f"{reason} {PX4_WAYPOINT_SPACING_M:.0f} m by default, today's have no limit"
 
 
-def _below_home(mission: Mission) -> Iterator[_Remark]:
+def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
     for item in _flown_items(mission):
         if item.frame in OVER_HOME and mission.home is None:
             reason = "the file has no home, and heights over it: PX4 refuses them until the vehicle has one"
@@ -356,7 +357,7 @@ def _below_home(mission: Mission) -> Iterator[_Remark]:
             yield True, item.seq, f"waypoint {item.seq} below home: a warning"
 
 
-def _fence(setup: FlightSetup) -> Iterator[_Remark]:
+def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:
     if not setup.mission.fences:
         yield True, None, "the mission has no geofence"
         return

@@ -1,4 +1,4 @@
-"""List the rules of the verdict that judge, in one place.
+"""List all judging rules of the verdict in one place.
 
 To add a rule, write its words in `logs.verdict.rule_words`, its file, and its line here.
 """

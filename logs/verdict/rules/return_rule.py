@@ -1,8 +1,8 @@
-"""The return rule: where a return to launch goes, and how far it was flown.
+"""The return rule: judge where a return to launch goes, and how far it was flown.
 
-A mission only states that the aircraft is to return.  The path back is the autopilot's choice: no corridor, waypoint or
-slope is required of it, and its stand-in in the route is not judged for accuracy.  Ground, threats, zones, area, speed,
-stall and energy are judged on it as on every other leg.
+A mission only states that the aircraft is to return.  The autopilot chooses the path back, so the path has no required
+corridor, waypoint or slope, and is not judged against its stand-in in the route.  Ground, threats, zones, area, speed,
+stall and energy are judged on the return as on every other leg.
 """
 
 import math
@@ -30,12 +30,12 @@ from logs.verdict.rule import Rule
 from world.errors import MissionError
 from world.scenario_tables import ReturnDemand
 
-# Largest number of returns that are simulated if all have to be safe: one a second up to this, 2 ms each.
+# Maximum number of simulated returns if all have to be safe: one for each second of flight, 2 ms each.
 _MAX_RETURNS = 3000
 # Angle by which a logged loiter may fall short of a full lap, rad: its rows may miss up to a second at either end, at
 # 26 m/s on 260 m.
 _LAP_TOLERANCE_RAD = 0.1
-# Rules that hold a flight to its legs.
+# Rules that judge how well a flight follows its legs.
 _LEG_RULES = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
 
 
@@ -44,7 +44,7 @@ def return_findings(
 ) -> list[Finding]:
     """Judge where a planned return to launch goes, and whether an imported flight completed its return.
 
-    The end of planfly's own flights is known from outside their track: `flown_return_findings` judges them.
+    `flown_return_findings` judges planfly's own flights, because their track alone does not tell how they ended.
     """
     if geometric:
         demanded = _requirement_findings(requirements, partial(planned_starts, requirements.setup))
@@ -59,9 +59,10 @@ def return_findings(
 def flown_return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge where a flown return to launch goes and how, and whether it got there.
+    """Judge the path of a flown return to launch, and whether it arrived.
 
-    ended: "completed", which is after its loiter, or the reason for its end.  log_complete: reported by completion.
+    ended: "completed" if the flight ended after its loiter, otherwise the reason for its end.
+    log_complete: not used, because the completion rule reports it.
     """
     arrived = aligned is not None and bool(aligned.passed[-1]) and ended == "completed"
     why = "" if ended == "completed" else f": {ended}"
@@ -73,9 +74,9 @@ def flown_return_findings(
 
 
 def _requirement_findings(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:
-    """Judge the scenario's requirements on returns and glides from all of the path; may be empty.
+    """Judge the scenario's requirements on returns and glides from the whole path; return [] without requirements.
 
-    starts: makes the starts of returns, at an interval in s.
+    starts: function that samples the starts of returns at an interval, s.
     """
     setup = requirements.setup
     demanded = setup.scenario.returns
@@ -109,7 +110,7 @@ _NOT_KNOWN = "whether the aircraft gets home as the scenario requires is not kno
 
 
 class _Answer(NamedTuple):
-    """Answer to a requirement: whether it is met, or None if unknown; the reason; and how it was judged."""
+    """Answer to a requirement: True if it is met or None if unknown, the reason, and the method of judging."""
 
     ok: bool | None
     reason: str
@@ -123,9 +124,10 @@ def _judge_rtl(world: ReturnWorld, starts: ReturnStarts, every: float) -> _Answe
 
 
 def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer:
-    """Judge whether a glide from anywhere reaches home, a rally point, a landing place or flat ground.
+    """Judge whether a glide from every start reaches home, a rally point, a landing place or flat ground.
 
-    Below the least height above ground an aircraft takes off or lands, and descends straight ahead.
+    Starts below the minimum height above ground are left out, because there the aircraft takes off or lands and would
+    descend straight ahead.
     """
     low = heights_above_ground(world, starts) < world.limit
     glides = judge_glides(world, starts.at(np.flatnonzero(~low)))
@@ -142,9 +144,9 @@ _DEMANDS: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _Answe
 
 
 def circled(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
-    """Return True if a track was at its return loiter for its duration, all around it, at its altitude.
+    """Return True if a track flew its return loiter for at least one lap and for the loiter's full duration.
 
-    The time starts when it is there, near the center and at the altitude, as for a simulated flight
+    The time starts when the aircraft is near the center and at the loiter's altitude, as for a simulated flight
     (`flight.simulation.tick.end_return`).
     """
     end = requirements.setup.route.return_to
@@ -171,7 +173,7 @@ def _flown_finding(requirements: RouteRequirements, arrived: bool, why: str = ""
 
 
 def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> list[Finding]:
-    """Return one finding for a mission that ends with a return to launch."""
+    """Return one finding if the mission ends with a return to launch, otherwise []."""
     route = requirements.setup.route
     if route.return_from < 0:
         return []
@@ -200,9 +202,9 @@ def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> 
 def without_style(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Return findings without those that hold the return to its drawn path.
+    """Remove the findings that judge how well the return follows its drawn path.
 
-    findings: including the finding on the return itself.
+    findings: all findings, including the finding on the return itself.
     """
     first = requirements.setup.route.return_from
     if first < 0:

@@ -1,4 +1,4 @@
-"""The slope rule: whether each leg can be climbed or descended at its speed, and whether it was."""
+"""The slope rule: judge if each leg can be climbed or descended at its speed, and how it was flown."""
 
 import math
 
@@ -31,7 +31,7 @@ from world.wind import W20
 def slope_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each leg; ``geometric`` judges the route alone, without a flight."""
+    """Judge the slope of each leg; if ``geometric``, judge the route alone, without a flight."""
     out = []
     for leg in range(requirements.legs):
         # Without a flight the path of a climb that cannot be flown is unknown.
@@ -48,17 +48,17 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
     planned = float(requirements.slopes[leg])
     limit, source = slope_limit(requirements, leg)
     sign = 1.0 if planned >= 0.0 else -1.0
-    if abs(planned) <= LEVEL_SLOPE_RAD and not _in_envelope(requirements, leg):
+    if abs(planned) <= LEVEL_SLOPE_RAD and not _is_in_envelope(requirements, leg):
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL_SLOPE_RAD)
     faults, facts = [], [f"slope {math.degrees(planned):+.2f}°"]
     if abs(planned) > limit + PLAN_TOLERANCE_RAD:
         rise = step(requirements, leg)
         if rise is None:
-            faults.append(_too_steep(requirements, leg, limit, source))
+            faults.append(_steep_leg_message(requirements, leg, limit, source))
         else:
             facts.append(f"a step of {rise:.1f} m, beyond {math.degrees(limit):.1f}°, flown within its own height")
-    faults += _steep_arc(requirements, leg)
+    faults += _steep_arc_faults(requirements, leg)
     fit: LegFit | None = None
     method = "route"
     if measure is not None:
@@ -104,9 +104,9 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
-    """Return why a slope within all limits is undecided by an uncertain aircraft, "" if it is decided.
+    """Explain why an uncertain aircraft model leaves a slope within its limits undecided; return "" if decided.
 
-    A tighter limit of the scenario says nothing about the aircraft's ability.
+    Only the aircraft's own limits count, because a tighter limit of the scenario says nothing about its ability.
     """
     planned, envelope = float(requirements.slopes[leg]), requirements.setup.envelope
     limits, certain, verb, off = (
@@ -122,7 +122,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     return f"{verb} {slope:.1f}°, and what {envelope.source} says of the limit is {known:.1f}° give or take {give:.1f}°"
 
 
-def _steep_arc(requirements: RouteRequirements, leg: int) -> list[Message]:
+def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message]:
     """Return a fault if the fly-by arc at a leg's end is beyond the aircraft's limit."""
     found = steep_arc(requirements, leg)
     if found is None:
@@ -142,16 +142,16 @@ def _steep_arc(requirements: RouteRequirements, leg: int) -> list[Message]:
     return [Message(asks + limit, asks if place.item is None else f"the arc at {place_text(Place('waypoint', i))}")]
 
 
-def _in_envelope(requirements: RouteRequirements, leg: int) -> bool:
+def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
     low, high = requirements.setup.envelope.level_speeds(float(requirements.points[leg, 2]))
     return low <= float(requirements.route.airspeed[leg]) <= high
 
 
-def _too_steep(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
-    """Return the fault of a planned slope: what the leg needs, and the limit there."""
+def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
+    """Describe a planned slope beyond its limit, with the slope that the leg needs and the limit."""
     planned = float(requirements.slopes[leg])
     verb = "climbs" if planned >= 0.0 else "falls"
-    asks = f"{math.degrees(abs(planned)):.1f}° for {_distance(float(requirements.runs[leg]))}"
+    asks = f"{math.degrees(abs(planned)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
     if requirements.runs[leg] < MIN_LEG_LENGTH_M:
         rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
         asks = f"{round(rise, 1):g} m on the spot, {math.degrees(abs(planned)):.1f}°"
@@ -159,7 +159,7 @@ def _too_steep(requirements: RouteRequirements, leg: int, limit: float, source: 
 
 
 def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
-    """Return the limit on a leg's slope, in words, and the effect of the wind on it."""
+    """Describe the limit on a leg's slope, and how the wind changes the limit."""
     if source == "scenario":
         return f"the scenario allows {math.degrees(limit):.1f}°"
     speed = float(requirements.route.airspeed[leg])
@@ -179,17 +179,17 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     return f"{at} the aircraft can {calm_text} in calm air but {math.degrees(limit):.1f}° in this {blows}"
 
 
-def _distance(metres: float) -> str:
+def _distance_text(metres: float) -> str:
     return f"{metres / 1000.0:.1f} km" if metres >= 1000.0 else f"{metres:.0f} m"
 
 
 def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str], ...]:
-    """Return for either throttle limit: name, s at it, m/s off the command meanwhile, and direction."""
+    """Return each throttle limit's name, its duration, s, and the speed error at the limit, m/s, with its direction."""
     return (("full", measure.at_full, measure.slow, "slow"), ("idle", measure.at_idle, measure.fast, "fast"))
 
 
 def _flown_facts(measure: SlopeMeasure) -> list[str]:
-    """Describe how the leg was flown, in words."""
+    """Describe how the leg was flown."""
     facts = []
     if measure.slope is not None:
         facts.append(f"flown {math.degrees(measure.slope.value):+.2f}°")
@@ -200,7 +200,7 @@ def _flown_facts(measure: SlopeMeasure) -> list[str]:
 
 
 def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> list[Fact]:
-    """Return the measured leg in numbers."""
+    """Return the measurements of a flown leg as facts."""
     if measure is None:
         return []
     facts = [] if measure.height_error is None else [Fact("height error", measure.height_error, "m")]
@@ -215,7 +215,7 @@ def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMea
 def _flown_faults(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, weak: list[Message]
 ) -> list[Message]:
-    """Return how the flown leg differs from the planned leg.
+    """Return faults in which the flown leg differs from the planned leg.
 
     weak: faults that show a lack of performance.
     """
@@ -238,18 +238,18 @@ def _flown_faults(
     most = SPEED_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
     for name, held, off, way in _throttle_times(measure):
         # If the aircraft showed more ability than the leg needs, the air caused the speed error.
-        if held >= SATURATED_TIME_S and off > most and not (covered and name == _throttle(planned)):
+        if held >= SATURATED_TIME_S and off > most and not (covered and name == _throttle_limit(planned)):
             faults.append(message(f"throttle at {name} for {held:.0f} s and {off:.1f} m/s too {way}"))
     return faults
 
 
-def _throttle(planned: float) -> str:
-    """Return the name of the throttle limit that a slope may reach."""
+def _throttle_limit(planned: float) -> str:
+    """Return the name of the throttle limit, "full" or "idle", that a slope may reach."""
     return "full" if planned >= 0.0 else "idle"
 
 
 def _performance_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
-    """Return a fault if the aircraft showed a smaller limit than the leg needs."""
+    """Return a fault if the aircraft showed less climb or sink ability than the leg needs."""
     ability, planned = measure.ability, float(requirements.slopes[leg])
     if ability is None or abs(planned) <= LEVEL_SLOPE_RAD:
         return []
@@ -259,7 +259,7 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
     speed = float(requirements.route.airspeed[leg])
     return [
         message(
-            f"in {ability.seconds:.0f} s at {_throttle(planned)} throttle the aircraft showed that it can {verb}"
+            f"in {ability.seconds:.0f} s at {_throttle_limit(planned)} throttle the aircraft showed that it can {verb}"
             f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here",
             f"; the leg asks for {math.degrees(abs(planned)):.1f}°",
         )

@@ -1,4 +1,4 @@
-"""The speed rule: commanded airspeed in the envelope, room to take it up, and the flown airspeed."""
+"""The speed rule: judge the commanded airspeed by the envelope, the distance to reach it, and the flown airspeed."""
 
 import math
 from typing import NamedTuple
@@ -35,7 +35,7 @@ def speed_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge each leg's commanded airspeed by the envelope, and report the flown airspeed."""
-    found = [_speed(requirements, aligned, leg, geometric) for leg in range(requirements.legs)]
+    found = [_speed_finding(requirements, aligned, leg, geometric) for leg in range(requirements.legs)]
     return [*_parameter_findings(requirements), *found] if geometric else found
 
 
@@ -49,9 +49,9 @@ def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
     return [make_finding("speed", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN)]
 
 
-def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
+def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
     commanded = float(requirements.route.airspeed[leg])
-    slowest, fastest, faults = _level_flight_range(requirements, leg, commanded)
+    slowest, fastest, faults = _level_speed_range(requirements, leg, commanded)
     command = float(requirements.setup.route.airspeed[leg])
     notes = [_command_text(command, commanded, slowest, fastest)]
     notes += [*_speed_range_notes(requirements, command), *_short_leg_notes(requirements, leg, commanded)]
@@ -63,7 +63,7 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
     if unflown:
         notes.append("the leg was not flown")
     elif aligned is not None:
-        measured = _measure_leg(requirements, aligned, leg)
+        measured = _measure_airspeed(requirements, aligned, leg)
         if measured is None:
             mean = _nearest_mean(aligned, leg, commanded)
             notes.append(f"{mean:.1f} m/s reached; the leg is too short to hold it")
@@ -129,7 +129,8 @@ def _flown_command(requirements: RouteRequirements, leg: int) -> float:
 class _HeldSpeed(NamedTuple):
     """Airspeed that was held instead of the commanded airspeed, m/s.
 
-    allowed: tolerated difference from the command.  tolerance: what gusts may add to it.
+    allowed: tolerated difference from the command, m/s.
+    tolerance: further difference that gusts may cause, m/s.
     """
 
     speed: float
@@ -140,11 +141,11 @@ class _HeldSpeed(NamedTuple):
 def _find_held_speed(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int, commanded: float
 ) -> _HeldSpeed | None:
-    """Return the airspeed that a leg settled at if it is far from its command, or None.
+    """Return the airspeed at which the flight of a leg settled if it is far from the command, or None.
 
-    The mean over the second half of its steady rows.  In the first half an autopilot may still take up its speed.  If
-    the leg is too steep for the aircraft, the slope rule names the cause.  For an imported flight it is a fact only:
-    its airspeed sensor may have the same error.
+    The airspeed is the mean over the second half of the leg's steady rows, because in the first half the autopilot may
+    still change its speed.  Return None if the leg is too steep for the aircraft, because the slope rule then names the
+    cause, and for an imported flight, because its airspeed sensor may have the same error.
     """
     if abs(float(requirements.slopes[leg])) > slope_limit(requirements, leg)[0] + PLAN_TOLERANCE_RAD:
         return None
@@ -164,7 +165,7 @@ def _find_held_speed(
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: float, fastest: float) -> str:
-    """Return why a level-flight speed is undecided if the aircraft's maximum is uncertain; "" if decided."""
+    """Explain why an uncertain maximum airspeed leaves a commanded speed undecided; return "" if decided."""
     envelope = requirements.setup.envelope
     if not envelope.fastest_sd:
         return ""
@@ -188,7 +189,7 @@ def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[
 
 
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
-    """Return a note if a leg is too short to take up its speed at `MAX_STEADY_ACCELERATION_MPS2`."""
+    """Return a note if a leg is too short to reach its speed at `MAX_STEADY_ACCELERATION_MPS2`."""
     before = float(requirements.route.airspeed[leg - 1]) if leg else commanded
     change, run = commanded - before, float(requirements.runs[leg])
     seconds = abs(change) / MAX_STEADY_ACCELERATION_MPS2
@@ -207,13 +208,13 @@ def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float
 
 
 def _nearest_mean(aligned: AlignedTrack, leg: int, commanded: float) -> float:
-    """Return the mean airspeed over a second of a leg, or over a shorter leg, nearest to its command, m/s."""
+    """Return the one-second mean airspeed on a leg (or the mean over a shorter leg) nearest to the command, m/s."""
     means = _second_means(aligned, aligned.leg_rows(leg))
     return float(means[np.argmin(np.abs(means - commanded))])
 
 
 def _second_means(aligned: AlignedTrack, rows: slice) -> Floats:
-    """Return the mean airspeeds over each second of some rows, or over all of fewer rows, m/s."""
+    """Return the mean airspeed over each second of some rows, or over all rows if they are fewer, m/s."""
     speed = aligned.track.airspeed[rows].astype(np.float64)
     width = max(1, min(speed.size, round(1.0 / aligned.tick)))
     total = np.concatenate([[0.0], np.cumsum(speed)])
@@ -221,17 +222,17 @@ def _second_means(aligned: AlignedTrack, rows: slice) -> Floats:
 
 
 def _caused_by_air(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, off: float) -> bool:
-    """Return True if vertical air motion caused the speed error and the aircraft showed enough ability."""
+    """Return True if vertical air motion caused the speed error `off`, because the aircraft showed enough ability."""
     if off * requirements.slopes[leg] >= 0.0:
         return False
     ability = measure_ability(requirements, aligned, leg)
     return ability is not None and ability.covers(float(requirements.slopes[leg]))
 
 
-def _level_flight_range(
+def _level_speed_range(
     requirements: RouteRequirements, leg: int, commanded: float
 ) -> tuple[float, float, list[Message]]:
-    """Return the range of level-flight speeds all along a leg, and faults of the commanded speed."""
+    """Return the airspeeds at which level flight is possible along the whole leg, and faults of the commanded speed."""
     heights = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     speeds = [requirements.setup.envelope.level_speeds(up) for up in heights]
     # If level flight is impossible at one altitude, NaN remains for the whole leg.
@@ -251,10 +252,12 @@ def _level_flight_range(
     return slowest, fastest, faults
 
 
-def _measure_leg(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> tuple[float, float, float] | None:
-    """Return a leg's mean airspeed, its tolerance, and its least mean over a second, m/s.
+def _measure_airspeed(
+    requirements: RouteRequirements, aligned: AlignedTrack, leg: int
+) -> tuple[float, float, float] | None:
+    """Return a leg's mean airspeed, its tolerance, and its minimum mean over a second, m/s; None if too short.
 
-    The tolerance is for gusts and a new slope.
+    The tolerance allows for gusts and for a change of slope at the start of the leg.
     """
     rows = steady_rows(requirements, aligned, leg)
     time = aligned.track.time[rows]
@@ -271,7 +274,7 @@ def _measure_leg(requirements: RouteRequirements, aligned: AlignedTrack, leg: in
 
 
 def _gust_spread(requirements: RouteRequirements, seconds: float) -> float:
-    """Return how far gusts may carry the mean airspeed over some seconds, m/s."""
+    """Return how much gusts may change the mean airspeed over a duration, m/s."""
     gust = GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
     return GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_DURATION_S / max(seconds, 1e-3)))
 

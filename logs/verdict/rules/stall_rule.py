@@ -1,9 +1,9 @@
-"""The stall rule: airspeed against the stall speed in a bank, which the load factor raises.
+"""The stall rule: compare the airspeed with the stall speed in a bank, which the load factor raises.
 
-A level turn with bank b needs a lift of n = 1 / cos b weights, and the slowest speed that carries it is the slowest
-level speed times the root of n (Beard and McLain, *Small Unmanned Aircraft*, section 5.1; any text on the level turn).
-All speeds are true airspeeds at the altitude where they are flown, like the envelope's speeds: they include the lower
-air density there, and an autopilot's equivalent airspeeds are converted to true airspeeds first.
+A level turn with bank b needs a lift of n = 1 / cos b weights, and the minimum speed that provides this lift is the
+minimum level speed times the root of n (Beard and McLain, *Small Unmanned Aircraft*, section 5.1; any text on the level
+turn).  All speeds are true airspeeds at the altitude where they are flown, like the envelope's speeds, so they include
+the lower air density at that altitude; an autopilot's equivalent airspeeds are converted to true airspeeds first.
 """
 
 import math
@@ -28,7 +28,7 @@ from world.wind import W20
 
 @dataclass(frozen=True, slots=True)
 class _Margin:
-    """Airspeed, the stall speed in this bank (rad) and in level flight; m/s true."""
+    """True airspeed and the stall speeds in this bank (rad) and in level flight, m/s."""
 
     speed: float
     stall: float
@@ -44,21 +44,21 @@ class _Margin:
 def stall_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the least margin of airspeed over the stall in a bank; empty for a route without a turn.
+    """Judge the minimum margin of airspeed above the stall in a bank; return [] for a route without a turn.
 
-    A route that needs a bank in which its speed is below the stall fails in flight too, at whatever speed it was flown:
-    an autopilot that did not accept the speed, or banked less, does not make the route flyable.
+    A route fails in flight too if its speed is below the stall in a bank that it needs, whatever speed was flown,
+    because an autopilot that did not accept the speed, or banked less, does not make the route flyable.
     """
-    planned = _planned(requirements)
+    planned = _planned_findings(requirements)
     if geometric:
         return planned
     # Without an envelope there is no limit to compare a flight with.
     if aligned is None or not requirements.envelope:
         return []
-    return [found for found in planned if found.ok is False] or _flown(requirements, aligned)
+    return [found for found in planned if found.ok is False] or _flown_findings(requirements, aligned)
 
 
-def _planned(requirements: RouteRequirements) -> list[Finding]:
+def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
     worst: tuple[float, int, _Margin] | None = None
     for i in range(1, requirements.legs):
         for speed in requirements.route.airspeed[i - 1 : i + 1].tolist():
@@ -76,10 +76,10 @@ def _planned(requirements: RouteRequirements) -> list[Finding]:
 
 
 def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float:
-    """Return the bank (rad) that a waypoint's turn takes at an airspeed (m/s), up to the limit.
+    """Return the bank that a waypoint's turn needs at an airspeed (m/s), up to the bank limit, rad.
 
-    On an arc of radius R it is atan(v^2 / (g R)) at the highest ground speed v on it, and a turn that is over before
-    the aircraft has rolled into it takes no more bank than it can roll to.
+    On an arc of radius R the bank is atan(v^2 / (g R)) at the highest ground speed v on the arc.  A turn that ends
+    before the aircraft has rolled in completely needs no more bank than the aircraft reaches by then.
     """
     turn, radius, limit = abs(float(requirements.turns[i])), float(requirements.radius[i]), requirements.limits.max_bank
     if turn <= 0.0 or not math.isfinite(radius):
@@ -94,19 +94,19 @@ def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float
 
 
 def level_stall(requirements: RouteRequirements, up: float) -> float:
-    """Return the slowest level flight at an altitude (m AMSL), m/s true.
+    """Return the minimum true airspeed of level flight at an altitude (m AMSL), m/s.
 
-    The elevator is at its stop there.
+    At this airspeed the elevator is at its stop.
     """
     return requirements.setup.envelope.level_speeds(up)[0]
 
 
-def _flown(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Finding]:
+def _flown_findings(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Finding]:
     track = aligned.track
     width = max(1, min(len(track), round(STALL_AVERAGING_TIME_S / aligned.tick)))
-    speed, load = _means(track.airspeed, width), _means(track.load_factor, width)
-    bank = _means(np.abs(track.attitude[:, ROLL]), width)
-    up = _means(track.position[:, 2], width)
+    speed, load = _window_means(track.airspeed, width), _window_means(track.load_factor, width)
+    bank = _window_means(np.abs(track.attitude[:, ROLL]), width)
+    up = _window_means(track.position[:, 2], width)
     envelope = requirements.setup.envelope
     level = np.interp(up, envelope.amsl, envelope.level_speed_min)
     # Load that the wing carried, or that it needed to hold altitude in a turn within the bank limit.
@@ -122,8 +122,8 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Findi
     return [_finding(found, f"at {track.time[k + width // 2]:.1f} s", tolerance, geometric=False)]
 
 
-def _means(values: NDArray[np.floating], width: int) -> Floats:
-    """Return the mean over each window of this many rows."""
+def _window_means(values: NDArray[np.floating], width: int) -> Floats:
+    """Return the mean over each window of `width` rows."""
     total = np.concatenate([[0.0], np.cumsum(values.astype(np.float64))])
     return np.asarray((total[width:] - total[:-width]) / width)
 

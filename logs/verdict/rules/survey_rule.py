@@ -1,7 +1,7 @@
-"""The survey rule: how much of each photo line is flown usably, and how much its photos overlap.
+"""The survey rule: judge how much of each photo line is usable for photos, and how much the photos overlap.
 
-The autopilot decides a survey's turn-arounds, as long as they keep clear of ground, threats and zones: the turn, slope
-and waypoint rules ignore them, and so does the corridor rule unless a corridor is stated.
+The autopilot chooses the path of a survey's turnarounds, as long as they stay clear of ground, threats and zones.  The
+turn, slope and waypoint rules therefore ignore turnarounds, and so does the corridor rule unless a corridor is stated.
 """
 
 import math
@@ -32,26 +32,27 @@ SIDE = "side overlap"
 def survey_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each photo line.
+    """Judge each photo line and the overlap of each survey's photos.
 
-    ``geometric``: by the part that its end turns leave of it, and each turn-around's room.
+    If ``geometric``, judge a line by the part that the turns at its ends leave straight, and report turnarounds that
+    are too tight.
     """
     out = []
     for survey in requirements.surveys:
         for number, line in enumerate(survey.lines, 1):
             if geometric:
-                out.append(_planned(requirements, survey, line, number))
+                out.append(_planned_finding(requirements, survey, line, number))
             else:
-                out.append(_flown(requirements, aligned, survey, line, number))
+                out.append(_flown_finding(requirements, aligned, survey, line, number))
         if geometric:
-            out += _turn_arounds(requirements, survey)
+            out += _tight_turnaround_findings(requirements, survey)
         if geometric or aligned is not None:
-            out += _overlaps(requirements, None if geometric else aligned, survey)
+            out += _overlap_findings(requirements, None if geometric else aligned, survey)
     return out
 
 
-def _overlaps(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
-    """Judge the least overlap of a survey's photos along its lines and across, if its camera is known."""
+def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
+    """Judge the minimum overlap of a survey's photos along and across its lines, if its camera is known."""
     measure = measure_overlap(requirements, aligned, survey)
     if measure is None:
         return []
@@ -70,7 +71,7 @@ def _overlaps(requirements: RouteRequirements, aligned: AlignedTrack | None, sur
         out.append(
             make_finding(
                 "survey",
-                _place(requirements, line),
+                _line_place(requirements, line),
                 ok=ok,
                 reason=reason_of(faults, [] if faults else [text]),
                 faults=faults,
@@ -89,7 +90,7 @@ def _overlaps(requirements: RouteRequirements, aligned: AlignedTrack | None, sur
 
 
 def overlap_text(measure: OverlapMeasure, check: str) -> str:
-    """Describe the least overlap of photos along lines or across them, its place, and the requirement."""
+    """Describe the minimum overlap of photos along or across lines, its place, and the required overlap."""
     if check == FRONT:
         share, specified = measure.front, measure.camera.front
         soonest = f" apart, one each {measure.camera.interval:g} s" if measure.slow else " apart"
@@ -104,15 +105,16 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
     return text if specified is None else f"{text}, {100.0 * specified:.0f} % asked for"
 
 
-def _turn_arounds(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
-    """Report turn-arounds too tight to be flown as drawn with hazards in reach.
+def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
+    """Report each turnaround that is too tight to be flown as drawn and has hazards within reach.
 
-    Only a flight shows their path.  This includes the turns onto the first line and off the last.
+    Only a flight shows the path of such a turnaround.  The turns onto the first line and off the last line count as
+    turnarounds.
     """
     out = []
     ways = survey.ways_onto_lines()
     for number, (first, last) in enumerate(ways):
-        if not any(_too_tight(requirements, i) for i in range(first, last + 1)):
+        if not any(_is_too_tight(requirements, i) for i in range(first, last + 1)):
             continue
         points, radii = requirements.points[first : last + 1], requirements.tightest[first : last + 1]
         middle = points[:, :2].mean(axis=0)
@@ -130,8 +132,8 @@ def _turn_arounds(requirements: RouteRequirements, survey: Survey) -> list[Findi
     return out
 
 
-def _too_tight(requirements: RouteRequirements, i: int) -> bool:
-    """Return True if a corner has no room for its turn."""
+def _is_too_tight(requirements: RouteRequirements, i: int) -> bool:
+    """Return True if the legs at a corner are too short for its turn."""
     turn = abs(float(requirements.turns[i]))
     return 0 < i < requirements.legs and turn > turn_limit(requirements, i)[0] + PLAN_TOLERANCE_RAD
 
@@ -141,18 +143,18 @@ def _line_text(requirements: RouteRequirements, survey: Survey, line: PhotoLine,
     return f"photo line {number} of {len(survey.lines)} (items {items[0]} to {items[1]})"
 
 
-def _place(requirements: RouteRequirements, line: PhotoLine) -> Place:
+def _line_place(requirements: RouteRequirements, line: PhotoLine) -> Place:
     return requirements.leg(line.first)
 
 
-def _planned(requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int) -> Finding:
-    """Judge the part of a line that the turns at its ends leave, if the line ends at its turns."""
+def _planned_finding(requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int) -> Finding:
+    """Judge the part of a line that the turns at its ends leave straight."""
     length = float(requirements.runs[line.first : line.last].sum())
-    # The part that the turns use of the leads before and after the line does not matter.
+    # The turns may use the leads before and after the line.
     lead_in = float(requirements.runs[line.begins : line.first].sum())
     lead_out = float(requirements.runs[line.last : line.ends].sum())
-    cut_in = _clipped(float(requirements.after[line.begins]) - lead_in, length)
-    cut_out = _clipped(_turn_lead(requirements, line) - lead_out, length)
+    cut_in = _clip_length(float(requirements.after[line.begins]) - lead_in, length)
+    cut_out = _clip_length(_turn_lead(requirements, line) - lead_out, length)
     share = max(0.0, length - cut_in - cut_out) / length
     ok = share >= PHOTO_COVERAGE_FRACTION
     name = _line_text(requirements, survey, line, number)
@@ -168,7 +170,7 @@ def _planned(requirements: RouteRequirements, survey: Survey, line: PhotoLine, n
 
 
 def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
-    """Return how far before the end of a line's straight run the turn there begins, m."""
+    """Return the distance before the end of a line's straight run at which the turn begins, m."""
     setup, last = requirements.setup, line.ends
     if setup.autopilot.follows_path or not 0 < last < requirements.legs:
         return float(requirements.before[last])
@@ -177,11 +179,11 @@ def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
     return stated or setup.autopilot.turn_distance(turn, float(requirements.points[last, 2]))
 
 
-def _clipped(metres: float, length: float) -> float:
+def _clip_length(metres: float, length: float) -> float:
     return min(max(metres, 0.0), length) if math.isfinite(metres) else length
 
 
-def _flown(
+def _flown_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey, line: PhotoLine, number: int
 ) -> Finding:
     name = _line_text(requirements, survey, line, number)
@@ -189,7 +191,7 @@ def _flown(
     if measure is None:
         return _finding(requirements, line, None, [], [f"{name}: not flown"], math.nan, geometric=False)
     ok = measure.good >= PHOTO_COVERAGE_FRACTION
-    faults = [] if ok else [_fault(measure, name)]
+    faults = [] if ok else [_coverage_fault(measure, name)]
     facts = [] if not ok else [f"{name}: {100.0 * measure.good:.0f} % of its {measure.length:.0f} m can be used"]
     if measure.missed:
         facts.append(f"{measure.missed} of {measure.photos} photos missed")
@@ -197,7 +199,7 @@ def _flown(
 
 
 def lost_text(measure: LineMeasure) -> str:
-    """Describe the defects of the lost parts of a line, the largest first; "" if next to nothing is lost."""
+    """Describe the defects of a line's unusable parts, the largest first; return "" if almost nothing is lost."""
     lacks = {
         f"not along it within {measure.allowed_aside:.0f} m": measure.away,
         f"banked beyond {math.degrees(MAX_PHOTO_BANK_RAD):.0f}°": measure.banked,
@@ -208,8 +210,8 @@ def lost_text(measure: LineMeasure) -> str:
     return ", ".join(f"{100.0 * share:.0f} % {what}" for share, what in parts)
 
 
-def _fault(measure: LineMeasure, name: str) -> Message:
-    """Describe the usable part of a line, the defects of the rest, and the lost length at its ends."""
+def _coverage_fault(measure: LineMeasure, name: str) -> Message:
+    """Describe a line's usable part, the defects of its other parts, and the length lost at its ends."""
     ends = f"; its first {measure.late:.0f} m and last {measure.early:.0f} m are lost"
     return message(
         f"{name}: {100.0 * measure.good:.0f} % of its {measure.length:.0f} m can be used",
@@ -239,7 +241,7 @@ def _finding(
         ]
     return make_finding(
         "survey",
-        _place(requirements, line),
+        _line_place(requirements, line),
         ok=ok,
         reason=reason_of(faults, facts),
         faults=faults,

@@ -1,9 +1,10 @@
-"""The take-off and landing rules: the climb to a mission's first place, and its final approach.
+"""The take-off and landing rules: judge the climb to a mission's first place, and its final approach.
 
-A flight begins and ends in the air, so both are judged by the mission's places alone, whether it was flown or not.
-An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper than it can climb
-is not judged: QGroundControl draws a climb-out of 30 degrees (its TakeoffMissionItem), and autopilots climb on.
-Any part of a mission's own take-off or landing that is not judged leaves the verdict undecided.
+A flight begins and ends in the air, so both are judged from the mission's places alone, whether or not the mission was
+flown.  An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper than the
+aircraft can climb is not judged, because QGroundControl draws a climb-out of 30 degrees (its TakeoffMissionItem), and
+autopilots continue to climb.  Any part of a mission's own take-off or landing that is not judged leaves the verdict
+undecided.
 """
 
 import math
@@ -19,7 +20,7 @@ from logs.verdict.tolerances import PLAN_TOLERANCE_RAD
 from logs.verdict.wording import gentle_launch_text, place_text
 from world.airfield import Launch
 
-# Verb for how the flight replaces the phase.
+# Verb that says which end of the flight, in the air, replaces the phase.
 _VERBS = {"takeoff": "begins", "landing": "ends"}
 _TITLES = {"takeoff": "take-off", "landing": "landing"}
 # Result for a slope beyond the limit.
@@ -49,18 +50,18 @@ def takeoff_findings(
     if launch is not None and (at == 0 or not own):
         # From the ground at home to the next place, on the launch course.
         high = float(requirements.points[at + 1, 2])
-        return [_slope(requirements, "takeoff", at, at + 1, route.takeoff_ground, high)]
+        return [_slope_finding(requirements, "takeoff", at, at + 1, route.takeoff_ground, high)]
     if at == 0 or not own:
         reason = f"to {up:.0f} m AMSL over home, on a course that is the autopilot's to choose"
-        return [_unjudged("takeoff", requirements.waypoint(at), reason)]
+        return [_unjudged_finding("takeoff", requirements.waypoint(at), reason)]
     # From home, over which the flight starts: `at` is the take-off item's own place.
-    return [_slope(requirements, "takeoff", 0, at, route.takeoff_ground, up)]
+    return [_slope_finding(requirements, "takeoff", 0, at, route.takeoff_ground, up)]
 
 
 def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> list[Finding]:
-    """Return a finding if a launch is too gentle to start the motor.
+    """Return a finding if the acceleration of a launch is too small to start the motor.
 
-    Empty if the autopilot needs no acceleration.
+    Return [] if the autopilot needs no acceleration.
     """
     setup = requirements.setup
     trigger, found = setup.autopilot.launch_trigger, launch.acceleration(setup.slowest_launched)
@@ -107,25 +108,27 @@ def landing_findings(
         if route.return_from >= 0 and not flown_on:
             # The return ends the mission; the landing after it is not flown.
             return [make_finding("landing", end, ok=None, reason=reason, unit="deg")]
-        return [_unjudged("landing", end, reason)]
+        return [_unjudged_finding("landing", end, reason)]
     at, ground = found[-1], requirements.setup.route.landing_ground
-    return [_slope(requirements, "landing", at - 1, at, float(requirements.points[at - 1, 2]), ground)]
+    return [_slope_finding(requirements, "landing", at - 1, at, float(requirements.points[at - 1, 2]), ground)]
 
 
 def _waypoint_of(requirements: RouteRequirements, seq: int) -> int:
-    """Return the last waypoint of a mission's item, or -1 without one."""
+    """Return the last waypoint that belongs to a mission item, or -1 if there is none."""
     found = [k for k, item in enumerate(requirements.setup.route.items) if int(item) == seq]
     return found[-1] if found else -1
 
 
-def _slope(requirements: RouteRequirements, rule: str, first: int, last: int, low: float, high: float) -> Finding:
-    """Judge the slope between the places of two waypoints, at two altitudes (m AMSL)."""
+def _slope_finding(
+    requirements: RouteRequirements, rule: str, first: int, last: int, low: float, high: float
+) -> Finding:
+    """Judge the slope from waypoint `first` at altitude `low` to waypoint `last` at altitude `high`, m AMSL."""
     place = requirements.waypoint(last)
     run = float(requirements.runs[first:last].sum())
     if math.isnan(low) or math.isnan(high):
-        return _unjudged(rule, place, "the height of the ground there is not known")
+        return _unjudged_finding(rule, place, "the height of the ground there is not known")
     slope = math.atan2(high - low, run)
-    limit, source = _limit(requirements, first, low, high, slope)
+    limit, source = _slope_limit(requirements, first, low, high, slope)
     verb = "climbs" if slope >= 0.0 else "sinks"
     text = f"{verb} {abs(high - low):.0f} m in {run:.0f} m, {math.degrees(abs(slope)):.1f}°"
     within = abs(slope) <= limit + PLAN_TOLERANCE_RAD
@@ -155,14 +158,14 @@ def _slope(requirements: RouteRequirements, rule: str, first: int, last: int, lo
     )
 
 
-def _unjudged(rule: str, place: Place, reason: str) -> Finding:
+def _unjudged_finding(rule: str, place: Place, reason: str) -> Finding:
     """Return a finding on a take-off or landing that is not judged, which leaves the verdict undecided."""
     fault = message(f"the {_TITLES[rule]} at {place_text(place)} is not judged")
     return make_finding(rule, place, ok=None, reason=reason, faults=[fault], unit="deg", check=GROUND_WAY)
 
 
-def _limit(requirements: RouteRequirements, leg: int, low: float, high: float, slope: float) -> tuple[float, str]:
-    """Return the steepest slope of this sign over the ground on a leg's course (rad), and its source."""
+def _slope_limit(requirements: RouteRequirements, leg: int, low: float, high: float, slope: float) -> tuple[float, str]:
+    """Return the limit of slopes with the sign of `slope`, over the ground on a leg's course, rad, and its source."""
     side, limits = (0 if slope >= 0.0 else 1), requirements.limits
     speed, course = float(requirements.route.airspeed[leg]), float(requirements.courses[leg])
     by_aircraft = min(limits.slopes(course, up, speed)[side] for up in (low, high))

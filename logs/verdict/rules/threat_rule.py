@@ -1,4 +1,4 @@
-"""The threat rule: time and exposure inside each missile's and radar's sphere, planned and flown."""
+"""The threat rule: judge time and exposure inside each missile's and radar's sphere, planned and flown."""
 
 import math
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ _METHOD = "time inside, exact on each segment"
 def threat_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each missile and radar sphere that plan or flight touches, or report that no missile is met."""
+    """Judge each missile or radar sphere that plan or flight touches, or report that no missile sphere is entered."""
     scenario = requirements.setup.scenario
     if scenario.external:
         reason = "the mission came without a scenario, so threats are not known"
@@ -49,10 +49,10 @@ def threat_findings(
                 if away < nearest:
                     nearest, name = away, threat_label(table.name or "", m)
             if plan.closest[m] <= radii[m] or (track is not None and track.closest[m] <= radii[m]):
-                visit = None if geometric else _visit(track, m)
+                visit = None if geometric else _sphere_visit(track, m)
                 place = Place(side, m, name=table.name or "")
-                where = "" if side == "radar" else _nearest_place(requirements, aligned, visit, float(radii[m]))
-                touched.append(_sphere_finding(place, _visit(plan, m), visit, float(radii[m]), where))
+                where = "" if side == "radar" else _nearest_place_text(requirements, aligned, visit, float(radii[m]))
+                touched.append(_sphere_finding(place, _sphere_visit(plan, m), visit, float(radii[m]), where))
     if not any(item.place.kind == "missile" for item in touched):
         error = position_error(requirements.setup)
         touched.insert(0, _no_entry_finding(len(threats), nearest, name, error, aligned is not None or geometric))
@@ -60,7 +60,7 @@ def threat_findings(
 
 
 def _spheres(threats: Threats, side: Side) -> tuple[Floats, Floats]:
-    """Return the radii and scales of every threat's missile or radar, (m,) m each."""
+    """Return the radius and the scale of each threat's missile or radar sphere, m, (m,) each."""
     if side == "missile":
         return threats.kill_radius, threats.kill_scale
     return threats.detection_radius, threats.detection_scale
@@ -68,9 +68,10 @@ def _spheres(threats: Threats, side: Side) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True, slots=True)
 class _Visit:
-    """Visit to one sphere; NaN if not flown.
+    """Visit to one sphere; all values are NaN if nothing was flown.
 
-    inside, exposure, closest_time: s.  closest: least distance to its center, m.
+    inside, exposure, closest_time: s.
+    closest: minimum distance to the sphere's center, m.
     """
 
     inside: float = math.nan
@@ -79,19 +80,19 @@ class _Visit:
     closest_time: float = math.nan
 
 
-def _visit(visits: SphereVisits | None, m: int) -> _Visit:
+def _sphere_visit(visits: SphereVisits | None, m: int) -> _Visit:
     if visits is None:
         return _Visit()
     columns = (visits.inside, visits.exposure, visits.closest, visits.closest_time)
     return _Visit(*(float(column[m]) for column in columns))
 
 
-def _nearest_place(
+def _nearest_place_text(
     requirements: RouteRequirements, aligned: AlignedTrack | None, visit: _Visit | None, radius: float
 ) -> str:
-    """Return where a flight inside a sphere was nearest to its center, in words; "" if not inside.
+    """Describe where a flight inside a sphere was nearest to the center; return "" if it was not inside.
 
-    radius: m.
+    radius: radius of the sphere, m.
     """
     if aligned is None or visit is None or math.isnan(visit.closest_time) or visit.closest > radius:
         return ""
@@ -102,9 +103,10 @@ def _nearest_place(
 
 
 def _no_entry_finding(count: int, nearest: float, name: str, error: float, judged: bool) -> Finding:
-    """Report that no sphere is entered.
+    """Report that no missile sphere is entered.
 
-    nearest: m outside the named threat's sphere.  error: of navigation, m.
+    nearest: distance outside the sphere of the threat called `name`, m.
+    error: navigation error, m.
     """
     reason = f"no missile sphere of {count} threats is entered" if count else "the scenario has no threats"
     facts = []

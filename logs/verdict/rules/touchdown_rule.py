@@ -1,10 +1,10 @@
-"""The touchdown rule: a flown landing, from the last waypoint to where the aircraft stops.
+"""The touchdown rule: judge a flown landing, from the last waypoint to where the aircraft stops.
 
-It judges the final's height above ground, the hazards that the final enters, and where the aircraft touches down and
-stops on the scenario's strip.  The sink rate towards the ground, which may rise before the aircraft, is reported: the
-simulation of ArduPlane's law is accurate down to the flare, but less so in the last metres (`docs/measured.md`).  So a
-sink rate beyond all measured ones leaves the landing undecided, and no sink rate passes or fails it.  A
-landing that is not flown is judged by the landing and approach rules, from the mission's items.
+The rule judges the height of the final above ground, the hazards that the final enters, and the places on the
+scenario's strip where the aircraft touches down and stops.  It only reports the sink rate towards the ground, which may
+slope upwards, because the simulation of ArduPlane's law is accurate down to the flare but less accurate in the last
+metres (`docs/measured.md`).  A sink rate beyond all measured ones therefore leaves the landing undecided, and no sink
+rate passes or fails it.  The landing and approach rules judge a landing that is not flown, from the mission's items.
 """
 
 import math
@@ -40,14 +40,14 @@ _SLOPE_RUN_M = 10.0
 
 
 class _Landing(NamedTuple):
-    """Landing in numbers.
+    """Measurements of a landing.
 
-    along, aside: position of the touch-down, beyond the landing point and to the right of it, m.
-    touch, stop: positions along the strip beyond its center, and to the side of it, m.
-    left: length of strip left beyond the stop, m.
+    along, aside: position of the touch-down beyond the landing point and to the right of the landing course, m.
+    touch, stop: touch-down and stop, each as distance beyond the strip's center and distance to the side, m.
+    left: length of strip remaining beyond the stop, m.
     sink, towards: sink rate at the touch-down, vertical and relative to the sloping ground, m/s.
-    room: least height above ground of the final, m; inf without a final, NaN if unknown.
-    over: height of the landing point above the ground there, m.
+    room: minimum height of the final above ground, m; inf without a final, NaN if unknown.
+    over: height of the landing point above the ground, m.
     """
 
     along: float
@@ -64,7 +64,7 @@ class _Landing(NamedTuple):
 def touchdown_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flown landing at its point; before the flight only a strip that is too short."""
+    """Judge a flown landing; before a flight, only report a strip that is too short."""
     ground = requirements.ground
     if ground is None or ground.ways.approach is None:
         planned = requirements.setup.ground_ways.approach if geometric else None
@@ -83,7 +83,7 @@ def touchdown_findings(
         return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY)]
     k = _touchdown_row(track, terrain)
     if k is None:
-        fault = message("the aircraft did not touch down", f" at {_place_of(approach)}")
+        fault = message("the aircraft did not touch down", f" at {_landing_point_text(approach)}")
         return [make_finding("touchdown", place, ok=False, reason=fault.text, faults=[fault], unit="m")]
     landing = _measure_landing(requirements, track, terrain, approach, k)._replace(over=over)
     faults = _detect_faults(approach, landing)
@@ -94,8 +94,8 @@ def touchdown_findings(
 
 
 def _planned_findings(place: Place, approach: Approach) -> list[Finding]:
-    """Return the finding known before a landing is flown: a strip too short to judge the touch-down."""
-    found = _too_short(approach)
+    """Before a flight, return a finding if the strip is too short to judge the touch-down."""
+    found = _short_strip_messages(approach)
     reason = reason_of(found)
     return [make_finding("touchdown", place, ok=None, reason=reason, faults=found, check=GROUND_WAY)] if found else []
 
@@ -103,10 +103,10 @@ def _planned_findings(place: Place, approach: Approach) -> list[Finding]:
 def _measure_landing(
     requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, k: int
 ) -> _Landing:
-    """Measure a landing that touches down at a row, except the height of its point."""
+    """Measure a landing that touches down at row `k`; the field `over` stays unset."""
     position = np.asarray(track.position, dtype=np.float64)
-    along, aside = _pair(approach.place(position[k]))
-    touch, stop = (_pair(approach.on_strip(position[row])) for row in (k, -1))
+    along, aside = _as_floats(approach.place(position[k]))
+    touch, stop = (_as_floats(approach.on_strip(position[row])) for row in (k, -1))
     sink, towards = _sink_rates(track, terrain, approach, k)
     return _Landing(
         along=along,
@@ -121,7 +121,7 @@ def _measure_landing(
 
 
 def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[Message], *, gusts: bool) -> Finding:
-    """Return the finding: faults, or else undecided parts, or else unknown ground.
+    """Return the finding on a landing, with its faults, otherwise its undecided parts, otherwise unknown ground.
 
     gusts: True if the air is turbulent.
     """
@@ -135,7 +135,7 @@ def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[M
         "touchdown",
         place,
         ok=False if faults else None if open_ else True,
-        reason=reason_of(messages, _description(approach, landing)),
+        reason=reason_of(messages, _describe_landing(approach, landing)),
         faults=messages,
         flown=farthest,
         limit=inside,
@@ -156,17 +156,17 @@ def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[M
     )
 
 
-def _place_of(approach: Approach) -> str:
-    """Return the landing point in words."""
+def _landing_point_text(approach: Approach) -> str:
+    """Name the landing point by its mission item."""
     return f"item {approach.item}"
 
 
-def _pair(values: tuple[Floats, Floats]) -> tuple[float, float]:
+def _as_floats(values: tuple[Floats, Floats]) -> tuple[float, float]:
     return float(values[0]), float(values[1])
 
 
 def _touchdown_row(track: Track, terrain: Terrain) -> int | None:
-    """Return the first row at which the aircraft is as low above ground as at rest, or None."""
+    """Return the first row at which the aircraft is as low above ground as at rest; None if it never stopped."""
     if not len(track):
         return None
     position = np.asarray(track.position, dtype=np.float64)
@@ -180,7 +180,7 @@ def _touchdown_row(track: Track, terrain: Terrain) -> int | None:
 
 
 def _sink_rates(track: Track, terrain: Terrain, approach: Approach, k: int) -> tuple[float, float]:
-    """Return the sink rate just before touch-down, and the rate relative to the sloping ground, m/s."""
+    """Return the vertical sink rate just before touch-down, and the sink rate relative to the sloping ground, m/s."""
     k = max(0, k - 2)
     east, north, up = (float(value) for value in track.velocity[k])
     here = np.asarray(track.position[k, :2], dtype=np.float64)
@@ -191,7 +191,7 @@ def _sink_rates(track: Track, terrain: Terrain, approach: Approach, k: int) -> t
 
 
 def _final_clearance(requirements: RouteRequirements, position: Floats, terrain: Terrain, approach: Approach) -> float:
-    """Return the least height above ground until flare or touch-down, m, as in `_Landing.room`."""
+    """Return the minimum height above ground before flare or touch-down, m, as in `_Landing.room`."""
     up = float(approach.point[2])
     glide = requirements.setup.autopilot.landing_glide(approach.begin - up, approach.run, approach.tail_wind, up)
     flares = glide.flare_distance + max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
@@ -204,14 +204,14 @@ def _final_clearance(requirements: RouteRequirements, position: Floats, terrain:
 
 
 def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
-    """Return faults: parts of the landing off the strip, or a point off the ground."""
+    """Return a fault for each part of the landing off the strip, and for a landing point below the ground."""
     half, side = 0.5 * approach.strip.length, 0.5 * approach.strip.width
     # On a strip shorter than the error, only a distance beyond the strip by more than the error is known.
     inside = half - TOUCHDOWN_ERROR_M if half > TOUCHDOWN_ERROR_M else half + TOUCHDOWN_ERROR_M
     touch, stop = landing.touch, landing.stop
     faults = []
     if -landing.over > LANDING_POINT_ERROR_M:
-        brief = f"the landing point of {_place_of(approach)} is {-landing.over:.0f} m below the ground"
+        brief = f"the landing point of {_landing_point_text(approach)} is {-landing.over:.0f} m below the ground"
         faults.append(message(brief, ": the aircraft meets it before it flares"))
     if abs(touch[0]) > inside:
         where = "before" if touch[0] < 0.0 else "beyond"
@@ -228,8 +228,8 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
     return faults
 
 
-def _too_short(approach: Approach) -> list[Message]:
-    """Return a message if a strip is shorter than the error of the simulated law requires."""
+def _short_strip_messages(approach: Approach) -> list[Message]:
+    """Return a message if a strip is too short for the touch-down error of the simulated law."""
     if approach.strip.length > 2.0 * TOUCHDOWN_ERROR_M:
         return []
     brief = f"the strip is {approach.strip.length:.0f} m long"
@@ -237,14 +237,14 @@ def _too_short(approach: Approach) -> list[Message]:
 
 
 def _undecided_messages(approach: Approach, landing: _Landing, *, gusts: bool) -> list[Message]:
-    """Return the undecided parts of a landing, due to the limited accuracy of the simulated law."""
-    found = _too_short(approach)
+    """Return messages on parts of a landing that the limited accuracy of the simulated law leaves undecided."""
+    found = _short_strip_messages(approach)
     left = 0.5 * approach.strip.length - max(landing.touch[0], landing.stop[0])
     if gusts and left < GUST_TOUCHDOWN_ERROR_M and not found:
         brief = f"comes down or to rest {left:.0f} m before the strip's end"
         found.append(message(brief, f"; in turbulence that is known within {GUST_TOUCHDOWN_ERROR_M:.0f} m"))
     if landing.over > LANDING_POINT_ERROR_M:
-        brief = f"the landing point of {_place_of(approach)} is {landing.over:.0f} m above the ground"
+        brief = f"the landing point of {_landing_point_text(approach)} is {landing.over:.0f} m above the ground"
         found.append(message(brief, ": it flares too early, and falls"))
     if landing.room < FINAL_APPROACH_CLEARANCE_M:
         brief = f"the final passes the ground by {landing.room:.1f} m"
@@ -255,8 +255,8 @@ def _undecided_messages(approach: Approach, landing: _Landing, *, gusts: bool) -
     return found
 
 
-def _description(approach: Approach, landing: _Landing) -> list[str]:
-    """Describe the landing in words."""
+def _describe_landing(approach: Approach, landing: _Landing) -> list[str]:
+    """Describe the landing in a list of phrases."""
     before = "before" if landing.along < 0.0 else "beyond"
     known = [f"touches down {abs(landing.along):.0f} m {before} the landing point, {abs(landing.aside):.1f} m aside"]
     known.append(f"comes to rest with {landing.left:.0f} m of the strip left")

@@ -1,4 +1,4 @@
-"""The turn rule: whether each corner can be turned, and whether it was."""
+"""The turn rule: judge if each corner can be flown on its legs, and how it was flown."""
 
 import math
 
@@ -33,7 +33,7 @@ from world.geometry import fly_by_offset
 def turn_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each inner waypoint; ``geometric`` judges the route alone, without a flight."""
+    """Judge the turn at each inner waypoint; if ``geometric``, judge the route alone, without a flight."""
     measures: list[TurnMeasure | None] = [None if geometric else TurnMeasure()] * (requirements.legs - 1)
     if aligned is not None:
         measures = [*measure_turns(requirements, aligned)]
@@ -61,10 +61,10 @@ def _judge(
     if planned > limit + PLAN_TOLERANCE_RAD:
         lateral = negligible_kink(requirements, i)
         if lateral is None:
-            faults.append(_too_sharp(requirements, i, planned, limit, source))
+            faults.append(_sharp_turn_message(requirements, i, planned, limit, source))
         else:
             facts.append(f"a negligible kink: the way without it passes it at {lateral:.1f} m and can be flown")
-    facts += _flown_over(requirements, i, planned)
+    facts += _fly_over_notes(requirements, i, planned)
     method, angle, tolerance = "route", None, PLAN_TOLERANCE_RAD
     if measure is not None:
         angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE_RAD
@@ -78,7 +78,7 @@ def _judge(
             method = "not flown"
     ok: bool | None = not faults
     if measure is not None and not measure.over:
-        facts.append(_unflown_reason(requirements, i, measure, aligned))
+        facts.append(_unflown_turn_text(requirements, i, measure, aligned))
         ok = None if ok else False
     return make_finding(
         "turn",
@@ -98,10 +98,12 @@ def _judge(
     )
 
 
-def _unflown_reason(requirements: RouteRequirements, i: int, measure: TurnMeasure, aligned: AlignedTrack | None) -> str:
-    """Return why a turn was not flown.
+def _unflown_turn_text(
+    requirements: RouteRequirements, i: int, measure: TurnMeasure, aligned: AlignedTrack | None
+) -> str:
+    """Explain why a turn was not flown.
 
-    The flight ended before it, or the autopilot skipped a neighbouring leg.
+    Either the flight ended before the turn, or the autopilot skipped a neighbouring leg.
     """
     if measure.corner is not None:
         return "its legs were not flown in turn"
@@ -117,8 +119,8 @@ def _unflown_reason(requirements: RouteRequirements, i: int, measure: TurnMeasur
     )
 
 
-def _flown_over(requirements: RouteRequirements, i: int, turn: float) -> list[str]:
-    """Return a note if a waypoint is flown over because its arc would miss its acceptance radius."""
+def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> list[str]:
+    """Return a note if a waypoint is flown over because a fly-by arc would miss its acceptance radius."""
     radius, acceptance = float(requirements.radius[i]), float(requirements.setup.route.acceptance[i])
     if not requirements.setup.route.fly_over[i] or not acceptance or not math.isfinite(radius):
         return []
@@ -132,7 +134,7 @@ def _flown_over(requirements: RouteRequirements, i: int, turn: float) -> list[st
     ]
 
 
-def _too_sharp(requirements: RouteRequirements, i: int, planned: float, limit: float, source: str) -> Message:
+def _sharp_turn_message(requirements: RouteRequirements, i: int, planned: float, limit: float, source: str) -> Message:
     sharp = f"turns {math.degrees(planned):.1f}°"
     if source == "scenario":
         return message(f"{sharp}, beyond the scenario's {math.degrees(limit):.1f}°")
@@ -160,7 +162,7 @@ def _too_sharp(requirements: RouteRequirements, i: int, planned: float, limit: f
 
 
 def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[str]:
-    """Describe how the turn was flown, in words."""
+    """Describe how the turn was flown."""
     facts = []
     if measure.angle is not None and measure.tolerance is not None:
         facts.append(f"flown {math.degrees(measure.angle):.2f}°")
@@ -180,7 +182,7 @@ def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) 
 
 
 def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
-    """Return the measured turn in numbers."""
+    """Return the measurements of a flown turn as facts."""
     if measure is None:
         return []
     bank = None if measure.held_bank is None else math.degrees(measure.held_bank)
@@ -195,7 +197,7 @@ def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
 
 
 def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure, limit: float) -> list[Message]:
-    """Return faults of the flown turn: angle or bank beyond the limit, tighter arc, overshoot."""
+    """Return faults of the flown turn, such as an angle or bank beyond its limit, a tighter arc, or overshoot."""
     faults = []
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
         flown, most = math.degrees(measure.angle), math.degrees(limit)
@@ -205,7 +207,7 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
     if measure.held_bank is not None and measure.held_bank > max_bank:
         held, most = math.degrees(measure.held_bank), math.degrees(max_bank)
         faults.append(message(f"bank {held:.1f}° beyond {most:.1f}°"))
-    faults += _too_tight(requirements, i, measure)
+    faults += _tight_turn_faults(requirements, i, measure)
     if measure.overshoot is not None and measure.overshoot > OVERSHOOT_TOLERANCE_M:
         past = "its arc" if measure.corner is None else "its next leg"
         faults.append(
@@ -220,11 +222,11 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
     return faults
 
 
-def _too_tight(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[Message]:
-    """Return a fault if a turn was tighter than the bank limit's arc, by the distance from its waypoint.
+def _tight_turn_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[Message]:
+    """Return a fault if a turn passed its waypoint so closely that it was tighter than the arc at the bank limit.
 
-    Legs too short for their turn are joined by a tighter arc, and a flight that follows it has used more bank
-    than it has, or slowed down.
+    Legs too short for their turn are joined by a tighter arc, and a flight that follows this arc exceeded the bank
+    limit or slowed down.
     """
     turn, setup = abs(float(requirements.turns[i])), requirements.setup
     tightest = float(requirements.tightest[i])

@@ -1,8 +1,8 @@
-"""The waypoint rule: whether each waypoint was reached, by the mission's or autopilot's radius.
+"""The waypoint rule: judge if each waypoint was reached within the mission's or the autopilot's radius.
 
-ArduPlane also considers a waypoint reached, and turns to the next leg, once it is past the line across the leg at its
-end, however far to the side; for ArduPlane's simulated law that is accepted within the corridor.  Altitude has no part
-in the rule: other rules judge the harm that a wrong altitude can do.
+ArduPlane also considers a waypoint reached, and turns to the next leg, once the aircraft has crossed the line across
+the leg at its end, however far to the side.  For ArduPlane's simulated law, crossing within the corridor is accepted.
+The rule ignores altitude, because other rules judge the harm that a wrong altitude can do.
 """
 
 import math
@@ -25,12 +25,12 @@ def waypoint_findings(
     """Judge how closely the track, or the planned path (``geometric``), passes each waypoint."""
     judged = [i for i in range(len(requirements.points)) if not requirements.turns_around(i)]
     if geometric:
-        return [_planned(requirements, i) for i in judged]
+        return [_planned_finding(requirements, i) for i in judged]
     apexes = requirements.apexes()
-    return [_flown(requirements, aligned, i, apexes) for i in judged]
+    return [_flown_finding(requirements, aligned, i, apexes) for i in judged]
 
 
-def _planned(requirements: RouteRequirements, i: int) -> Finding:
+def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
     """Judge whether the fly-by arc at a waypoint passes it within its acceptance distance."""
     near, offset = reach(requirements, i), float(requirements.fly_by_offset[i])
     faults, fact = [], f"the fly-by path passes at {offset:.0f} m"
@@ -72,7 +72,7 @@ def _turn_text(requirements: RouteRequirements, i: int, near: Reach) -> str:
     return f"{autopilot.title} turns to the next leg {before:.0f} m before it, or where it is past it{unread}"
 
 
-def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
+def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
     near, setup = reach(requirements, i), requirements.setup
     offset, most = float(requirements.fly_by_offset[i]), near.radius + near.tolerance
     away, reason = math.nan, "missed: nothing was flown"
@@ -80,7 +80,7 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int
     facts: tuple[Fact, ...] = ()
     faults: list[Message] = []
     if aligned is not None:
-        away, off = _closest(requirements, aligned, i, float(apexes[i, 2]))
+        away, off = _closest_approach(requirements, aligned, i, float(apexes[i, 2]))
         facts = (Fact("height error", off, "m"),)
         ok = away <= most
         crossing = math.inf if ok or setup.autopilot.follows_path else _crossing_offset(requirements, aligned, i)
@@ -122,7 +122,7 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int
 
 
 def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> float:
-    """Return the distance (m) from a waypoint where the track crossed the line across its leg, or inf."""
+    """Return the distance from a waypoint at which the track crossed the line across its leg's end, m, or inf."""
     if i == 0:
         return math.inf
     last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
@@ -132,14 +132,16 @@ def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: 
 
 
 def _acceptance_text(near: Reach) -> str:
-    """Return the acceptance distance, in words."""
+    """Describe the acceptance distance and its source."""
     owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(near.source, "the path's")
     error = f", and {near.tolerance:.1f} m for navigation and gusts," if near.tolerance else ""
     return f"{near.radius:.0f} m{error} count as reached ({owner})"
 
 
-def _closest(requirements: RouteRequirements, aligned: AlignedTrack, i: int, level: float) -> tuple[float, float]:
-    """Return the closest horizontal approach between the neighbours, m, and the height above ``level``."""
+def _closest_approach(
+    requirements: RouteRequirements, aligned: AlignedTrack, i: int, level: float
+) -> tuple[float, float]:
+    """Return the minimum horizontal distance of the track from a waypoint, and its height above ``level`` there, m."""
     first = int(aligned.rows[i - 1]) if i else 0
     last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
     position = aligned.track.position[first : max(last, first + 1) + 1]

@@ -46,7 +46,7 @@ def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
 def csv_text(log: FlightLog) -> str:
     """Return the table as CSV: a line of names, then one line a row.
 
-    Numbers have the fewest digits that read back.
+    Numbers have the fewest digits from which the same value is read back.
 
     >>> from logs.recording.example_log import example_log
     >>> csv_text(example_log()).splitlines()[1].split(",")[:6]
@@ -316,7 +316,7 @@ def _battery(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
 
 
 def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
-    """Return the topic navigator_mission_item: each item when it becomes active, from the start on.
+    """Return the topic navigator_mission_item, with each item from the time at which it becomes active.
 
     Items without a position get the time of the next item with one, and the position 0, 0: a gap in the numbers would
     read as lost items.

@@ -147,7 +147,7 @@ def _line(setup: FlightSetup, name: str, places: ArrayLike, folder: str, role: s
 
 
 def glide_shapes(setup: FlightSetup, drawn: DrawnReturns) -> list[MapZone]:
-    """Return the glide footprint: least heights above ground to reach a chosen place, and flat ground."""
+    """Return the glide footprint: minimum heights above ground to reach a chosen place, and flat ground."""
     footprint = drawn.glides.footprint
     if footprint is None:
         return []

@@ -28,7 +28,7 @@ _LATEST_ENTRIES = 3
 
 
 class _Size(NamedTuple):
-    """Least columns of a frame for this size, columns of its horizon, and columns of the bar of a control."""
+    """Minimum columns of a frame of this size, columns of its horizon, and columns of a control's bar."""
 
     columns: int
     horizon: int
@@ -58,7 +58,7 @@ class Instruments:
         log = self.log
         k = max(0, int(np.searchsorted(log.track.time, time, side="right")) - 1)
         size = _WIDE if columns >= _WIDE.columns else _NARROW
-        left, right = self._horizon(k, size.horizon), self._numbers(k)
+        left, right = self._horizon(k, size.horizon), self._readout_lines(k)
         rows = max(len(left), len(right))
         left += [" " * (size.horizon + 2)] * (rows - len(left))
         right += [""] * (rows - len(right))
@@ -104,7 +104,7 @@ class Instruments:
         edge = "+" + "-" * columns + "+"
         return [edge, *("|" + "".join(cells) + "|" for cells in rows), edge]
 
-    def _numbers(self, k: int) -> list[str]:
+    def _readout_lines(self, k: int) -> list[str]:
         track, setup = self.log.track, self.log.setup
         east, north, up = (float(value) for value in track.velocity[k])
         roll, pitch, yaw = (math.degrees(float(angle)) for angle in track.attitude[k])
@@ -130,7 +130,7 @@ class Instruments:
         ]
 
     def _controls(self, k: int, bar: int) -> list[str]:
-        """Draw one bar a control: its position (O) between its limits, and its command (|)."""
+        """Draw one bar for each control, with its position (O) between its limits, and its command (|)."""
         lines = []
         controls, commands = self.log.track.controls[k].tolist(), self.log.track.commands[k].tolist()
         for (name, limit), stands, asked in zip(self.limits, controls, commands, strict=True):

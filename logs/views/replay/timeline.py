@@ -168,7 +168,7 @@ def _legs(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
 
 
 def _turns(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
-    """List each change to the next leg: the turn of the route, and the peak bank from mid-leg to mid-leg."""
+    """List each change to the next leg, with the turn of the route and the peak bank from mid-leg to mid-leg."""
     route, track = log.setup.route, log.track
     turns = signed_turns(route.waypoints)
     roll, _, _ = track.attitude.T
@@ -219,11 +219,11 @@ def _threats(log: FlightLog) -> list[TimelineEntry]:
     for k, name in enumerate(threats.names):
         for unit, radius in (("missile", threats.kill_radius[k]), ("radar", threats.detection_radius[k])):
             for stay in passages(track.time, track.position, threats.position[k], float(radius)):
-                entries += _stay(name, unit, float(radius), stay)
+                entries += _stay_entries(name, unit, float(radius), stay)
     return entries
 
 
-def _stay(name: str, unit: str, radius: float, stay: Passage) -> list[TimelineEntry]:
+def _stay_entries(name: str, unit: str, radius: float, stay: Passage) -> list[TimelineEntry]:
     entered = TimelineEntry(stay.start, "threat", f"inside the {unit} range of {name} ({radius:.0f} m)")
     inside = f"{stay.end - stay.start:.1f} s inside, closest {stay.closest:.0f} m"
     if not stay.whole:

@@ -114,16 +114,18 @@ def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
         ("time in the air", "s"): float(track.time[-1] - track.time[0]),
         ("distance flown", "m"): float(path_length(position)) if len(position) > 1 else math.nan,
         ("energy used", "Wh"): float(track.energy[-1]),
-        ("mean airspeed", "m/s"): _reduced(np.mean, track.airspeed),
-        ("highest", "m AMSL"): _reduced(np.max, position[:, 2]),
-        ("largest bank", "deg"): math.degrees(_reduced(np.max, np.abs(roll))),
-        ("largest load factor", "g"): _reduced(np.max, track.load_factor),
-        ("largest cross-track", "m"): _reduced(np.max, np.abs(track.cross_track)),
-        ("typical cross-track (rms)", "m"): math.sqrt(_reduced(np.mean, track.cross_track.astype(np.float64) ** 2)),
-        ("largest height error", "m"): _reduced(np.max, np.abs(track.height_error)),
+        ("mean airspeed", "m/s"): _reduce_finite(np.mean, track.airspeed),
+        ("highest", "m AMSL"): _reduce_finite(np.max, position[:, 2]),
+        ("largest bank", "deg"): math.degrees(_reduce_finite(np.max, np.abs(roll))),
+        ("largest load factor", "g"): _reduce_finite(np.max, track.load_factor),
+        ("largest cross-track", "m"): _reduce_finite(np.max, np.abs(track.cross_track)),
+        ("typical cross-track (rms)", "m"): math.sqrt(
+            _reduce_finite(np.mean, track.cross_track.astype(np.float64) ** 2)
+        ),
+        ("largest height error", "m"): _reduce_finite(np.max, np.abs(track.height_error)),
     }
     if setup.scenario.terrain is not None and len(position) > 1:
-        found["lowest height above ground", "m"] = _reduced(
+        found["lowest height above ground", "m"] = _reduce_finite(
             np.min, segment_clearances(setup.scenario.terrain, position)[0]
         )
     threats = setup.scenario.threats
@@ -143,7 +145,7 @@ def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
     return found
 
 
-def _reduced(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]]) -> float:
+def _reduce_finite(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]]) -> float:
     """Apply a reduction to the finite values; NaN if there are none."""
     finite = values[np.isfinite(values)].astype(np.float64)
     return float(reduce(finite)) if finite.size else math.nan
@@ -200,7 +202,7 @@ _BLOCK_POINTS = 32
 def nearest_distances(points: Floats, track: Floats) -> Floats:
     """Return the distance (n,) from each point of one track (n, 3) to the nearest point of another (m, 3).
 
-    Successive points lie near each other: their bounding boxes show which points of the other track can be nearest.
+    Because successive points lie near each other, bounding boxes show which points of the other track can be nearest.
 
     >>> nearest_distances(np.array([[0.0, 3.0, 4.0], [9.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]]))
     array([5., 1.])

@@ -183,7 +183,7 @@ def script_digest(text: str) -> str:
 
 @cache
 def page_library() -> PageLibrary:
-    """Return plotly.js as packed by the build, a third of its size.
+    """Return plotly.js as packed by the build, at a third of its original size.
 
     Raises OSError if the build is missing.
     """

@@ -97,10 +97,10 @@ def _flown_cells(track: Track | None, above: Floats | None, leg: int) -> tuple[s
     return (
         number(float(track.time[last] - track.time[rows[0]]), digits=1),
         number(float(np.mean(track.airspeed[rows], dtype=np.float64)), digits=1),
-        number(math.degrees(_peak(roll)), digits=1),
-        number(_peak(track.cross_track[rows]), digits=2),
-        number(_peak(track.height_error[rows]), digits=2),
-        number(_least(above[rows]) if above is not None else None, digits=1),
+        number(math.degrees(_max_magnitude(roll)), digits=1),
+        number(_max_magnitude(track.cross_track[rows]), digits=2),
+        number(_max_magnitude(track.height_error[rows]), digits=2),
+        number(_min_finite(above[rows]) if above is not None else None, digits=1),
         number(float(track.energy[last]) - float(track.energy[rows[0]]), digits=2),
     )
 
@@ -112,7 +112,7 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
     seconds, distance = float(track.time[-1] - track.time[0]), float(path_length(track.position)) / 1000.0
     above = ground_clearance(setup, track)
     landed = by_the_ground(track, setup.ground_ways)
-    low = NOTHING if above is None else number(_least(above[~landed]), digits=0)
+    low = NOTHING if above is None else number(_min_finite(above[~landed]), digits=0)
     between = " between take-off and landing" if landed.any() else ""
     height = f", never less than {low} m above ground{between}" if low != NOTHING else ""
     energy = float(track.energy[-1])
@@ -121,12 +121,12 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
     return f"Flown: {number(distance, digits=1)} km in {number(seconds, digits=0)} s{height}{used}."
 
 
-def _peak(values: NDArray[np.float32]) -> float:
+def _max_magnitude(values: NDArray[np.float32]) -> float:
     finite = np.abs(values[np.isfinite(values)])
     return float(finite.max()) if finite.size else math.nan
 
 
-def _least(values: Floats) -> float:
+def _min_finite(values: Floats) -> float:
     finite = values[np.isfinite(values)]
     return float(finite.min()) if finite.size else math.nan
 
@@ -203,7 +203,7 @@ def flight_facts(setup: FlightSetup, track: Track | None, ended: str) -> Facts:
     if setup.plan is not None:
         plan = setup.plan
         how = f"{plan.algorithm}, seed {plan.seed}, {plan.evaluations} paths tried"
-        facts.append(("Plan", f"{how}; {_standing(plan.feasible, plan.safe)}"))
+        facts.append(("Plan", f"{how}; {_plan_status(plan.feasible, plan.safe)}"))
     if track is not None and len(track):
         facts.append(("Time in the air", quantity(float(track.time[-1] - track.time[0]), "s")))
         facts.append(("Distance flown", quantity(float(path_length(track.position)) / 1000.0, "km")))
@@ -212,7 +212,7 @@ def flight_facts(setup: FlightSetup, track: Track | None, ended: str) -> Facts:
     return facts
 
 
-def _standing(feasible: bool, safe: bool) -> str:
+def _plan_status(feasible: bool, safe: bool) -> str:
     if safe:
         return "feasible, and outside every missile's reach"
     return "feasible, but within a missile's reach" if feasible else "not feasible"
@@ -241,7 +241,7 @@ def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
         ("Used", quantity(used, "Wh")),
         ("Battery", quantity(setup.battery, "Wh")),
         ("Left", f"{quantity(setup.battery - used, 'Wh')}, {quantity(100.0 * (1.0 - used / setup.battery), '%')}"),
-        ("Peak current", quantity(_peak(track.current), "A")),
+        ("Peak current", quantity(_max_magnitude(track.current), "A")),
     ]
     if seconds > 0.0:
         facts.append(("Mean power", quantity(used * 3600.0 / seconds, "W")))
@@ -303,7 +303,7 @@ def saturation_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, 
         low = 0.0 if name == "throttle" else -limit
         held = float(lasts[held_at_limit(track, k, low, limit)].sum())
         scale, unit = (100.0, " %") if name == "throttle" else (180.0 / math.pi, "°")
-        peak = number(scale * _peak(command), digits=1)
+        peak = number(scale * _max_magnitude(command), digits=1)
         limit_text = number(scale * limit, digits=1)
         rows.append(
             (

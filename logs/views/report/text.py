@@ -275,7 +275,7 @@ def would_pass_text(found: WouldPass, unit: str) -> str:
 
 
 def count_sentence(rows: list[FindingRow]) -> str:
-    """State the numbers of findings that hold, fail, and were not judged."""
+    """State the numbers of findings that pass, fail, and were not judged."""
     counts = {state: sum(row.state == state for row in rows) for state in _SIGNS}
     held = f"{counts['pass']} of {counts['pass'] + counts['fail']} judged findings hold"
     failed = f", {counts['fail']} {'fails' if counts['fail'] == 1 else 'fail'}" if counts["fail"] else ""
@@ -317,7 +317,7 @@ _MOST_DECIMALS = 6
 
 
 def _digits_of(finding: Finding) -> int | None:
-    """Return the number of decimals with which a value differs from its limit, or None if the usual ones do."""
+    """Return the number of decimals needed to tell a value from its limit, or None if the usual number suffices."""
     value, limit = (in_unit(one, finding.unit)[0] for one in (finding.value, finding.effective_limit))
     if value is None or limit is None or value == limit or number(value) != number(limit):
         return None
@@ -389,11 +389,11 @@ def refly_lines(again: Reflight) -> list[str]:
     legs: list[tuple[str, ...]] = [_HEAD]
     for one in again.legs:
         numbers = (one.cross_track, one.height_error, one.ground_speed, one.bank, one.energy)
-        legs.append((f"leg {one.leg}", *map(_both, numbers)))
+        legs.append((f"leg {one.leg}", *map(_pair_text, numbers)))
     turns: list[tuple[str, ...]] = [("", "overshoot (m)", "bank (deg)", "nearest pass (m)")]
     for turn in again.turns:
         name = f"waypoint {turn.waypoint} ({turn.turn:+.1f}°)"
-        turns.append((name, *map(_both, (turn.overshoot, turn.bank, turn.passed))))
+        turns.append((name, *map(_pair_text, (turn.overshoot, turn.bank, turn.passed))))
     stretch = again.stretch
     named = f"{stretch.mode or 'the flight'} from {stretch.start:.1f} s to {stretch.end:.1f} s"
     of = f", legs {again.first} to {again.first + len(again.legs) - 1}"
@@ -404,7 +404,7 @@ def refly_lines(again: Reflight) -> list[str]:
 
 
 def trust_line(again: Reflight) -> str:
-    """Describe in a line how well the model represents this aircraft."""
+    """Describe in one line how well the model represents this aircraft."""
     model = again.setup.aircraft
     whose = f"{model}, which stands in for an aircraft that is not named," if again.stands_in else model
     if not again.spreads:
@@ -439,7 +439,7 @@ def left_lines(agains: Sequence[Reflight], stretches: Sequence[MissionStretch], 
     return lines
 
 
-def _both(pair: tuple[float, float]) -> str:
+def _pair_text(pair: tuple[float, float]) -> str:
     return " / ".join("-" if math.isnan(value) else f"{value:.1f}" for value in pair)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
-from logs.verdict.measures.circle_reach import _rings, end_loiter_hazards, hazards_within
+from logs.verdict.measures.circle_reach import _ring_points, end_loiter_hazards, hazards_within
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from tests.logs.verdict.rules.test_loiter_rule_own_radius import TIME, loiter, radius_at, sphere
 
@@ -72,7 +72,7 @@ def test_a_hill_counts_within_its_reach_only(up: float, what: str) -> None:
 @pytest.mark.parametrize(("reach", "spacing", "rings"), [(900.0, 30.0, 30), (900.0, 90.0, 24), (9000.0, 30.0, 120)])
 def test_a_disc_is_looked_at_along_rings_a_step_of_the_ground_apart(reach: float, spacing: float, rings: int) -> None:
     """So many between its middle and its edge, of 24 at the least and 120 at the most."""
-    away = np.hypot(*(_rings(np.array([200.0, -100.0]), reach, spacing) - [200.0, -100.0]).T)
+    away = np.hypot(*(_ring_points(np.array([200.0, -100.0]), reach, spacing) - [200.0, -100.0]).T)
     found = np.unique(away.round(6))
     assert len(found) == rings + 1
     assert np.diff(found) == pytest.approx(found[-1] / rings, rel=1e-5)

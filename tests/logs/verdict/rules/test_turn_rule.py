@@ -13,7 +13,7 @@ from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.measures.turns import TurnMeasure, measure_turn
 from logs.verdict.places import Place
-from logs.verdict.rules.turn_rule import _unflown_reason
+from logs.verdict.rules.turn_rule import _unflown_turn_text
 from tests.logs.verdict.judging import ROUTE, failing, judge, of, waypoint
 from tests.synthetic import (
     bank_radius,
@@ -165,7 +165,7 @@ def test_a_leg_that_the_autopilot_left_at_once_is_the_reason_that_is_given() -> 
 
     def why(seconds: float, last: int) -> str:
         leg = np.select([track.time < track.time[start], track.time < track.time[start] + seconds], [1, 2], last)
-        return _unflown_reason(requirements, 2, TurnMeasure(), align_track(requirements, replace(track, leg=leg)))
+        return _unflown_turn_text(requirements, 2, TurnMeasure(), align_track(requirements, replace(track, leg=leg)))
 
     counts = "since it counts a waypoint as reached from"
     assert f"{short.autopilot.title} was on leg 2, to item 3, of 40 m for 1.0 s, {counts}" in why(1.0, 3)

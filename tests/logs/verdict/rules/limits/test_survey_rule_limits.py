@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Home
-from logs.verdict.measures.photo_lines import LineMeasure, _cells, over_ground
+from logs.verdict.measures.photo_lines import LineMeasure, _line_steps, over_ground
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.rules.survey_rule import _too_tight, lost_text
+from logs.verdict.rules.survey_rule import _is_too_tight, lost_text
 from tests.logs.verdict.judging import judge
 from tests.synthetic import bank_radius, fly_path, make_setup
 
@@ -28,7 +28,7 @@ def test_low_over_ground_a_photo_may_be_five_metres_off(off: float, lost: float)
 
 def test_a_line_is_looked_at_metre_by_metre() -> None:
     along = np.arange(0.0, 12.25, 0.25)
-    taken = _cells(along, along <= 7.0, 12.0)
+    taken = _line_steps(along, along <= 7.0, 12.0)
     assert (len(taken), np.count_nonzero(taken)) == (12, 7)
 
 
@@ -44,7 +44,7 @@ def test_a_corner_may_be_a_hundredth_of_a_degree_too_sharp(over: float, tight: b
     turn = 2.0 * math.atan(300.0 / bank_radius()) + math.radians(over)
     ends = [[0.0, 0.0], [0.0, 300.0], [300.0 * math.sin(turn), 300.0 + 300.0 * math.cos(turn)]]
     setup = make_setup([[*place, 100.0] for place in ends])
-    assert _too_tight(route_requirements(setup), 1) is tight
+    assert _is_too_tight(route_requirements(setup), 1) is tight
 
 
 @pytest.mark.parametrize(("home", "up"), [(None, [0.0, 20.0]), (70.0, [10.0, 30.0])])
