@@ -217,7 +217,7 @@ def _toml_advice(folder: Path) -> str:
     )
 
 
-def _numbers(table: dict[str, Any]) -> dict[str, float]:
+def _numeric_fields(table: dict[str, Any]) -> dict[str, float]:
     """Return the numeric fields of `Aircraft`; raise FlightError without the file's name."""
     store = _FUEL_KEYS if set(_FUEL_KEYS) & table.keys() else _BATTERY_KEYS
     allowed = {*_FIELD_BY_KEY, *store}

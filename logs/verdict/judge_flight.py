@@ -81,7 +81,7 @@ def judge_flight(
     flyable = complete and not unjudged and not any(item.ok is False for item in findings)
     findings = with_suggestions(in_air, aligned, findings)
     findings = with_passing_suggestions(findings, None if reference is None else reference.tried)
-    levels = _levels(whole, findings, flyable, reference)
+    levels = _level_answers(whole, findings, flyable, reference)
     deciding = None if reference is None or flyable else reference.deciding
     conditions = setup_conditions(setup)
     lines = summary_lines(findings, setup, "flown", levels, conditions, deciding)

@@ -45,10 +45,10 @@ def junit_error_text(name: str, message: str) -> str:
     """
     root = ElementTree.Element("testsuites")
     suite = ElementTree.SubElement(
-        root, "testsuite", name=_plain(name), tests="1", failures="0", errors="1", skipped="0"
+        root, "testsuite", name=_without_control_characters(name), tests="1", failures="0", errors="1", skipped="0"
     )
     case = ElementTree.SubElement(suite, "testcase", classname="planfly", name="verdict")
-    ElementTree.SubElement(case, "error", message=_plain(message))
+    ElementTree.SubElement(case, "error", message=_without_control_characters(message))
     return _document_text(root)
 
 

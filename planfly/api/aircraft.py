@@ -127,7 +127,7 @@ def new_aircraft(
     """
     stated = {name: value for name, value in given.items() if value is not None}
     if not stated:
-        copied = _opened("aerosonde" if source is None else source)
+        copied = _open_aircraft("aerosonde" if source is None else source)
         model = shipped_model(copied) if copied.model.shipped else None
         make_own_folder(Path(folder), copied, model, overwrite=overwrite)
         return find_aircraft(str(Path(folder).absolute()))

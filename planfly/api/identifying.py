@@ -113,7 +113,7 @@ def identify_aircraft(
     paths = [Path(one) for one in ([logs] if isinstance(logs, str | Path) else logs)]
     if not paths:
         raise PlanflyError.of_argument("logs", "", "at least one log is expected", shown="")
-    prior = _base(base)
+    prior = _load_base(base)
     area = prior.wing_area * (span / prior.wing_span) ** 2 if area is None else area
     stated = {"mass": mass, "span": span, "area": area}
     _check_stated(stated, prior)
@@ -139,7 +139,7 @@ def identify_aircraft(
         files = folder_files(found, target.name, (volts, energy))
     replays = () if checked is None else _replay_check_log(found, files, target.name, checked)
     with stage("drawing", "drawing an identification"):
-        files["identify.html"] = _page(found, replays, None if check is None else Path(check).name, target.name)
+        files["identify.html"] = _report_page(found, replays, None if check is None else Path(check).name, target.name)
     write_own_folder(target, {name: text.encode() for name, text in files.items()})
     slow = slow_logs([one for one, _, _ in read])
     return IdentifiedAircraft(

@@ -175,7 +175,7 @@ def compare(
 def _report_content(source: Source) -> _ReportContent:
     if isinstance(source, Plan):
         setup = open_flight(source, {})
-        return _Shown(setup, judge_mission(setup))
+        return _ReportContent(setup, judge_mission(setup))
     if isinstance(source, FlownMission):
         return _ReportContent(source.setup, source.verdict, source.track, source.ended, source.events)
     log = source if isinstance(source, FlightLog) else read_log(source)

@@ -115,4 +115,4 @@ def _closeness(item: Finding) -> float:
 
 def _value_text(item: Finding) -> str:
     value, limit = item.compared_texts()
-    return f"{_word(item)} {value}" + (f" ({limit})" if limit else "")
+    return f"{_rule_name(item)} {value}" + (f" ({limit})" if limit else "")

@@ -367,7 +367,7 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
         if corners > MAX_FILE_CORNERS:
             allowed = f"at most {MAX_FILE_CORNERS:,}"
             raise ScenarioError(f"{source}: too many corners: {allowed}", file=source, allowed=allowed)
-        done, repaired = _mend(entries, MAX_CROSSINGS - crossings, f"{source}: {where}")
+        done, repaired = _repair_outline(entries, MAX_CROSSINGS - crossings, f"{source}: {where}")
         crossings += repaired
         for one in done:
             mended[one].append(str(entries["name"]))
