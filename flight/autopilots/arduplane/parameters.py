@@ -212,6 +212,8 @@ class ArduPilotParameters(ParameterSet):
     fence_type: bits of the limits that its fence has: 1 and 8 altitudes, 2 a circle about home, 4 the mission's fence.
     altitude_offset: m, added to the altitudes of mission items.  soaring, quadplane, rudder_only: 1 if it soars, has
         lift motors, or steers by the rudder alone; none of these four is flown.
+    ground_speed_min: m/s, 0 for none.  airspeed_use: 1 with an airspeed sensor.  roll_rate_p to pitch_rate_ff: gains of
+        the rate controllers.  None of these is flown.
     throttle_failsafe to fence_auto_enable: causes to leave the mission, and the reactions; see
         `flight.autopilots.arduplane.failsafes`.
     """
@@ -308,6 +310,12 @@ class ArduPilotParameters(ParameterSet):
     soaring: float = field(init=False)
     quadplane: float = field(init=False)
     rudder_only: float = field(init=False)
+    ground_speed_min: float = field(init=False)
+    airspeed_use: float = field(init=False)
+    roll_rate_p: float = field(init=False)
+    roll_rate_ff: float = field(init=False)
+    pitch_rate_p: float = field(init=False)
+    pitch_rate_ff: float = field(init=False)
 
     def __post_init__(self) -> None:
         """Convert the values to SI."""
