@@ -44,14 +44,11 @@ def judge_flight(
     """Judge a flown track at the level "flown".
 
     Any track is judged, however short or damaged; missing data makes the verdict incomplete.  A track without rows is a
-    flight that never began, so its route is judged at the level "geometric".  An imported flight is judged as far as
-    its log permits.
+    flight that never began, so its route is judged at the level "geometric".
 
-    ended: "completed", or the reason why the flight ended early.
-    log_complete: True if the record has its end.
+    ended: "completed", or the reason why the flight ended early.  log_complete: True if the record has its end.
     envelope: True to apply the aircraft's envelope as well as the evidence of the flight, False for the flight alone.
-    reference: results of reference flights.
-    requirements: the setup's route requirements if already known.
+    reference: results of reference flights.  requirements: the setup's route requirements if already known.
 
     >>> from aircraft.catalog import find_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope

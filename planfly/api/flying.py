@@ -169,8 +169,7 @@ def fly(
     """Fly a plan or a mission file in JSBSim, and judge the flight.
 
     mission: a `Plan`, or the path of a plan.json, .waypoints or .plan file.
-    log: MCAP file for the flight, in which {name} and {seed} stand for the mission's name and the seed; None writes no
-    log.
+    log: MCAP file for the flight; {name} and {seed} in it stand for the mission's name and the seed; None writes none.
     overwrite: True replaces an existing file.
 
     The world of the flight (None keeps the value of the plan or the scenario):
@@ -178,10 +177,8 @@ def fly(
     terrain: an elevation file that replaces the terrain of the scenario.
     fence: files of fences and zones in addition to the mission's own.
     seed: seed of the turbulence; None takes the seed of the plan or of the scenario, or 1.
-    wind: speed, m/s, and the direction from which the wind blows, degrees.
-    turbulence: "none", "light" or "moderate".
-    at: time of the flight, "START" or "START/END", in ISO 8601 with offsets from UTC; zones that are inactive at this
-    time are left out.
+    wind: speed, m/s, and the direction it blows from, degrees.  turbulence: "none", "light" or "moderate".
+    at: time of the flight, "START" or "START/END", in ISO 8601 with offsets from UTC; it leaves out inactive zones.
 
     The aircraft and its control:
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.

@@ -142,15 +142,8 @@ def identify_aircraft(
         files["identify.html"] = _report_page(found, replays, None if check is None else Path(check).name, target.name)
     write_own_folder(target, {name: text.encode() for name, text in files.items()})
     slow = slow_logs([one for one, _, _ in read])
-    return IdentifiedAircraft(
-        read_aircraft(target),
-        estimate,
-        *_intervals(found),
-        replays,
-        without_current(records),
-        slow,
-        _find_wide_numbers(found),
-    )
+    made, wide = read_aircraft(target), _find_wide_numbers(found)
+    return IdentifiedAircraft(made, estimate, *_intervals(found), replays, without_current(records), slow, wide)
 
 
 def _load_base(base: str | Path) -> Aircraft:

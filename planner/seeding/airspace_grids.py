@@ -208,9 +208,8 @@ def _relax_stage(
             to_east, to_north = position_of(frame, stage * step, grid.across[to])
             closed = _Passage(math.inf, -math.inf)
             if zones.required.shape[0] > 0:
-                closed = _closed_heights(
-                    zones, segment_between(east, north, to_east, to_north), lateral, before[y].ground
-                )
+                leg = segment_between(east, north, to_east, to_north)
+                closed = _closed_heights(zones, leg, lateral, before[y].ground)
             climb, dive = slopes[side + SIDEWAYS, 0] * run, slopes[side + SIDEWAYS, 1] * run
             for z in range(grid.layers):
                 if cost[y, z] == math.inf:

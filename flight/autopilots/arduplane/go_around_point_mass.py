@@ -92,8 +92,7 @@ def fly_go_arounds(
     """Simulate a go-around from each of n places on a glide to the end of a landing sequence.
 
     starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
-    top: altitude above which the climb ends, m AMSL.
-    pitch: pitch of the climb, rad.
+    top: altitude above which the climb ends, m AMSL.  pitch: pitch of the climb, rad.
     landings: one or more landing sequences; each go-around joins the nearest one where its climb is over.  A loiter in
         a sequence is the last place: the go-around is over once around it.
 

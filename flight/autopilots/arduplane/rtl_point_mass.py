@@ -326,8 +326,7 @@ def fly_stages(
 ) -> None:
     """Fly from stage to stage for at most ``most`` s, and fill in the outcome.
 
-    climb: True if the first stage is a climb, and the altitude up to which it climbs.
-    staged: the parameters of that climb.
+    climb: True if the first stage is a climb, and its final altitude.  staged: the parameters of that climb.
     """
     # The same spacing as in `waypoint_column`.  A loiter is flown until the RTL is over: no leg follows it.
     spaced, turns = np.zeros(6, WAYPOINT), np.zeros(1, _LOITER_PROGRESS)
