@@ -36,7 +36,6 @@ LONGER = {
     "logs/verdict/rules/loiter_rule.py:_loiter_finding": 68,
     "logs/views/exports/log_files.py:_topics": 100,
     "planfly/campaigns/pictures.py:draw_go_no_go": 67,
-    "planner/search/replan.py:replan": 61,
     "tests/instrumented_flights.py:px4_topics": 70,
 }
 KERNELS = set(DECORATORS)
