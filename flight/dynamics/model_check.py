@@ -258,7 +258,8 @@ def _try(folder: str, _version: str) -> tuple[int | None, str]:
         )
     except subprocess.TimeoutExpired:
         return None, ""
-    return done.returncode, jsbsim_reason((done.stdout + b"\n" + done.stderr).decode(errors="replace"))
+    printed = b"\n".join(part for part in (done.stdout, done.stderr) if part)
+    return done.returncode, jsbsim_reason(printed.decode(errors="replace"))
 
 
 # End of JSBSim's banner.

@@ -105,7 +105,7 @@ def settle_step(steps: Sequence[float], before: Sequence[float], change: Sequenc
     A change that falls to 0.9 in equal steps of 0.2 s has a time constant of 2 s, of which 4 times 0.2 s are taken; one
     that swings, with -3 times the change before, has one of 0.05 s.
 
-    >>> settle_step((0.2, 0.2), (1.0,), (0.9,)), settle_step((0.2, 0.2), (0.1,), (-0.3,))
+    >>> settle_step((0.2, 0.2), (1.0,), (0.9,)), round(settle_step((0.2, 0.2), (1.0,), (-3.0,)), 9)
     (0.8, 0.05)
     """
     largest = max(range(len(before)), key=lambda k: abs(before[k]))

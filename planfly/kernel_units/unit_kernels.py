@@ -88,6 +88,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "aircraft.envelope.ground_speed",
         "aircraft.path_limits.aircraft_slopes",
         "aircraft.path_limits.arc_slope",
+        "aircraft.path_limits.fly_over_run",
         "aircraft.path_limits.ground_speed_on",
         "aircraft.path_limits.true_airspeed",
         "aircraft.path_limits.turn_radius_between",

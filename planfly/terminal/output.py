@@ -7,11 +7,9 @@ import itertools
 import json
 import math
 import os
-import re
 import sys
 import threading
 import time
-import unicodedata
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -19,7 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 from planfly.runtime.stages import Advance, Receiver, received_by
-from planfly.terminal.command_parser import COLOUR_SEQUENCE, wants_colour
+from planfly.terminal.command_parser import wants_colour
+from planfly.terminal.control_characters import escaped_json, without_controls
 from planfly.workflow.output_paths import refuse_existing
 from world.errors import PlanflyError
 from world.files import read_at_most, write_whole
@@ -30,29 +29,6 @@ if TYPE_CHECKING:
 # ----------------------------------------------------------------------
 # Standard streams: no text of a foreign file controls the terminal, and a closed pipe is tolerated:
 # ``planfly check M | head -1`` still exits with the code of the verdict.
-
-# Categories of Unicode of characters that move the cursor, reverse the text, or are no text.
-_CONTROLS = ("Cc", "Cf", "Cs", "Zl", "Zp")
-# Colours of planfly's own on a stream in colour, and any character beyond plain ASCII, which may be a control.
-_COLOUR_OR_SPECIAL = re.compile(COLOUR_SEQUENCE + r"|[^\n\t\x20-\x7e]")
-_SPECIAL = re.compile(r"[^\n\t\x20-\x7e]")
-
-
-def without_controls(text: str, *, colours: bool = False) -> str:
-    r"""Return a text with escapes for all control characters except line feeds and tabs.
-
-    colours: True to keep planfly's own colours.
-
-    >>> print(without_controls("a\x1b[2J \u202e\x9b \xb0"))
-    a\x1b[2J \u202e\x9b °
-    """
-    return (_COLOUR_OR_SPECIAL if colours else _SPECIAL).sub(_escape, text)
-
-
-def _escape(found: re.Match[str]) -> str:
-    text = found[0]
-    is_control = len(text) == 1 and unicodedata.category(text) in _CONTROLS
-    return text.encode("unicode_escape").decode() if is_control else text
 
 
 class _SafeStream(io.TextIOBase):
@@ -517,14 +493,9 @@ def give_answer(args: argparse.Namespace, answer: Callable[[], object | str]) ->
     made = answer()
     text = made if isinstance(made, str) else answer_text(made)
     if target == STANDARD_OUTPUT:
-        print(_escaped_json(text), end="", file=_output.get() or sys.stdout)
+        print(escaped_json(text), end="", file=_output.get() or sys.stdout)
     else:
         write_whole(Path(target), text)
-
-
-def _escaped_json(text: str) -> str:
-    """Return JSON text with JSON's escapes for control characters in its strings."""
-    return _SPECIAL.sub(lambda found: found[0] if _escape(found) == found[0] else json.dumps(found[0])[1:-1], text)
 
 
 def give_junit(args: argparse.Namespace, verdicts: Mapping[str, "Verdict"]) -> None:

@@ -29,6 +29,7 @@ from logs.views import drawing
 from planfly.cli import main
 from planfly.commands.registry import build_parser
 from planfly.live.served_flights import ServedFlights, ServeOptions
+from planfly.workflow import suggestion_trials
 from tests.planfly.conftest import FIELD
 from tests.setups import waypoint_mission
 from tests.world.made.elevation_files import from_origin, write_raster
@@ -84,6 +85,8 @@ def entered(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         getattr(planfly, name)
     for room in ("logs.views.report.page", "logs.views.replay.timeline"):
         import_module(room)
+    # Each suggestion that is tried has a mission of its own; trials are counted in test_suggestion_trials.py.
+    monkeypatch.setattr(suggestion_trials, "MAX_TRIED_FINDINGS", 0)
     # What is drawn enters stages as ever; to render it takes longer than all of them.
     monkeypatch.setattr(drawing, "png_bytes", lambda figure: b"")
     entered: Counter[str] = Counter()

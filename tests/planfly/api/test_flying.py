@@ -174,7 +174,7 @@ def test_both_at_once_are_the_one_after_the_other(tmp_path: Path) -> None:
 @pytest.mark.parametrize("wind", ["8,270", "8", 8, (8,), (8, 270, 1), ("a", "b"), {"speed": 8}])
 def test_a_wind_that_is_none_is_refused_by_its_name_in_python(wind: object) -> None:
     with pytest.raises(
-        planfly.PlanflyError, match=r"^wind .*: a speed, m/s, and the degrees .* as \(8, 270\)$"
+        planfly.PlanflyError, match=r"^wind .*: expected a speed, m/s, and the direction .* as \(8, 270\)$"
     ) as found:
         planfly.plan("paper-07", wind=wind)  # type: ignore[arg-type]
     assert (found.value.field, found.value.value) == ("wind", wind)

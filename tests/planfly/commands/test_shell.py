@@ -43,7 +43,7 @@ def test_it_says_what_help_says(capsys: Output) -> None:
 
 def test_the_schema_of_an_answer(capsys: Output) -> None:
     assert main(["help", "fly", "--schema"]) == 0
-    assert json.loads(capsys.readouterr().out)["properties"]["log"]["description"].startswith("The flight log")
+    assert json.loads(capsys.readouterr().out)["properties"]["log"]["description"].startswith("Flight log")
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,7 @@ from planfly.live.served_flights import ServedFlights, ServeOptions, open_served
 from tests.logs.made_flight import make_track
 from tests.planfly.conftest import FIELD
 from tests.setups import waypoint_mission
+from world.errors import LogError
 from world.frames import to_geo
 
 
@@ -161,6 +162,13 @@ def test_a_log_takes_the_next_free_number_and_holds_the_flight(options: ServeOpt
     assert not read_log(options.logs / "flight-003.mcap").complete
 
 
+def _holds_rows(log: Path) -> bool:
+    try:
+        return len(read_log(log).track) > 0
+    except LogError:
+        return False
+
+
 def test_a_circle_without_end_is_logged_in_pieces_about_one_place(
     options: ServeOptions, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -173,8 +181,7 @@ def test_a_circle_without_end_is_logged_in_pieces_about_one_place(
     for request in (JudgeMission(level, 1), StartFlight(), DivertFlight(LOITER, replace(level, home=home))):
         ours.send(request)
     pieces = 0
-    # The third log is complete once there is a fourth one.
-    while pieces < 4:
+    while pieces < 3 or not _holds_rows(options.logs / "flight-003.mcap"):
         pieces = len(list(options.logs.glob("flight-*.mcap"))) if options.logs.exists() else 0
         ours.poll(0.05) and ours.recv_bytes()
     ours.send(EndFlight(quit=True))
