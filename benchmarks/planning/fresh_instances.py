@@ -145,7 +145,7 @@ def main() -> None:
     parser.add_argument("--from", dest="first", type=int, default=7001, help="seed of the first instance")
     parser.add_argument("--count", type=int, default=60, help="instances")
     parser.add_argument("--runs", type=int, default=1, help="seeds of each algorithm on each")
-    parser.add_argument("--autopilot", default="planfly", help="for whom plans leave room")
+    parser.add_argument("--autopilot", default="planfly", help="autopilot that the plans leave room for")
     parser.add_argument("--kept", type=Path, default=KEPT, help="file that keeps what the reference finds")
     parser.add_argument("--without-reference", action="store_true", help="best known is the best of the runs")
     parser.add_argument("--algorithms", nargs="+", default=[DEFAULT])

@@ -1,4 +1,4 @@
-"""``python -m making`` in docs/: write the tables of the pages anew."""
+"""``python -m making`` in docs/: update the generated tables of the pages."""
 
 from pathlib import Path
 

@@ -1,6 +1,6 @@
 """Tables of a page that the code knows, between ``<!-- made: NAME WORD... -->`` and ``<!-- end of NAME -->``.
 
-Pages hold them as `filled` makes them, so that they can be read in place; ``make tables`` writes them anew.
+Pages hold them as `filled` makes them, so that they can be read in place; ``make tables`` updates them.
 """
 
 import re
@@ -53,7 +53,7 @@ def _table(found: re.Match[str], built: bool) -> str:
 
 
 def fill_pages(folder: Path) -> list[Path]:
-    """Write the tables of all pages of a folder anew, and return the pages that changed."""
+    """Update the generated tables of all pages of a folder, and return the pages that changed."""
     changed = []
     for page in sorted(folder.glob("*.md")):
         text = page.read_text(encoding="utf-8")

@@ -9,7 +9,8 @@ from tests.world.test_kernels import _divide
 from world import kernels
 from world.kernel_files import CheckedCacheFiles
 
-KEY, OTHER = ("float64", "here"), ("int64", "here")
+KEY = ("float64", "here")
+OTHER = ("int64", "here")
 
 
 @pytest.fixture

@@ -13,7 +13,8 @@ from planfly.workflow import trial_flight
 from planfly.workflow.trial_flight import Trial, TrialAborted
 from world.errors import StartError
 
-SETUP, AIRCRAFT = example_log().setup, load_aircraft("aerosonde")
+SETUP = example_log().setup
+AIRCRAFT = load_aircraft("aerosonde")
 
 
 def test_a_trial_is_flown_when_it_is_asked_for_and_once(monkeypatch: pytest.MonkeyPatch) -> None:
