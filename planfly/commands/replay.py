@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import planfly
 from planfly.terminal.arguments import number, time_or_stations
 from planfly.terminal.command_parser import LineParser
+from planfly.terminal.control_characters import without_controls
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.options import (
     call,
@@ -19,7 +20,7 @@ from planfly.terminal.options import (
     result_options,
     stop_signals,
 )
-from planfly.terminal.output import give_answer, plain_stream, without_controls
+from planfly.terminal.output import give_answer, plain_stream
 from planfly.terminal.results import warn_of_loss
 from world.errors import PlanflyError
 from world.running_clock import RunningClock
