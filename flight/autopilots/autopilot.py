@@ -176,6 +176,24 @@ class Candidate(NamedTuple):
     least: float = -math.inf
 
 
+class MissionParts(NamedTuple):
+    """Parts of a mission that decide which of an autopilot's settings change its flight.
+
+    returns: True if it returns to launch.
+    has_return_path: True if it marks a return path (DO_RETURN_PATH_START).
+    takes_off, lands: True if its take-off or its landing is flown from or to the ground.
+    enables_fence: True if it switches the fence on (DO_FENCE_ENABLE).
+    wind: highest mean wind speed on its route, m/s.
+    """
+
+    returns: bool = False
+    has_return_path: bool = False
+    takes_off: bool = False
+    lands: bool = False
+    enables_fence: bool = False
+    wind: float = 0.0
+
+
 @dataclass(frozen=True, slots=True)
 class AutopilotProgram(DocumentConfig):
     """SITL program of a flight."""
@@ -236,6 +254,7 @@ class Autopilot(ABC):
         value that is not positive, and reads gates.
     flies_ground: True if it flies take-offs and landings, see `from_ground`.
     flies_both_ends: True if it does so only in a mission that has both.
+    is_program: True for an external program, which reads its own parameters.
     height_parameter: the altitude tolerance outside which it circles at a waypoint; "" if it flies on.
     height_candidates, side_candidates: parameters that may cause an altitude or a track to fail.
     """
@@ -252,6 +271,7 @@ class Autopilot(ABC):
     reads_as_px4: ClassVar[bool] = False
     flies_ground: ClassVar[bool] = False
     flies_both_ends: ClassVar[bool] = False
+    is_program: ClassVar[bool] = False
     height_parameter: ClassVar[str] = ""
     height_candidates: ClassVar[tuple[Candidate, ...]] = ()
     side_candidates: ClassVar[tuple[Candidate, ...]] = ()
@@ -373,11 +393,8 @@ class Autopilot(ABC):
         """True if it follows the fly-by path, and does not turn by an acceptance radius."""
         return self.acceptance_radius is None
 
-    def settings_not_flown(self, *, returns: bool) -> list[str]:
-        """Return the settings that change the flight path but are not flown, as sentences without a full stop.
-
-        returns: True if the mission returns to launch.
-        """
+    def settings_not_flown(self, mission: MissionParts) -> list[str]:
+        """Return the settings that change the flight path but are not flown, as sentences without a full stop."""
         return []
 
     @property

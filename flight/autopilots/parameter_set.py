@@ -50,6 +50,8 @@ class ParameterTable:
 
     autopilot: the autopilot's name in a scenario.  title: its name in texts.
     definitions: definitions by the field of the control law's record, in the order of the values.
+    when_stated: definitions of parameters that have no part in the control law, by name; a set holds them only if a
+        file states them.
     pairs: a minimum and a maximum; the minimum must be lower.
     orders: names of parameters whose values should not decrease from one parameter to the next.
     log_digits: significant digits of the values in a log.
@@ -63,12 +65,14 @@ class ParameterTable:
         *,
         pairs: Iterable[tuple[str, str]],
         orders: Iterable[tuple[str, ...]],
+        when_stated: Iterable[Definition] = (),
         log_digits: int = 17,
     ) -> None:
         self.autopilot, self.title, self.log_digits = autopilot, title, log_digits
         self.definitions = tuple(definitions.values())
+        self.when_stated = {definition.name: definition for definition in when_stated}
         self.pairs, self.orders = tuple(pairs), tuple(orders)
-        self.by_name = {definition.name: definition for definition in self.definitions}
+        self.by_name = {definition.name: definition for definition in self.definitions} | self.when_stated
         # Definition and factor to its unit, by each name that a file may use.
         self.by_any_name = {name: (definition, 1.0) for name, definition in self.by_name.items()} | {
             definition.old[0]: (definition, definition.old[1]) for definition in self.definitions if definition.old
@@ -128,7 +132,8 @@ class ParameterTable:
 class ParameterSet:
     """The parameters that an autopilot flies with; each autopilot has a subclass with its own `table`.
 
-    values: every parameter that the law reads, in the order of the table's definitions.
+    values: every parameter that the law reads, in the order of the table's definitions, and after these the stated
+        parameters of the table's ``when_stated``.
     unused: names in the file that the law does not read.
     source: the user's file, "" if there is no file.
     """
@@ -221,7 +226,8 @@ class ParameterSet:
                     return ParameterValue(definition.name, value, origin)
             return ParameterValue(definition.name, definition.default, "default")
 
-        made = cls(tuple(map(find, cls.table.definitions)), unused, source, *fields)
+        others = [parameter for parameter in map(find, cls.table.when_stated.values()) if parameter.origin != "default"]
+        made = cls((*map(find, cls.table.definitions), *others), unused, source, *fields)
         found = {name: value for name, value, _ in made.values}
         for low, high in cls.table.pairs:
             if found[low] >= found[high]:
@@ -239,11 +245,9 @@ class ParameterSet:
         """Return the same parameters with other values, by the autopilot's names and in its units."""
         if unknown := sorted(set(values) - self.table.by_name.keys()):
             raise ValueError(f"{unknown[0]}: not a parameter of the simulated autopilot")
-        made = tuple(
-            parameter._replace(value=values[parameter.name], origin="file") if parameter.name in values else parameter
-            for parameter in self.values
-        )
-        return replace(self, values=made)
+        made = {parameter.name: parameter for parameter in self.values}
+        made |= {name: ParameterValue(name, value, "file") for name, value in values.items()}
+        return replace(self, values=tuple(made.values()))
 
     def by_origin(self, origin: Origin) -> dict[str, float]:
         """Return the values from one source, by name and in the autopilot's units."""

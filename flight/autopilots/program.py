@@ -39,6 +39,7 @@ class ProgramAutopilot(Autopilot):
     """
 
     own: ClassVar[np.dtype[np.record] | None] = None
+    is_program: ClassVar[bool] = True
     log_suffix: ClassVar[str]
     program: AutopilotProgram | None = None
     binary: Path | None = field(default=None, compare=False)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import planfly
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from logs.recording.reader import read_log
 from logs.verdict import tolerances
 from logs.verdict.rule_words import RULE_WORDS
@@ -86,6 +87,16 @@ def test_every_tolerance_stands_on_the_page_with_its_value() -> None:
                 for number, degrees in re.findall(r"(-?[\d.]+(?:e[+-]?\d+)?)(°?)", shown)
             ]
             assert told == pytest.approx(numbers(getattr(tolerances, name)), rel=1e-5), name
+
+
+def test_every_setting_that_leaves_the_verdict_open_stands_on_its_page() -> None:
+    page = text_of("arduplane-branches.md")
+    # The page names a group of settings once.
+    groups = {"FLAP_1_PERCNT": "FLAP_1_*", "FLAP_1_SPEED": "FLAP_1_*", "FLAP_2_PERCNT": "FLAP_2_*"}
+    groups |= {"FLAP_2_SPEED": "FLAP_2_*"}
+    names = [groups.get(name, name) for name in ArduPilotParameters.table.when_stated]
+    assert len(names) > 30
+    assert [name for name in names if f"`{name}`" not in page] == []
 
 
 def test_every_scale_that_ranks_flights_stands_on_its_page() -> None:

@@ -15,6 +15,7 @@ from flight.autopilots.arduplane.landing import go_around_height, landing_airspe
 from flight.autopilots.arduplane.launch import motor_start, takeoff_slew
 from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_tick
 from flight.autopilots.arduplane.navigator import LOITER_ALTITUDE_TOLERANCE_M, MAX_ACCEPTANCE_M, turn_distance
+from flight.autopilots.arduplane.open_settings import describe_open_settings
 from flight.autopilots.arduplane.parameters import (
     HEIGHT_CANDIDATES,
     RELEASE,
@@ -27,6 +28,7 @@ from flight.autopilots.autopilot import (
     Autopilot,
     GroundAutopilot,
     LandingGlide,
+    MissionParts,
     SpeedLimits,
     StoredAutopilot,
     StoredParameters,
@@ -155,8 +157,11 @@ class ArduPlane(Autopilot):
         """WP_RADIUS."""
         return self.parameters.wp_radius
 
-    def settings_not_flown(self, *, returns: bool) -> list[str]:
-        """Return settings of `_NEUTRAL` that are not neutral, zero rate gains, an own fence, and RTL over terrain."""
+    def settings_not_flown(self, mission: MissionParts) -> list[str]:
+        """Return `_NEUTRAL` settings that are not neutral, zero rate gains, an own fence, RTL over terrain, and others.
+
+        The others are those of `flight.autopilots.arduplane.open_settings`.
+        """
         made = self.parameters
         found = {name: value for name, value, _ in made.values}
         left = [
@@ -169,11 +174,12 @@ class ArduPlane(Autopilot):
             for axis in ("RLL_RATE", "PTCH_RATE")
             if found[f"{axis}_P"] == found[f"{axis}_FF"] == 0.0
         ]
-        if made.has_fence_of_its_own:
+        fenced = made.changed(FENCE_ENABLE=1.0) if mission.enables_fence else made
+        if fenced.has_fence_of_its_own:
             left.append(f"the circle and the altitudes of FENCE_TYPE {made.fence_type:g} are not judged")
-        if returns and made.follows_terrain_home:
+        if mission.returns and made.follows_terrain_home:
             left.append(f"TERRAIN_FOLLOW {made.terrain_follow:g} has the return follow the terrain, which is not flown")
-        return left
+        return left + describe_open_settings(made, mission, by_program=self.is_program)
 
     @property
     def follows_ground(self) -> bool:

@@ -146,7 +146,28 @@ _ORDERS = (
 )
 # Minimum and maximum; the minimum must be lower.
 _PAIRS = (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX"))
-TABLE = ParameterTable(ARDUPILOT, "ArduPlane", DEFINITIONS, pairs=_PAIRS, orders=_ORDERS)
+# Parameters with which the verdict may be open (`flight.autopilots.arduplane.open_settings`), with their defaults.
+_WHEN_STATED = {
+    **dict.fromkeys(("KFF_THR2PTCH", "BATT_WATT_MAX", "FWD_BAT_THR_CUT", "TECS_OPTIONS", "AFS_ENABLE"), 0.0),
+    **dict.fromkeys(("CHUTE_CRT_SINK", "ICE_IDLE_PCT", "AHRS_WIND_MAX", "ARSPD_WIND_MAX", "MIS_OPTIONS"), 0.0),
+    **dict.fromkeys(("FLAP_1_PERCNT", "FLAP_1_SPEED", "FLAP_2_PERCNT", "FLAP_2_SPEED"), 0.0),
+    **dict.fromkeys(("TKOFF_OPTIONS", "TKOFF_TDRAG_ELEV", "TKOFF_FLAP_PCNT", "TKOFF_THR_IDLE"), 0.0),
+    **dict.fromkeys(("TECS_TKOFF_IGAIN", "TECS_APPR_SMAX", "TECS_LAND_TDAMP", "TECS_LAND_IGAIN"), 0.0),
+    **dict.fromkeys(("LAND_TYPE", "LAND_PF_ARSPD", "LAND_OPTIONS", "LAND_THR_SLEW", "LAND_FLAP_PERCNT"), 0.0),
+    **dict.fromkeys(("RNGFND_LANDING", "TECS_LAND_PDAMP"), 0.0),
+    "ICE_IDLE_RPM": -1.0,
+    "TKOFF_ACCEL_CNT": 1.0,
+    "TECS_LAND_DAMP": 0.5,
+    "USE_REV_THRUST": 2.0,
+}
+TABLE = ParameterTable(
+    ARDUPILOT,
+    "ArduPlane",
+    DEFINITIONS,
+    pairs=_PAIRS,
+    orders=_ORDERS,
+    when_stated=[Definition(name, default, -math.inf, math.inf) for name, default in _WHEN_STATED.items()],
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -319,7 +340,7 @@ class ArduPilotParameters(ParameterSet):
 
     def __post_init__(self) -> None:
         """Convert the values to SI."""
-        for (name, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=True):
+        for (name, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=False):
             object.__setattr__(self, name, parameter.value * definition.to_si)
 
     @property

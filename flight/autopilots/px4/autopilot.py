@@ -8,7 +8,15 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
-from flight.autopilots.autopilot import Autopilot, MissionChecks, SpeedLimits, StoredAutopilot, StoredParameters, Tick
+from flight.autopilots.autopilot import (
+    Autopilot,
+    MissionChecks,
+    MissionParts,
+    SpeedLimits,
+    StoredAutopilot,
+    StoredParameters,
+    Tick,
+)
 from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE
 from flight.autopilots.px4.law import PX4, px4_tick
@@ -122,7 +130,7 @@ class Px4(Autopilot):
         """NAV_ACC_RAD, or up to 1.16 guidance's own switch distance at sea level if that is more."""
         return self.turn_distance(math.pi, 0.0)
 
-    def settings_not_flown(self, *, returns: bool) -> list[str]:
+    def settings_not_flown(self, mission: MissionParts) -> list[str]:
         """Return limits that end a mission, and the settings of `_NEUTRAL` that are not neutral."""
         made, names = self.parameters, ["COM_FLT_TIME_MAX"]
         if made["GF_ACTION"] > 0.0:

@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from flight.autopilots.autopilot import MissionChecks
+from flight.autopilots.autopilot import MissionChecks, MissionParts
 from flight.mission.commands import PASSED_OVER, Treatment, support_of
 from flight.mission.fences import fence_problem
 from flight.mission.items import (
@@ -175,9 +175,9 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
         steepest = f"{max(map(abs, slopes)):.1%}, and at most {STEEPEST_STRIP:.0%} can be landed on"
         why = f"NAV_LAND: the ground there slopes by {steepest}: the touchdown is not judged"
         left.append((int(setup.route.items[-1]), why))
-    returns = any(item.command == C.NAV_RETURN_TO_LAUNCH for item in setup.mission.items)
     # An imported flight was flown with its settings.
-    settings = [(None, text) for text in setup.autopilot.settings_not_flown(returns=returns) if setup.source is None]
+    texts = setup.autopilot.settings_not_flown(_mission_parts(setup)) if setup.source is None else []
+    settings = [(None, text) for text in texts]
     for seq, text in [*left, *settings]:
         yield make_finding(
             "mission",
@@ -189,6 +189,20 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
             method="mission items",
             check=NOT_FLOWN,
         )
+
+
+def _mission_parts(setup: FlightSetup) -> MissionParts:
+    """Return the parts of a mission that decide which settings change its flight."""
+    items, ways = setup.mission.items, setup.ground_ways
+    commands = {item.command for item in items}
+    return MissionParts(
+        returns=C.NAV_RETURN_TO_LAUNCH in commands,
+        has_return_path=C.DO_RETURN_PATH_START in commands,
+        takes_off=ways.take_off is not None,
+        lands=ways.approach is not None,
+        enables_fence=any(item.command == C.DO_FENCE_ENABLE and item.params[0] == 1.0 for item in items),
+        wind=setup.scenario.wind.strongest(setup.route.waypoints[:, 2]),
+    )
 
 
 def _flown_items(mission: Mission) -> list[MissionItem]:

@@ -8,8 +8,10 @@ import pytest
 
 from aircraft.catalog import aircraft_names, load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.open_settings import OPEN_SETTINGS
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.process import (
+    FLYING,
     SIMULATION,
     autopilot_parameters,
     load_aircraft_parameters,
@@ -94,3 +96,9 @@ def test_each_aircrafts_speeds_are_its_own(name: str) -> None:
 def test_an_aircraft_without_parameters_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"ardupilot\.parm"):
         load_aircraft_parameters(replace(AEROSONDE, folder=tmp_path))
+
+
+def test_a_program_gets_the_settings_that_it_is_said_to_fly() -> None:
+    """Flaps it gets, too, and planfly's aircraft have none."""
+    given = {name for name in OPEN_SETTINGS if name.startswith(FLYING) and "FLAP" not in name}
+    assert {name for name, setting in OPEN_SETTINGS.items() if setting.by_program} == given

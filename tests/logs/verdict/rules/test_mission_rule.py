@@ -342,9 +342,28 @@ def test_settings_of_arduplane_that_no_flight_shows_leave_the_verdict_open(
     left = [item for item in mission_findings(replace(setup_of(*lines), autopilot=law)) if item.check == "not flown"]
     assert [item.ok for item in left] == [None] * len(said)
     assert all(words in item.reason for item, words in zip(left, said, strict=True))
-    # Without a return none follows the terrain.
+    # Without a return the terrain is not followed.
     alone = mission_findings(replace(setup_of(*lines[:2]), autopilot=law))
     assert not any("TERRAIN_FOLLOW" in item.reason for item in alone)
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        # On its item 3 the mission switches on a fence that the file has off: FENCE_TYPE 1 limits the altitude.
+        ((wp(0, 0), wp(0, 900), "2 207 1 0 0 0 0 0 0", wp(900, 900)), "FENCE_TYPE 1"),
+        ((wp(0, 0), wp(0, 900), "2 207 0 0 0 0 0 0 0", wp(900, 900)), ""),
+        # ArduPlane's RTL_AUTOLAND 4 returns along the items behind DO_RETURN_PATH_START, if there is one.
+        ((wp(0, 0), wp(0, 900), "2 20 0 0 0 0 0 0 0", "2 188 0 0 0 0 0 0 0", wp(900, 900)), "RTL_AUTOLAND 4"),
+        ((wp(0, 0), wp(0, 900), "2 20 0 0 0 0 0 0 0"), ""),
+        ((wp(0, 0), wp(0, 900), "2 188 0 0 0 0 0 0 0", wp(900, 900)), ""),
+    ],
+)
+def test_settings_leave_the_verdict_open_where_an_item_makes_them_matter(lines: tuple[str, ...], said: str) -> None:
+    law = ArduPlane(ArduPilotParameters.defaults().changed(FENCE_TYPE=1.0, RTL_AUTOLAND=4.0))
+    left = [item for item in mission_findings(replace(setup_of(*lines), autopilot=law)) if item.check == "not flown"]
+    assert [item.ok for item in left] == [None] * bool(said)
+    assert all(said in item.reason for item in left)
 
 
 @pytest.mark.parametrize(

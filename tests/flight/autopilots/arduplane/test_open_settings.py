@@ -1,0 +1,139 @@
+"""ArduPlane's settings that leave the verdict open: where each matters, and which values change nothing."""
+
+import pytest
+
+from flight.autopilots.arduplane.open_settings import OPEN_SETTINGS, describe_open_settings
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.autopilot import MissionParts, StoredParameters
+
+EVERYTHING = MissionParts(returns=True, has_return_path=True, takes_off=True, lands=True, enables_fence=True, wind=12.0)
+IN_THE_AIR = MissionParts(wind=12.0)
+FROM_GROUND = IN_THE_AIR._replace(takes_off=True)
+TO_GROUND = IN_THE_AIR._replace(lands=True)
+# Defaults of ArduPlane 4.6.3 and 4.7, in its parameter reference and in its sources.
+DEFAULTS = """KFF_THR2PTCH 0
+BATT_WATT_MAX 0
+FWD_BAT_THR_CUT 0
+TECS_OPTIONS 0
+AFS_ENABLE 0
+CHUTE_CRT_SINK 0
+ICE_IDLE_PCT 0
+ICE_IDLE_RPM -1
+TKOFF_OPTIONS 0
+TKOFF_ACCEL_CNT 1
+TKOFF_TDRAG_ELEV 0
+TKOFF_FLAP_PCNT 0
+TKOFF_THR_IDLE 0
+TECS_TKOFF_IGAIN 0
+LAND_TYPE 0
+LAND_PF_ARSPD 0
+LAND_OPTIONS 0
+LAND_THR_SLEW 0
+LAND_FLAP_PERCNT 0
+RNGFND_LANDING 0
+TECS_APPR_SMAX 0
+TECS_LAND_DAMP 0.5
+TECS_LAND_TDAMP 0
+TECS_LAND_IGAIN 0
+TECS_LAND_PDAMP 0
+FLAP_1_PERCNT 0
+FLAP_1_SPEED 0
+FLAP_2_PERCNT 0
+FLAP_2_SPEED 0
+AHRS_WIND_MAX 0
+ARSPD_WIND_MAX 0
+MIS_OPTIONS 0
+USE_REV_THRUST 2
+"""
+
+
+def said(text: str, mission: MissionParts, *, by_program: bool = False) -> list[str]:
+    return describe_open_settings(ArduPilotParameters.of_text(text, "mine.param"), mission, by_program=by_program)
+
+
+def test_arduplanes_defaults_leave_nothing_open_stated_or_not() -> None:
+    assert said(DEFAULTS, EVERYTHING) == said("WP_RADIUS 60", EVERYTHING) == []
+
+
+@pytest.mark.parametrize(
+    ("line", "mission"),
+    [
+        ("KFF_THR2PTCH -0.1", IN_THE_AIR),
+        ("BATT_WATT_MAX 300", IN_THE_AIR),
+        ("FWD_BAT_THR_CUT 13.2", IN_THE_AIR),
+        ("TECS_OPTIONS 2", IN_THE_AIR),
+        ("AFS_ENABLE 1", IN_THE_AIR),
+        ("CHUTE_CRT_SINK 8", IN_THE_AIR),
+        ("ICE_IDLE_PCT 12", IN_THE_AIR),
+        ("ICE_IDLE_RPM 0", IN_THE_AIR),
+        ("TKOFF_OPTIONS 1", FROM_GROUND),
+        ("TKOFF_ACCEL_CNT 2", FROM_GROUND),
+        ("TKOFF_TDRAG_ELEV 20", FROM_GROUND),
+        ("TKOFF_FLAP_PCNT 30", FROM_GROUND),
+        ("TKOFF_THR_IDLE 10", FROM_GROUND),
+        ("TECS_TKOFF_IGAIN 0.2", FROM_GROUND),
+        ("LAND_TYPE 1", TO_GROUND),
+        ("LAND_PF_ARSPD 11", TO_GROUND),
+        ("LAND_OPTIONS 1", TO_GROUND),
+        ("LAND_THR_SLEW 50", TO_GROUND),
+        ("LAND_FLAP_PERCNT 40", TO_GROUND),
+        ("RNGFND_LANDING 1", TO_GROUND),
+        ("TECS_APPR_SMAX 6", TO_GROUND),
+        ("TECS_LAND_DAMP 0.3", TO_GROUND),
+        ("TECS_LAND_TDAMP 0.1", TO_GROUND),
+        ("TECS_LAND_IGAIN 0.1", TO_GROUND),
+        ("TECS_LAND_PDAMP 0.1", TO_GROUND),
+    ],
+)
+def test_a_setting_leaves_the_verdict_open_where_its_part_is_flown(line: str, mission: MissionParts) -> None:
+    (text,) = said(line, mission)
+    assert text.startswith(line)
+    assert text.endswith("and is not flown")
+    # A take-off's or a landing's setting changes no flight that begins and ends in the air.
+    assert (said(line, IN_THE_AIR) == []) == (mission is not IN_THE_AIR)
+    assert line.split()[0] in OPEN_SETTINGS
+
+
+@pytest.mark.parametrize(
+    ("text", "mission", "expected"),
+    [
+        ("FLAP_1_PERCNT 30\nFLAP_1_SPEED 15", IN_THE_AIR, "FLAP_1_PERCNT 30 below FLAP_1_SPEED 15"),
+        ("FLAP_1_PERCNT 30", IN_THE_AIR, ""),
+        ("FLAP_2_SPEED 15", IN_THE_AIR, ""),
+        # 12 m/s of wind: that much can lie between the airspeed and the ground speed.
+        ("AHRS_WIND_MAX 11.9", IN_THE_AIR, "AHRS_WIND_MAX 11.9 in 12 m/s of wind"),
+        ("AHRS_WIND_MAX 12", IN_THE_AIR, ""),
+        ("ARSPD_WIND_MAX 11.9", IN_THE_AIR, "ARSPD_WIND_MAX 11.9 in 12 m/s of wind"),
+        ("MIS_OPTIONS 4", TO_GROUND, "MIS_OPTIONS 4 continues"),
+        ("MIS_OPTIONS 4", IN_THE_AIR, ""),
+        ("MIS_OPTIONS 3", TO_GROUND, ""),
+        ("TRIM_THROTTLE 1", IN_THE_AIR, "TRIM_THROTTLE 1 stops the motor"),
+        ("TRIM_THROTTLE 2", IN_THE_AIR, ""),
+        # By default thrust is reversed on a landing's approach alone, and only with a THR_MIN below 0.
+        ("THR_MIN -100", TO_GROUND, "THR_MIN -100 and USE_REV_THRUST 2"),
+        ("THR_MIN -100", IN_THE_AIR, ""),
+        ("THR_MIN -100\nUSE_REV_THRUST 1", IN_THE_AIR, "THR_MIN -100 and USE_REV_THRUST 1"),
+        ("THR_MIN -100\nUSE_REV_THRUST 64", IN_THE_AIR, ""),
+        ("THR_MIN -100\nUSE_REV_THRUST 64", IN_THE_AIR._replace(returns=True), "THR_MIN -100 and USE_REV_THRUST 64"),
+        ("USE_REV_THRUST 1", EVERYTHING, ""),
+    ],
+)
+def test_settings_that_depend_on_others(text: str, mission: MissionParts, expected: str) -> None:
+    assert len(said(text, mission)) == bool(expected)
+    assert all(one.startswith(expected) for one in said(text, mission))
+
+
+def test_a_program_flies_its_own_settings_but_what_the_physics_lacks() -> None:
+    text = "LAND_PF_ARSPD 11\nTRIM_THROTTLE 1\nAHRS_WIND_MAX 5\nLAND_FLAP_PERCNT 40\nBATT_WATT_MAX 300\n"
+    left = [one.split()[0] for one in said(text, TO_GROUND, by_program=True)]
+    assert left == ["BATT_WATT_MAX", "LAND_FLAP_PERCNT"]
+
+
+def test_a_set_holds_these_settings_only_where_they_are_stated() -> None:
+    made = ArduPilotParameters.of_text("LAND_TYPE 1\nWP_RADIUS 60\nSERIAL1_BAUD 57\n", "mine.param")
+    assert made.by_origin("file") == {"WP_RADIUS": 60.0, "LAND_TYPE": 1.0}
+    assert made.unused == ("SERIAL1_BAUD",)
+    assert len(made.values) == len(ArduPilotParameters.defaults().values) + 1
+    again = ArduPilotParameters.restore(StoredParameters(made.values, made.unused, made.source))
+    assert again == made
+    assert ArduPilotParameters.defaults().changed(LAND_TYPE=1.0).by_origin("file") == {"LAND_TYPE": 1.0}
