@@ -134,13 +134,11 @@ class SpeedLimits(NamedTuple):
 class MissionChecks(NamedTuple):
     """Settings of PX4's feasibility checks, by default as for its fixed wings.
 
-    acceptance: NAV_ACC_RAD, m.
     landing_angle: FW_LND_ANG, rad.
     requires: MIS_TKO_LAND_REQ: 0 nothing, 1 a takeoff, 2 a landing, 3 both, 4 and 5 both or neither.
     stated: True if the user's file decides what it requires.
     """
 
-    acceptance: float = 10.0
     landing_angle: float = math.radians(5.0)
     requires: int = 2
     stated: bool = False
@@ -183,6 +181,7 @@ class MissionParts(NamedTuple):
     has_return_path: True if it marks a return path (DO_RETURN_PATH_START).
     takes_off, lands: True if its take-off or its landing is flown from or to the ground.
     enables_fence: True if it switches the fence on (DO_FENCE_ENABLE).
+    moves_payload: True if it commands a gripper, a winch or a gimbal, after which PX4 may wait.
     wind: highest mean wind speed on its route, m/s.
     """
 
@@ -191,6 +190,7 @@ class MissionParts(NamedTuple):
     takes_off: bool = False
     lands: bool = False
     enables_fence: bool = False
+    moves_payload: bool = False
     wind: float = 0.0
 
 

@@ -238,8 +238,9 @@ class ParameterSet:
         return made
 
     def __getitem__(self, name: str) -> float:
-        """Return a parameter's value by the autopilot's name, in SI and radians."""
-        return next(value * self.table.by_name[name].to_si for known, value, _ in self.values if known == name)
+        """Return a parameter's value by the autopilot's name, in SI and radians; its default if it is not held."""
+        definition = self.table.by_name[name]
+        return definition.to_si * next((value for known, value, _ in self.values if known == name), definition.default)
 
     def changed(self, **values: float) -> Self:
         """Return the same parameters with other values, by the autopilot's names and in its units."""

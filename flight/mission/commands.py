@@ -290,7 +290,9 @@ SUPPORT: dict[Command, Support] = {
     C.DO_SET_RELAY: Support(_NO_EFFECT, _REFUSED, "switches a plain relay"),
     C.DO_REPEAT_RELAY: Support(_NO_EFFECT, _REFUSED, "switches a plain relay"),
     # `AP_ServoRelayEvents::do_set_servo` moves only channels without a function: no control surface and no throttle.
-    C.DO_SET_SERVO: Support(_NO_EFFECT, _NO_EFFECT, "moves a servo that does not steer"),
+    # PX4 removed it in 1.14, and has DO_SET_ACTUATOR instead.
+    C.DO_SET_SERVO: Support(_NO_EFFECT, _REFUSED, "moves a servo that does not steer"),
+    C.DO_SET_ACTUATOR: Support(_REFUSED, _NO_EFFECT, "moves a servo that does not steer"),
     C.DO_REPEAT_SERVO: Support(_NO_EFFECT, _REFUSED, "moves a servo that does not steer"),
     C.DO_RETURN_PATH_START: Support(_NO_EFFECT, _REFUSED, "a mark that returns may go on from"),
     C.DO_LAND_START: Support(_FLOWN, _FLOWN, "the mark of a landing sequence"),
@@ -312,8 +314,8 @@ SUPPORT: dict[Command, Support] = {
     C.DO_PARACHUTE: Support(_OPEN, _REFUSED, "may release the parachute, or let it be released"),
     C.DO_INVERTED_FLIGHT: Support(_OPEN, _REFUSED, "ArduPlane flies on inverted"),
     C.DO_GRIPPER: Support(_NO_EFFECT, _NO_EFFECT, "the payload's; its mass is not flown"),
-    # `Plane::autotune_enable`: the roll and pitch gains change in flight.
-    C.DO_AUTOTUNE_ENABLE: Support(_OPEN, _REFUSED, "ArduPlane changes its own gains in flight"),
+    # `Plane::autotune_enable`: the roll and pitch gains change in flight.  PX4 1.16 refuses it.
+    C.DO_AUTOTUNE_ENABLE: Support(_OPEN, _OPEN, "the autopilot changes its own gains in flight; PX4 from 1.17 on"),
     C.NAV_SET_YAW_SPEED: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
     C.DO_SET_CAM_TRIGG_INTERVAL: Support(_REFUSED, _NO_EFFECT, CAMERA),
     C.DO_SET_RESUME_REPEAT_DIST: Support(_NO_EFFECT, _REFUSED, "for a mission that is broken off and resumed"),
@@ -324,10 +326,13 @@ SUPPORT: dict[Command, Support] = {
     C.DO_GUIDED_LIMITS: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
     C.DO_ENGINE_CONTROL: Support(_OPEN, _REFUSED, "starts or stops the engine"),
     C.OBLIQUE_SURVEY: Support(_REFUSED, _NO_EFFECT, CAMERA),
+    # PX4 1.16 refuses it.
+    C.COMPONENT_ARM_DISARM: Support(_REFUSED, _OPEN, "may stop the motor; PX4 from 1.17 on"),
     C.SET_CAMERA_MODE: Support(_REFUSED, _NO_EFFECT, CAMERA),
-    C.SET_CAMERA_ZOOM: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
+    # `parse_mavlink_mission_item` has no case for it.
+    C.SET_CAMERA_ZOOM: Support(_NO_EFFECT, _REFUSED, CAMERA),
     C.SET_CAMERA_FOCUS: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
-    C.SET_CAMERA_SOURCE: Support(_NO_EFFECT, _REFUSED, CAMERA),
+    C.SET_CAMERA_SOURCE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
     C.JUMP_TAG: Support(_FLOWN, _REFUSED, "the mark that DO_JUMP_TAG leads to"),
     C.DO_JUMP_TAG: Support(_FLOWN, _REFUSED, "a jump to the first JUMP_TAG of its number"),
     C.DO_GIMBAL_MANAGER_PITCHYAW: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),

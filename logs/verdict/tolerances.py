@@ -344,8 +344,6 @@ SPHERE_FAR_DIAGONALS = 30.0
 
 # PX4's checks: constants of its `FeasibilityChecker` in addition to `flight.autopilots.autopilot.MissionChecks`
 
-# m.  A takeoff's height must exceed the acceptance radius by this; a literal in the checker.
-PX4_TAKEOFF_BUFFER_M = 1.0
 # rad.  A landing approach may be steeper than FW_LND_ANG by this; a literal in the checker.
 PX4_LANDING_BUFFER_RAD = math.radians(0.1)
 # m.  MIS_DIST_1WP.
@@ -354,10 +352,6 @@ PX4_FIRST_WAYPOINT_DISTANCE_M = 10_000.0
 PX4_WAYPOINT_SPACING_M = 900.0
 # m.  A condition gate nearer than this to a waypoint is at the same position.
 PX4_GATE_SPACING_M = 0.05
-# Highest actuator number of DO_SET_SERVO.
-PX4_MAX_SERVO_INDEX = 5
-# Highest value of DO_SET_SERVO.
-PX4_MAX_PWM_VALUE = 2000.0
 
 # Suggestions
 

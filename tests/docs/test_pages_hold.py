@@ -12,6 +12,7 @@ import pytest
 
 import planfly
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.px4.parameters import NOT_FLOWN, Px4Parameters
 from logs.recording.reader import read_log
 from logs.verdict import tolerances
 from logs.verdict.rule_words import RULE_WORDS
@@ -90,13 +91,19 @@ def test_every_tolerance_stands_on_the_page_with_its_value() -> None:
 
 
 def test_every_setting_that_leaves_the_verdict_open_stands_on_its_page() -> None:
-    page = text_of("arduplane-branches.md")
     # The page names a group of settings once.
     groups = {"FLAP_1_PERCNT": "FLAP_1_*", "FLAP_1_SPEED": "FLAP_1_*", "FLAP_2_PERCNT": "FLAP_2_*"}
     groups |= {"FLAP_2_SPEED": "FLAP_2_*"}
     names = [groups.get(name, name) for name in ArduPilotParameters.table.when_stated]
     assert len(names) > 30
-    assert [name for name in names if f"`{name}`" not in page] == []
+    for page, expected in (("arduplane-branches.md", names), ("px4-branches.md", [*Px4Parameters.table.when_stated])):
+        text = text_of(page)
+        assert [name for name in expected if f"`{name}`" not in text] == []
+
+
+def test_every_parameter_of_px4_that_is_not_flown_stands_on_its_page() -> None:
+    text = text_of("px4-branches.md")
+    assert [name for name in NOT_FLOWN if f"`{name}`" not in text] == []
 
 
 def test_every_scale_that_ranks_flights_stands_on_its_page() -> None:

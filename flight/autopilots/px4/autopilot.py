@@ -1,8 +1,9 @@
 """PX4's control law for fixed wing as an autopilot, with its parameters."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -30,15 +31,47 @@ from world.kernels import Record
 from world.scenario_tables import NEWEST_PX4, FlightTable, Navigation, Px4Version
 from world.wind import Turbulence
 
-# Neutral values of parameters that change the flight of a mission and are not simulated: throttle and pitch without an
-# airspeed sensor, the airspeed in wind, and the airspeeds of another weight.
-_NEUTRAL = {"FW_USE_AIRSPD": 1.0, "FW_WIND_ARSP_SC": 0.0, "WEIGHT_BASE": -1.0, "WEIGHT_GROSS": -1.0}
+
+class _NeutralRange(NamedTuple):
+    """Values of a parameter with which PX4 flies as simulated.
+
+    by_program: True if PX4's own program flies the other values, with planfly's physics.
+    """
+
+    lowest: float
+    highest: float
+    by_program: bool = True
+
+
+# Parameters that change the flight of a mission and are not simulated; docs/px4-branches.md lists their functions.
+_NEUTRAL = {
+    # Throttle and pitch without an airspeed sensor.
+    "FW_USE_AIRSPD": _NeutralRange(1.0, 1.0),
+    "ASPD_PRIMARY": _NeutralRange(1.0, 3.0, by_program=False),
+    # Airspeed in wind, and of another weight.
+    "FW_WIND_ARSP_SC": _NeutralRange(-math.inf, 0.0),
+    "WEIGHT_BASE": _NeutralRange(-math.inf, 0.0),
+    "WEIGHT_GROSS": _NeutralRange(-math.inf, 0.0),
+    # Climb rate in thin air, and throttle by airspeed (`PerformanceModel`).
+    "FW_SERVICE_CEIL": _NeutralRange(-math.inf, 0.0),
+    "FW_THR_ASPD_MIN": _NeutralRange(-math.inf, 0.0),
+    "FW_THR_ASPD_MAX": _NeutralRange(-math.inf, 0.0),
+    # Descents without throttle, at the highest airspeed (`TECS::_setFastDescend`).
+    "FW_T_F_ALT_ERR": _NeutralRange(-math.inf, 0.0),
+    # Descents that a distance sensor ends (`updateAltToAvoidTerrainCollisionAndRepublishTriplet`).
+    "NAV_MIN_GND_DIST": _NeutralRange(-math.inf, 0.0, by_program=False),
+}
 # By RTL_TYPE: the part of it that is not flown.
 _RTL_TYPES_NOT_FLOWN = {
     2: "RTL_TYPE 2, along the mission to its landing or back: flown as 1, to the nearest rally point or home",
     3: "RTL_TYPE 3, to the nearest of home, rally points and the mission's landing: flown as 0, to no landing",
     4: "RTL_TYPE 4, along the mission to its landing or back: flown as 1, to the nearest rally point or home",
 }
+
+# RTL_TYPE of a return along the mission.
+_ALONG_THE_MISSION = (2.0, 4.0)
+# COM_WIND_MAX_ACT of a mere warning.
+_WARN_OF_WIND = 1.0
 
 # Fields of `flight.autopilots.px4.law.PX4_MEMORY` that belong to the current leg or mission, not to the aircraft.
 _LEG_FIELDS = ("leg", "reached_for", "at_rim", "circling", "returning", "climbed", "finished", "waited")
@@ -131,16 +164,36 @@ class Px4(Autopilot):
         return self.turn_distance(math.pi, 0.0)
 
     def settings_not_flown(self, mission: MissionParts) -> list[str]:
-        """Return limits that end a mission, and the settings of `_NEUTRAL` that are not neutral."""
+        """Return limits that end a mission, the settings of `_NEUTRAL` that are not neutral, and others."""
         made, names = self.parameters, ["COM_FLT_TIME_MAX"]
         if made["GF_ACTION"] > 0.0:
             names += ["GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]
+        if made["COM_WIND_MAX_ACT"] > _WARN_OF_WIND and made["COM_WIND_MAX"] < mission.wind:
+            names += ["COM_WIND_MAX"]
         ending = [f"{name} {made[name]:g} ends a mission and is not judged" for name in names if made[name] > 0.0]
-        return ending + [
+        changing = [
             f"{name} {made[name]:g} changes the flight and is not flown"
             for name, neutral in _NEUTRAL.items()
-            if made[name] != neutral
+            if not neutral.lowest <= made[name] <= neutral.highest and not (self.is_program and neutral.by_program)
         ]
+        return [*ending, *changing, *([] if self.is_program else self._describe_others(mission))]
+
+    def _describe_others(self, mission: MissionParts) -> Iterator[str]:
+        """Describe settings that change only some missions or releases."""
+        made = self.parameters
+        if made["NPFG_EN_MIN_GSP"] == 0.0 and self.version == "1.16":
+            yield "NPFG_EN_MIN_GSP 0 keeps no minimum ground speed, which is not flown"
+        if mission.moves_payload and made["MIS_COMMAND_TOUT"] > 0.0:
+            yield f"MIS_COMMAND_TOUT {made['MIS_COMMAND_TOUT']:g} waits for the payload, which is not flown"
+        if not mission.returns:
+            return
+        if made["RTL_TYPE"] in _ALONG_THE_MISSION:
+            yield f"RTL_TYPE {made['RTL_TYPE']:g} returns along the mission, which is not flown"
+        if made["RTL_DESCEND_ALT"] != made["RTL_RETURN_ALT"]:
+            end = f"RTL_DESCEND_ALT {made['RTL_DESCEND_ALT']:g}"
+            yield f"{end} ends the return, which is flown to RTL_RETURN_ALT {made['RTL_RETURN_ALT']:g}"
+        if made["RTL_LAND_DELAY"] >= 0.0:
+            yield f"RTL_LAND_DELAY {made['RTL_LAND_DELAY']:g} lands after the return, which is not flown"
 
     @property
     def reads_acceptance(self) -> bool:
@@ -215,7 +268,7 @@ class Px4(Autopilot):
 
     @property
     def mission_checks(self) -> MissionChecks:
-        """Mission checks from NAV_ACC_RAD, FW_LND_ANG and MIS_TKO_LAND_REQ.
+        """Mission checks from FW_LND_ANG and MIS_TKO_LAND_REQ.
 
         A file with all parameters is taken to state MIS_TKO_LAND_REQ.
 
@@ -224,7 +277,7 @@ class Px4(Autopilot):
         """
         made = self.parameters
         stated = made.is_whole_set or "MIS_TKO_LAND_REQ" in made.by_origin("file")
-        return MissionChecks(made["NAV_ACC_RAD"], made["FW_LND_ANG"], int(made["MIS_TKO_LAND_REQ"]), stated)
+        return MissionChecks(made["FW_LND_ANG"], int(made["MIS_TKO_LAND_REQ"]), stated)
 
     @property
     def speed_limits(self) -> SpeedLimits | None:

@@ -148,7 +148,23 @@ FROM_ARDUPILOT = {
     "TECS_SINK_MIN": ("FW_T_SINK_MIN", 1.0),
     "TECS_SINK_MAX": ("FW_T_SINK_MAX", 1.0),
 }
-TABLE = ParameterTable(PX4, "PX4", DEFINITIONS, pairs=_PAIRS, orders=_ORDERS, log_digits=6)
+# Parameters with which the verdict may be open (`flight.autopilots.px4.autopilot.Px4.settings_not_flown`).
+_WHEN_STATED = {
+    "ASPD_PRIMARY": 1.0,
+    "COM_WIND_MAX": -1.0,
+    "COM_WIND_MAX_ACT": 0.0,
+    "MIS_COMMAND_TOUT": 0.0,
+    "NAV_MIN_GND_DIST": -1.0,
+}
+TABLE = ParameterTable(
+    PX4,
+    "PX4",
+    DEFINITIONS,
+    pairs=_PAIRS,
+    orders=_ORDERS,
+    when_stated=[Definition(name, default, -math.inf, math.inf) for name, default in _WHEN_STATED.items()],
+    log_digits=6,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +232,7 @@ class Px4Parameters(ParameterSet):
     def record(self) -> Record:
         """Return the parameters for compiled code, as a record of `PX4_PARAMETERS`."""
         record: Record = np.zeros(1, PX4_PARAMETERS)[0]
-        for (field, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=True):
+        for (field, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=False):
             setattr(record, field, parameter.value * definition.to_si)
         record.anticipates = self.anticipates
         gains = speed_filter_gains(record.speed_deviation, record.speed_rate_deviation, record.speed_process_deviation)

@@ -1,12 +1,12 @@
 """The mission rule: report items that PX4's feasibility checker would refuse, under the names of PX4's checks.
 
 The checks follow `FeasibilityChecker` and `MissionFeasibilityChecker` of PX4's navigator for a fixed wing, with PX4's
-parameters: NAV_ACC_RAD, FW_LND_ANG, MIS_TKO_LAND_REQ (its fixed-wing default, 2, requires a landing), and MIS_DIST_1WP
-10 km.  These are PX4's own limits and say nothing about the aircraft, so items that only PX4 refuses are reported, and
-fail only if PX4 is to fly.  A missing landing, which PX4 requires by default, fails only if the user's parameter file
-requires a landing, because most missions have no landing and one parameter changes the requirement.  A command that
-neither PX4 nor ArduPlane supports fails for any autopilot, and so does a route beyond the mission's own fence.  Invalid
-latitudes, longitudes, frames and numbers of items were refused when the file was read.
+parameters: FW_LND_ANG, MIS_TKO_LAND_REQ (its fixed-wing default, 2, requires a landing), and MIS_DIST_1WP 10 km.  These
+are PX4's own limits and say nothing about the aircraft, so items that only PX4 refuses are reported, and fail only if
+PX4 is to fly.  A missing landing, which PX4 requires by default, fails only if the user's parameter file requires a
+landing, because most missions have no landing and one parameter changes the requirement.  A command that neither PX4
+nor ArduPlane supports fails for any autopilot, and so does a route beyond the mission's own fence.  Invalid latitudes,
+longitudes, frames and numbers of items were refused when the file was read.
 """
 
 import itertools
@@ -40,9 +40,6 @@ from logs.verdict.tolerances import (
     PX4_FIRST_WAYPOINT_DISTANCE_M,
     PX4_GATE_SPACING_M,
     PX4_LANDING_BUFFER_RAD,
-    PX4_MAX_PWM_VALUE,
-    PX4_MAX_SERVO_INDEX,
-    PX4_TAKEOFF_BUFFER_M,
     PX4_WAYPOINT_SPACING_M,
 )
 from world.airfield import STEEPEST_STRIP
@@ -56,7 +53,7 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
     mission, origin, limits = setup.mission, setup.scenario.origin, setup.autopilot.mission_checks
     checks = (
         ("checkMissionItemValidity", _check_validity(mission)),
-        ("checkTakeoff", _check_takeoff(mission, limits)),
+        ("checkTakeoff", _check_takeoff(mission)),
         ("checkFixedWingLanding", _check_landing(mission)),
         ("checkFixedWindLandApproach", _check_approach(mission, origin, limits)),
         ("checkTakeoffLandAvailable", _check_required_ends(mission, limits, setup.autopilot.refuses)),
@@ -201,6 +198,7 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
         takes_off=ways.take_off is not None,
         lands=ways.approach is not None,
         enables_fence=any(item.command == C.DO_FENCE_ENABLE and item.params[0] == 1.0 for item in items),
+        moves_payload=not commands.isdisjoint((C.DO_GRIPPER, C.DO_WINCH, C.DO_GIMBAL_MANAGER_PITCHYAW)),
         wind=setup.scenario.wind.strongest(setup.route.waypoints[:, 2]),
     )
 
@@ -224,14 +222,6 @@ def _check_validity(mission: Mission) -> Iterator[_Remark]:
                 item.seq,
                 f"{name} in frame {item.frame}, above terrain, which PX4 does not take; ArduPlane does",
             )
-        elif item.command == C.DO_SET_SERVO and not 0 <= item.params[0] <= PX4_MAX_SERVO_INDEX:
-            yield REFUSED, item.seq, f"actuator number {item.params[0]:g} is out of bounds 0..{PX4_MAX_SERVO_INDEX}"
-        elif item.command == C.DO_SET_SERVO and not abs(item.params[1]) <= PX4_MAX_PWM_VALUE:
-            yield (
-                REFUSED,
-                item.seq,
-                f"actuator value {item.params[1]:g} is out of bounds -{PX4_MAX_PWM_VALUE:g}..{PX4_MAX_PWM_VALUE:g}",
-            )
     if mission.items and mission.items[0].command == C.NAV_LAND:
         yield REFUSED, mission.items[0].seq, "starts with landing"
 
@@ -243,17 +233,13 @@ def _height_above_home(mission: Mission, item: MissionItem) -> float:
     return item.alt - mission.home.alt if mission.home is not None else math.nan
 
 
-def _check_takeoff(mission: Mission, limits: MissionChecks) -> Iterator[_Remark]:
+def _check_takeoff(mission: Mission) -> Iterator[_Remark]:
     placed = False
     for item in mission.items:
         if item.command in TAKEOFFS:
             height = _height_above_home(mission, item)
-            if height - PX4_TAKEOFF_BUFFER_M < limits.acceptance:
-                least, radius = limits.acceptance + PX4_TAKEOFF_BUFFER_M, f"NAV_ACC_RAD {limits.acceptance:g} m"
-                low = message(
-                    f"takeoff altitude {height:.1f} m too low: at least {least:g} m", f", {radius} and 1 m more"
-                )
-                yield REFUSED, item.seq, low
+            if height <= 0.0:
+                yield REFUSED, item.seq, f"takeoff altitude {height:.1f} m is not above home"
             if placed:
                 yield REFUSED, item.seq, "takeoff is not the first waypoint item"
         placed = placed or item.command in PLACES | TAKEOFFS | LANDINGS | {C.NAV_RETURN_TO_LAUNCH}
@@ -387,14 +373,7 @@ def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:
 RULE = Rule(
     name="mission",
     tolerances=(
-        *("PX4_TAKEOFF_BUFFER_M", "PX4_LANDING_BUFFER_RAD"),
-        *(
-            "PX4_FIRST_WAYPOINT_DISTANCE_M",
-            "PX4_WAYPOINT_SPACING_M",
-            "PX4_GATE_SPACING_M",
-            "PX4_MAX_SERVO_INDEX",
-            "PX4_MAX_PWM_VALUE",
-        ),
+        *("PX4_LANDING_BUFFER_RAD", "PX4_FIRST_WAYPOINT_DISTANCE_M", "PX4_WAYPOINT_SPACING_M", "PX4_GATE_SPACING_M"),
     ),
     judge_items=mission_findings,
 )

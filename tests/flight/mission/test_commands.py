@@ -18,13 +18,15 @@ ARDUPLANE_STEERS = {30, 83, 84, 85, 94, 208, 210, 212, 217, 218, 223, 3000, 4270
 ARDUPLANE_FLOWN = {16, 17, 18, 19, 20, 21, 22, 31, 112, 114, 177, 178, 179, 189, 600, 601}
 
 # What both `parse_mavlink_mission_item` (src/modules/mavlink/mavlink_mission.cpp) and `checkMissionItemValidity`
-# (src/modules/navigator/MissionFeasibility/FeasibilityChecker.cpp) of PX4 take; NAV_ROI (80) is stored as DO_SET_ROI.
+# (src/modules/navigator/MissionFeasibility/FeasibilityChecker.cpp) of PX4 1.17 take; NAV_ROI (80) is stored as
+# DO_SET_ROI, and 1.16 takes neither DO_AUTOTUNE_ENABLE (212) nor COMPONENT_ARM_DISARM (400).
 PX4_TAKES = {
-    *(16, 17, 19, 20, 21, 22, 31, 80, 84, 85, 93, 177, 178, 179, 183, 189, 195, 196, 197, 200, 201, 203, 204, 205),
-    *(206, 211, 214, 260, 530, 531, 532, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 4501, 42600),
+    *(16, 17, 19, 20, 21, 22, 31, 80, 84, 85, 93, 177, 178, 179, 187, 189, 195, 196, 197, 200, 201, 203, 204, 205),
+    *(206, 211, 212, 214, 260, 400, 530, 532, 534, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 4501, 42600),
 }
-# `MissionBlock` (mission_block.cpp) waits at NAV_DELAY, flies VTOL items, and hands DO_SET_HOME to the commander.
-PX4_STEERS = {84, 85, 93, 179, 3000}
+# `MissionBlock` (mission_block.cpp) waits at NAV_DELAY, flies VTOL items, and hands DO_SET_HOME, DO_AUTOTUNE_ENABLE and
+# COMPONENT_ARM_DISARM to other modules.
+PX4_STEERS = {84, 85, 93, 179, 212, 400, 3000}
 PX4_FLOWN = {16, 17, 19, 20, 21, 22, 31, 177, 178, 189, 4501}
 
 

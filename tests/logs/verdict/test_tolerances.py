@@ -43,8 +43,8 @@ def test_more_turbulence_allows_no_less() -> None:
 
 
 def test_px4s_defaults_are_those_of_its_parameters() -> None:
-    """NAV_ACC_RAD, FW_LND_ANG and MIS_DIST_1WP as PX4's reference has them, MIS_TKO_LAND_REQ as its planes."""
+    """FW_LND_ANG and MIS_DIST_1WP as PX4's reference has them, MIS_TKO_LAND_REQ as its planes."""
     usual = MissionChecks()
-    assert (usual.acceptance, tolerances.PX4_FIRST_WAYPOINT_DISTANCE_M, usual.requires) == (10.0, 10_000.0, 2)
+    assert (tolerances.PX4_FIRST_WAYPOINT_DISTANCE_M, usual.requires) == (10_000.0, 2)
     assert math.degrees(usual.landing_angle + tolerances.PX4_LANDING_BUFFER_RAD) == pytest.approx(5.1)
     assert Px4(Px4Parameters.defaults()).mission_checks == usual

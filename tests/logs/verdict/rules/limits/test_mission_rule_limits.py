@@ -17,8 +17,8 @@ def of(check: str, *lines: str) -> Finding:
     return found
 
 
-@pytest.mark.parametrize(("height", "taken"), [(11.1, True), (10.9, False)])
-def test_a_takeoff_climbs_a_metre_more_than_the_acceptance_radius(height: float, taken: bool) -> None:
+@pytest.mark.parametrize(("height", "taken"), [(0.1, True), (0.0, False)])
+def test_a_takeoff_climbs_above_home(height: float, taken: bool) -> None:
     found = of("checkTakeoff", wp(0, 500, height, command=22), FIRST, SECOND)
     assert found.ok is (True if taken else None)
 
@@ -49,12 +49,4 @@ def test_a_gate_is_five_centimetres_from_a_waypoint(units: int, taken: bool) -> 
     place = FIRST.split()
     gate = [*place[:1], "4501", *place[2:6], f"{float(place[6]) + units * 1e-7:.7f}", *place[7:]]
     found = of("checkDistancesBetweenWaypoints", TAKEOFF, FIRST, " ".join(gate), SECOND)
-    assert found.ok is (True if taken else None)
-
-
-@pytest.mark.parametrize(
-    ("number", "value", "taken"), [(5, 1999, True), (5, -1999, True), (6, 1500, False), (5, 2001, False)]
-)
-def test_an_actuator_has_a_number_and_a_value(number: int, value: int, taken: bool) -> None:
-    found = of("checkMissionItemValidity", TAKEOFF, FIRST, SECOND, f"2 183 {number} {value} 0 0 0 0 0")
     assert found.ok is (True if taken else None)
