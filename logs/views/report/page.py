@@ -30,7 +30,7 @@ from logs.views.failures import failures
 from logs.views.figures import FIGURES, Subject, View, figure_views, subject_of, view_json
 from logs.views.moments import aircraft_model, flight_moments
 from logs.views.report import tables
-from logs.views.report.text import badge_of, count_sentence, failed_groups, finding_rows, level_rows, rule_rows
+from logs.views.report.text import badge_of, count_sentence, failed_groups, finding_rows, headline_after, rule_rows
 from logs.views.scene import script_json
 from world.files import write_whole
 
@@ -106,6 +106,7 @@ CHART_SCRIPTS = (
     "chart_panels",
     "chart_map",
     "charts",
+    "folds",
 )
 VIEW_SCRIPTS = (
     "moments",
@@ -260,27 +261,29 @@ def _page(
     failed = failures(verdict, len(setup.route.waypoints))
     rows = finding_rows(verdict.findings, verdict.deciding)
     shown = report_pictures(subject, pictures)
+    failing, lines, badge = failed_groups(verdict), verdict.lines or ("",), badge_of(verdict)
     return page_template("report.html").render(
         name=setup.scenario.name,
-        badge=badge_of(verdict),
-        summary=verdict.lines or [""],
+        badge=badge,
+        headline=headline_after(badge, lines[0]),
+        lines=lines[1:],
         flown=track is not None,
-        failing=failed_groups(verdict),
-        first=next((one for one in shown if one.identifier == "map"), None) if verdict.failed else None,
+        failing=failing,
+        remedy=next((group.worst for group in failing if group.worst.remedy), None),
         counts=count_sentence(rows),
         flight_line=tables.flight_sentence(setup, track),
-        levels=level_rows(verdict, setup.autopilot),
-        rules=rule_rows(verdict.findings),
+        rules=[row for row in rule_rows(verdict.findings) if row.state != "fail"],
         findings=rows,
-        notes=[note for note in tables.notes_of(setup) if note not in verdict.notes],
-        pictures=shown,
+        notes=[note for note in tables.notes_of(setup) if not any(note in line for line in (*verdict.notes, *lines))],
+        map=next((one for one in shown if one.identifier == "map"), None),
+        pictures=[one for one in shown if one.identifier != "map"],
         leg_columns=tables.LEG_COLUMNS,
         legs=tables.leg_rows(setup, track, frozenset(failed.legs)),
         passage_columns=tables.PASSAGE_COLUMNS,
         passages=tables.passage_rows(setup, track),
         saturation=tables.saturation_rows(setup, track),
         scenario=tables.scenario_facts(setup),
-        flight=tables.flight_facts(setup, track, ended or ""),
+        flight=tables.flight_facts(setup, ended or ""),
         events=tables.event_rows(events),
         more_events=max(0, len(events) - tables.MAX_EVENTS),
         energy=tables.energy_facts(setup, track),
@@ -302,9 +305,7 @@ def _page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View
         "chart_data": Markup(script_json(charts)),
         "threats": len(setup.scenario.threats),
         "moments": bool(flight["flights"]),
-        "timed": tuple(
-            name for name, view in views.items() if isinstance(view, Chart) and view.timed and flight["flights"]
-        ),
+        "timed": bool(flight["flights"]) and any(isinstance(view, Chart) and view.timed for view in views.values()),
         "library": page_library(),
         "script": Markup(script),
         "script_digest": script_digest(script),

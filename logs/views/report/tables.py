@@ -188,8 +188,8 @@ def _limit_facts(setup: FlightSetup) -> Facts:
     ]
 
 
-def flight_facts(setup: FlightSetup, track: Track | None, ended: str) -> Facts:
-    """Return numbers of aircraft, mission and flight."""
+def flight_facts(setup: FlightSetup, ended: str) -> Facts:
+    """Return facts on aircraft, mission, route and plan."""
     bank = min(setup.max_bank, setup.envelope.max_bank)
     braking = "may drive the motor" if setup.envelope.motor_braking else "does not drive the motor"
     route = setup.route
@@ -198,15 +198,11 @@ def flight_facts(setup: FlightSetup, track: Track | None, ended: str) -> Facts:
         ("Descent", f"the propeller {braking}"),
         ("Mission", f"{setup.mission.source}: {len(setup.mission.items)} items, {route.legs} legs"),
         ("Route", f"{quantity(float(path_length(route.waypoints)) / 1000.0, 'km')} long"),
-        ("Started", setup.started),
     ]
     if setup.plan is not None:
         plan = setup.plan
         how = f"{plan.algorithm}, seed {plan.seed}, {plan.evaluations} paths tried"
         facts.append(("Plan", f"{how}; {_plan_status(plan.feasible, plan.safe)}"))
-    if track is not None and len(track):
-        facts.append(("Time in the air", quantity(float(track.time[-1] - track.time[0]), "s")))
-        facts.append(("Distance flown", quantity(float(path_length(track.position)) / 1000.0, "km")))
     if ended:
         facts.append(("Flight ended", ended))
     return facts
@@ -229,7 +225,7 @@ def notes_of(setup: FlightSetup) -> list[str]:
 
 
 def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
-    """Summarize the energy that the flight drew from the battery."""
+    """Summarize the energy that the flight drew from the battery, beyond the amount in `flight_sentence`."""
     if track is None or len(track) == 0:
         return []
     used = float(track.energy[-1])
@@ -238,8 +234,6 @@ def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
     seconds = float(track.time[-1] - track.time[0])
     distance = float(path_length(track.position)) / 1000.0
     facts: Facts = [
-        ("Used", quantity(used, "Wh")),
-        ("Battery", quantity(setup.battery, "Wh")),
         ("Left", f"{quantity(setup.battery - used, 'Wh')}, {quantity(100.0 * (1.0 - used / setup.battery), '%')}"),
         ("Peak current", quantity(_max_magnitude(track.current), "A")),
     ]

@@ -3,68 +3,15 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
-from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import MissionStretch
 from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.imported.model_comparison import Reflight
-from logs.verdict.places import DecidingParameter, Suggestion
+from logs.verdict.places import DecidingParameter
 from logs.verdict.presentation import RuleFindings, findings_by_rule
 from logs.verdict.rule_words import rule_word
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import suggestions_text
-
-# ----------------------------------------------------------------------
-# Remedies for a failed finding: the value that passes, changes of the plan, and the autopilot's parameter.
-
-
-@dataclass(frozen=True, slots=True)
-class WouldPass:
-    """Remedies for one failed finding.
-
-    bound: side of the passing values; None if the finding fails by other evidence.
-    value: the limiting value that passes, the limit with its tolerance, in the finding's unit.
-    misses: distance of flight or plan beyond that value.
-    suggestions: the smallest changes of the plan; any one of them would pass.
-    parameter: the autopilot's deciding parameter, if it fails this finding first.
-    """
-
-    bound: Literal["at most", "at least"] | None
-    value: float | None
-    misses: float | None
-    suggestions: tuple[Suggestion, ...]
-    parameter: DecidingParameter | None
-
-    def __bool__(self) -> bool:
-        """Return True if any remedy is known."""
-        return bool(self.bound or self.suggestions or self.parameter)
-
-
-def would_pass(finding: Finding, deciding: DecidingParameter | None) -> WouldPass:
-    """Return the remedies for a failed finding.
-
-    deciding: deciding parameter of the verdict.
-
-    >>> from logs.verdict.findings import make_finding
-    >>> from logs.verdict.places import Place
-    >>> low = make_finding("clearance", Place("leg", 4), ok=False, reason="", limit=60.0, margin=-8.0, at_least=True)
-    >>> found = would_pass(low, None)
-    >>> found.bound, found.value, found.misses
-    ('at least', 60.0, 8.0)
-    """
-    limit, margin = finding.effective_limit, finding.margin
-    known = limit is not None and margin is not None
-    same = deciding is not None and (deciding.rule, deciding.place) == (finding.rule, finding.place)
-    return WouldPass(
-        # A descent is bounded in steepness.
-        bound=("at least" if finding.at_least and finding.rule != "slope" else "at most") if known else None,
-        value=limit if known else None,
-        misses=-margin - (finding.tolerance or 0.0) if margin is not None and known else None,
-        suggestions=finding.suggestions,
-        parameter=deciding if same else None,
-    )
-
 
 NOTHING = "–"
 _UNITS = {"deg": "°", "none": "", "1": ""}
@@ -76,7 +23,8 @@ class FindingRow:
 
     state: "fail", "pass", "open" (not judged, which leaves the verdict open) or "unjudged".
     sign: the state as a symbol, for readers who see no colour.
-    would_pass: value and changes that would have made a failed finding pass; "" if unknown.
+    missed_by: distance of a failed finding from the values that pass; "" if unknown.
+    remedy: changes that would have made a failed finding pass; "" if unknown.
     """
 
     state: str
@@ -92,7 +40,8 @@ class FindingRow:
     method: str
     reason: str
     sentence: str
-    would_pass: str
+    missed_by: str
+    remedy: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,18 +61,6 @@ class RuleRow:
 
 
 @dataclass(frozen=True, slots=True)
-class LevelRow:
-    """Answer of one level as text.  state: "pass" or "fail"; sign: the state as a symbol, without colour."""
-
-    state: str
-    sign: str
-    name: str
-    asks: str
-    flown_by: str
-    answer: str
-
-
-@dataclass(frozen=True, slots=True)
 class Badge:
     """The verdict in one word.  state: "pass", "fail" or "open" (not judged in full)."""
 
@@ -132,12 +69,6 @@ class Badge:
     word: str
 
 
-# Question of each level, and who flies for it; "" for the flight's own autopilot.
-_LEVELS = {
-    "geometry": ("Does the path ask for more than the envelope gives?", "nobody"),
-    "airframe": ("Can this aircraft follow it at all?", "planfly's guidance"),
-    "autopilot": ("Does it go well with the autopilot that will fly?", ""),
-}
 _SIGNS = {"pass": "✓", "fail": "✗", "open": "?", "unjudged": "–"}
 _WORDS = {"pass": "ok", "fail": "fails", "open": "not judged", "unjudged": "not judged"}
 
@@ -198,19 +129,14 @@ def badge_of(verdict: Verdict) -> Badge:
     return Badge("fail", _SIGNS["fail"], word.capitalize() + ("" if verdict.complete else ", and incomplete"))
 
 
-def level_rows(verdict: Verdict, autopilot: Autopilot) -> list[LevelRow]:
-    """Return each judged level, geometry first and the verdict's own level last.
+def headline_after(badge: Badge, headline: str) -> str:
+    """Return the headline without the answer that the badge gives.
 
-    autopilot: autopilot of the flight.
+    >>> headline_after(Badge("fail", "✗", "Not flyable"), "not flyable: slope on leg 1")
+    'slope on leg 1'
     """
-    own = autopilot.title if autopilot.parameters is None else f"{autopilot.title}, by its parameters"
-    rows = []
-    for level in verdict.levels:
-        state = state_of(None if level.undecided else level.flyable, is_open=True)
-        asks, flown_by = _LEVELS[level.name]
-        sign = f"{_SIGNS[state]} {_WORDS[state]}"
-        rows.append(LevelRow(state, sign, level.name, asks, flown_by or own, level.headline))
-    return rows
+    same = headline.lower().startswith(badge.word.lower())
+    return headline[len(badge.word) :].lstrip(":; ") if same else headline
 
 
 def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None = None) -> list[FindingRow]:
@@ -253,24 +179,23 @@ def _in_short(row: FindingRow) -> str:
     return row.where if value == NOTHING else f"{row.where} ({value}{unit.rstrip()})"
 
 
-def would_pass_text(found: WouldPass, unit: str) -> str:
-    """Describe the remedies in words; "" if none is known.
+def remedy_text(finding: Finding, deciding: DecidingParameter | None) -> str:
+    r"""Describe changes of the plan, each of which would make a failed finding pass; return "" if none is known.
 
-    unit: unit of the finding.
+    deciding: deciding parameter of the verdict; its value is named at the finding that it decides.
 
-    >>> would_pass_text(WouldPass("at most", 7.8, 3.45, (), None), "deg")
-    'at most 7.80° (misses by 3.45°)'
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import Place
+    >>> low = make_finding("clearance", Place("leg", 4), ok=False, reason="")
+    >>> remedy_text(low, DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4)))
+    'the plan as it is, with TECS_HDEM_TCONST 1.2\xa0s instead of 3'
     """
-    parts = []
-    if found.bound is not None:
-        value = abs(found.value) if found.value is not None and unit in ("deg", "rad") else found.value
-        parts.append(f"{found.bound} {quantity(value, unit)} (misses by {quantity(found.misses, unit)})")
-    if found.suggestions:
-        parts.append(suggestions_text(found.suggestions))
-    if found.parameter is not None:
-        one = found.parameter
-        unit_text = f"\u00a0{one.unit}" if one.unit else ""
-        parts.append(f"the plan as it is, with {one.name} {one.passing:g}{unit_text} instead of {one.current:g}")
+    parts = [suggestions_text(finding.suggestions)] if finding.suggestions else []
+    if deciding is not None and (deciding.rule, deciding.place) == (finding.rule, finding.place):
+        unit = f"\u00a0{deciding.unit}" if deciding.unit else ""
+        parts.append(
+            f"the plan as it is, with {deciding.name} {deciding.passing:g}{unit} instead of {deciding.current:g}"
+        )
     return "; ".join(parts)
 
 
@@ -290,7 +215,7 @@ def _row(finding: Finding, deciding: DecidingParameter | None = None) -> Finding
         in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.margin)
     )
     left = None if margin is None else margin + (in_unit(finding.tolerance, finding.unit)[0] or 0.0)
-    method, mended, digits = finding.method, finding.suggestion, _digits_of(finding)
+    method, digits = finding.method, _digits_of(finding)
     if finding.tolerance and method and finding.limit is not None:
         stated, tolerance = (quantity(value, finding.unit) for value in (finding.limit, finding.tolerance))
         method = f"{method}; limit {stated} with a tolerance of {tolerance}"
@@ -306,9 +231,10 @@ def _row(finding: Finding, deciding: DecidingParameter | None = None) -> Finding
         margin=number(left, signed=True),
         unit=in_unit(None, finding.unit)[1],
         method=method,
-        reason=finding.reason + (f"; would pass: {mended}" if mended else ""),
+        reason=finding.reason,
         sentence=_sentence(finding),
-        would_pass=would_pass_text(would_pass(finding, deciding), finding.unit) if finding.ok is False else "",
+        missed_by=_missed_text(finding),
+        remedy=remedy_text(finding, deciding) if finding.ok is False else "",
     )
 
 
@@ -329,6 +255,13 @@ def _limit_text(finding: Finding, digits: int | None) -> str:
     """Write the values that pass; an en dash without a limit."""
     text = number(in_unit(finding.effective_limit, finding.unit)[0], digits=digits)
     return text if text == NOTHING else f"{finding.limit_sign}\u00a0{text}"
+
+
+def _missed_text(finding: Finding) -> str:
+    """Write the distance of a failed finding from the values that pass; "" if it fails by other evidence."""
+    if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
+        return ""
+    return quantity(-finding.margin - (finding.tolerance or 0.0), finding.unit)
 
 
 def _sentence(finding: Finding) -> str:

@@ -67,8 +67,9 @@ def until(browser: Browser, condition: str) -> None:
 
 
 def show_chart(browser: Browser, name: str) -> None:
-    """Bring a chart into the picture and wait until it is drawn."""
+    """Open a chart's section, bring the chart into the picture and wait until it is drawn."""
     chart = f"document.querySelector('[data-chart={name}]')"
+    browser.value(f"for (const fold of [{chart}.closest('details')]) if (fold) fold.open = true")
     browser.value(f"{chart}.scrollIntoView({{block: 'center'}})")
     until(browser, f"{chart}.dataset.drawn")
     browser.settle()

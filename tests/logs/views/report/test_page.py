@@ -16,7 +16,7 @@ import pytest
 from plotly.offline import get_plotlyjs
 
 import logs.views.figures
-from logs.verdict.places import Place
+from logs.verdict.places import Change, Place
 from logs.verdict.verdict import Verdict
 from logs.views.figures import FIGURES, View, figure_views, subject_of
 from logs.views.report.page import (
@@ -46,6 +46,7 @@ from tests.soak import SOAK
 
 NAMES = [entry.name for entry in FIGURES]
 FILES = [entry.name for entry in FIGURES if entry.file]
+TURN = Place("waypoint", 1, 2)
 FLOWN = subject_of(make_setup(), make_track(), VERDICT)
 DRAWN = {f"{name}.png": name.encode() for name in NAMES}
 
@@ -183,14 +184,16 @@ def test_verdict_comes_first_then_what_fails() -> None:
     text = page.text()
     order = [
         "Not flyable",
-        "not flyable: slope on leg 1",
+        "slope on leg 1",
+        "No remedy was found.",
         "2 of 3 judged findings hold, 1 fails; 1 could not be judged",
         "Start: in the air",
+        "The broad line is the plan",
         "What fails",
-        "leg 1, slope: flown 11.2°, limit ≤ 7.90° (aircraft); why leg 1",
-        "Would pass: at most 7.90° (misses by 3.35°).",
-        "item 9: no loiter",
+        "leg 1, slope: flown 11.2°, limit ≤ 7.90° (aircraft); why leg 1. Missed by 3.35°.",
+        "What else was judged",
         "By rule",
+        "item 9: no loiter",
         "Leg by leg",
         "The failing first",
         "planfly run small",
@@ -202,12 +205,37 @@ def test_verdict_comes_first_then_what_fails() -> None:
     assert tables[0][1][:9] == ["leg 1", "slope", "✗ fails", "4.00", "11.2", "≤\u00a07.90", "−3.35", "°", "aircraft"]
     assert "no scenario was given" in tables[3][1][9]
     rules = [cells for state, cells in page.rows if state and len(cells) == 9]
-    assert rules[1] == ["slope", "✗ fails", "1 of 2 fail", "leg 1", "4.00", "11.2", "≤\u00a07.90", "−3.35", "°"]
-    assert rules[2] == ["bounds", "– not judged", "1 not judged", "no scenario was given", "–", "–", "–", "–", ""]
+    assert [cells[0] for cells in rules] == ["turn", "bounds"]
+    assert rules[1] == ["bounds", "– not judged", "1 not judged", "no scenario was given", "–", "–", "–", "–", ""]
 
 
 @pytest.mark.usefixtures("undrawn")
-@pytest.mark.parametrize(("line", "times"), [("flyable", 1), ("flyable; take-off not judged", 2)])
+def test_one_remedy_stands_first_and_no_text_stands_twice() -> None:
+    lower = replace(FINDINGS[2], suggestions=((Change("height", Place("leg", 1), None, 9.0, "m"),),))
+    turn = replace(FINDINGS[0], ok=False, margin=-2.0, suggestions=((Change("turn", TURN, 9.0, 6.0, "deg"),),))
+    lines = ("not flyable: slope on leg 1", "Not flown as written: item 9: no loiter")
+    verdict = Verdict((turn, lower, *FINDINGS[1:2]), False, True, lines, "flown")
+    page = Page(report_html(make_setup(), make_track(), verdict, **ARGUMENTS))
+    assert page.text().count("Would pass at leg 1: fly leg 1 9 m higher.") == 1
+    # Of each finding the remedy once: of the first at the top, of the other in its place.
+    for item in (turn, lower):
+        assert page.text().count(item.suggestion) == 1
+    texts = [text.strip() for text in page.texts[: page.texts.index("All 3 findings")] if len(text.strip()) >= 25]
+    assert sorted(texts) == sorted(set(texts))
+    assert page.text().count("item 9: no loiter") == 1
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_details_are_folded() -> None:
+    html = report_html(make_setup(), make_track(), VERDICT, **ARGUMENTS)
+    folded = re.findall(r'<section id="([a-z-]+)">\s*<details class="fold">', html)
+    assert {"turns", "time", "controls", "energy", "envelope", "legs", "all", "facts", "again"} <= set(folded)
+    assert not {"map", "profile", "scene", "fails", "findings"} & set(folded)
+    assert "<details open" not in html
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize(("line", "times"), [("flyable", 1), ("flyable; take-off not judged", 1)])
 def test_an_answer_that_the_badge_gives_is_not_repeated(line: str, times: int) -> None:
     verdict = Verdict((), True, True, (line, "Start: in the air"), "flown")
     text = Page(report_html(make_setup(), make_track(), verdict, **ARGUMENTS)).text()

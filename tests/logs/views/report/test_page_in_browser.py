@@ -79,6 +79,7 @@ def middle(browser: Browser, element: str) -> tuple[float, float, float, float]:
 @pytest.mark.usefixtures("page")
 def test_wide_page_draws_the_view_and_fills_the_tables(browser: Browser) -> None:
     prefer(browser, "light", 1200)
+    browser.value("for (const fold of document.querySelectorAll('details')) fold.open = true")
     browser.settle()
     assert browser.value("document.querySelector('.badge').innerText").strip()
     tables = browser.value(
@@ -120,6 +121,36 @@ def _try_the_controls(browser: Browser, first: bytes) -> None:
     browser.value("document.querySelector('[data-do=home]').click()")
     last = picture_when(browser, "#view3d", lambda png: apart(png, first) < 0.01)
     assert apart(last, first) < 0.01
+
+
+SECTIONS = "document.querySelectorAll('details.fold')"
+
+
+@pytest.mark.parametrize("width", [1400, 420])
+def test_the_first_screen_answers_and_the_page_is_short(browser: Browser, page: Path, width: int) -> None:
+    prefer(browser, "light", width)
+    browser.open(page)
+    until(browser, "document.querySelector('[data-chart=map]').dataset.drawn")
+    browser.settle()
+    shown = "['.badge', '.summary', '[data-chart=map]'].map(one => document.querySelector(one))"
+    low = browser.value(f"{shown}.map(one => one.getBoundingClientRect().bottom)")
+    assert max(low if width == 1400 else low[:2]) <= 900
+    assert browser.value("document.documentElement.scrollHeight") <= 10_000
+    assert browser.value("document.documentElement.scrollWidth") <= width
+
+
+def test_a_link_opens_its_section_and_paper_all(browser: Browser, page: Path) -> None:
+    prefer(browser, "light", 1400)
+    browser.open(page)
+    opened = f"[...{SECTIONS}].filter(fold => fold.open).map(fold => fold.parentNode.id)"
+    assert browser.value(opened) == []
+    browser.value("document.querySelector('nav a[href=\"#legs\"]').click()")
+    assert browser.value(opened) == ["legs"]
+    show_chart(browser, "energy")
+    browser.value("window.dispatchEvent(new Event('beforeprint'))")
+    assert len(browser.value(opened)) == browser.value(f"{SECTIONS}.length") > 5
+    browser.value("window.dispatchEvent(new Event('afterprint'))")
+    assert browser.value(opened) == ["energy", "legs"]
 
 
 @pytest.mark.usefixtures("page")

@@ -1,4 +1,4 @@
-"""What would have passed is the limit on the side to which the margin counts, with what the verdict knows beside it."""
+"""Findings as text: by how much each failed, what would have passed, and numbers with their units."""
 
 import math
 from dataclasses import replace
@@ -7,35 +7,30 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import MissionStretch
 from logs.recording.example_log import example_log
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.imported.flown_legs import flown_legs
 from logs.verdict.imported.model_comparison import Spread, compare_with_model
-from logs.verdict.places import FLIGHT, Change, DecidingParameter, LevelAnswer, LevelName, Place
+from logs.verdict.places import FLIGHT, Change, DecidingParameter, LevelAnswer, Place
 from logs.verdict.verdict import Verdict
-from logs.verdict.wording import place_text
+from logs.verdict.wording import place_text, suggestions_text
 from logs.views.report.text import (
     badge_of,
     failed_groups,
     finding_rows,
     left_lines,
-    level_rows,
     number,
     quantity,
     refly_lines,
+    remedy_text,
     rule_rows,
     trust_line,
-    would_pass,
 )
 from tests.logs.views.report.report_data import FINDINGS, finding
 from world.scenario import with_wind
 
 LEG = Place("leg", 4)
-LEVELS: tuple[LevelName, ...] = ("geometry", "airframe", "autopilot")
 DECIDING = DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", LEG, -8.2)
 
 
@@ -46,24 +41,21 @@ def failed(rule: str, flown: float | None, limit: float, margin: float | None, p
 
 
 @pytest.mark.parametrize(
-    ("rule", "flown", "limit", "margin", "bound"),
+    ("rule", "flown", "limit", "margin", "tolerance", "missed"),
     [
-        ("clearance", 52.0, 60.0, -8.0, "at least"),
-        ("stall", 15.0, 17.5, -2.5, "at least"),
-        ("bounds", -7.0, 0.0, -7.0, "at least"),
-        ("turn", 59.0, 9.0, -50.0, "at most"),
-        ("threat", 1.6, 0.0, -1.6, "at most"),
-        # Descents: the steepness is bounded, not the number.
-        ("slope", -11.0, -9.5, -1.5, "at most"),
-        ("energy", 800.0, 710.0, -90.0, "at most"),
+        ("clearance", 52.0, 60.0, -8.0, None, "8.00\u00a0m"),
+        # Beyond the limit by 1.5 m, of which 0.5 m are tolerated.
+        ("corridor", 61.5, 60.0, -1.5, 0.5, "1.00\u00a0m"),
+        # It fails by other evidence than its number.
+        ("turn", 6.9, 15.6, None, None, ""),
     ],
 )
-def test_the_number_that_passes_bounds_on_the_side_of_the_margin(
-    rule: str, flown: float, limit: float, margin: float, bound: str
+def test_a_failed_finding_states_by_how_much_it_missed(
+    rule: str, flown: float, limit: float, margin: float | None, tolerance: float | None, missed: str
 ) -> None:
-    found = would_pass(failed(rule, flown, limit, margin), None)
-    assert (found.bound, found.value, found.misses) == (bound, limit, -margin)
-    assert found
+    item = replace(failed(rule, flown, limit, margin), tolerance=tolerance, unit="m")
+    assert [row.missed_by for row in finding_rows([item])] == [missed]
+    assert [row.missed_by for row in finding_rows([replace(item, ok=True)])] == [""]
 
 
 def test_tables_call_a_rule_as_the_terminal_does() -> None:
@@ -76,22 +68,14 @@ def test_tables_call_a_rule_as_the_terminal_does() -> None:
     )
 
 
-def test_a_finding_that_fails_by_other_evidence_names_no_number() -> None:
-    found = would_pass(failed("turn", 6.9, 15.6, 8.7), None)
-    assert (found.bound, found.value, found.misses) == (None, None, None)
-    assert not found
-
-
 def test_the_parameter_stands_at_the_finding_that_it_decides_alone() -> None:
     low = failed("clearance", 52.0, 60.0, -8.0)
-    assert would_pass(low, DECIDING).parameter == DECIDING
-    assert would_pass(failed("clearance", 52.0, 60.0, -8.0, Place("leg", 5)), DECIDING).parameter is None
-    assert would_pass(failed("height", 52.0, 60.0, -8.0), DECIDING).parameter is None
-
-
-def test_suggestions_are_those_of_the_finding() -> None:
+    assert remedy_text(low, DECIDING) == "the plan as it is, with TECS_HDEM_TCONST 1.2\u00a0s instead of 3"
+    assert remedy_text(failed("clearance", 52.0, 60.0, -8.0, Place("leg", 5)), DECIDING) == ""
+    assert remedy_text(failed("height", 52.0, 60.0, -8.0), DECIDING) == ""
     change = (Change("height", LEG, None, 9.0, "m"),)
-    assert would_pass(replace(failed("turn", 6.9, 15.6, 8.7), suggestions=(change,)), None).suggestions == (change,)
+    both = remedy_text(replace(low, suggestions=(change,)), DECIDING)
+    assert both == f"{suggestions_text((change,))}; {remedy_text(low, DECIDING)}"
 
 
 # ----------------------------------------------------------------------
@@ -115,15 +99,6 @@ def test_badge_states_the_verdict(
     badge = badge_of(Verdict(findings, flyable, complete, (), level))
     assert badge.word == label
     assert badge.state == ("pass" if flyable else "fail")
-
-
-def test_each_level_says_who_flies_for_it() -> None:
-    answers = tuple(LevelAnswer(name, name != "autopilot", f"{name} says") for name in LEVELS)
-    verdict = Verdict((), False, True, (), "flown", answers)
-    rows = level_rows(verdict, ArduPlane(ArduPilotParameters.defaults()))
-    assert [row.flown_by for row in rows] == ["nobody", "planfly's guidance", "ArduPlane, by its parameters"]
-    assert [row.state for row in rows] == ["pass", "pass", "fail"]
-    assert level_rows(verdict, PlanflyGuidance("path"))[-1].flown_by == "planfly's guidance"
 
 
 @given(st.floats(-1e9, 1e9))
@@ -204,10 +179,8 @@ def test_what_was_not_flown_again_is_named_with_its_reason() -> None:
     assert line.endswith("in order, or 1 longer ones were")
 
 
-def test_a_level_that_leaves_something_open_neither_passes_nor_fails() -> None:
+def test_a_verdict_that_leaves_something_open_neither_passes_nor_fails() -> None:
     lines = ("not judged in full: slope on leg 1 is within what is not known of the aircraft",)
     levels = (LevelAnswer("geometry", False, lines[0], undecided=True),)
     verdict = Verdict((), False, True, lines, "geometric", levels, unjudged="slope on leg 1")
-    (row,) = level_rows(verdict, ArduPlane(ArduPilotParameters.defaults()))
-    assert (row.state, row.sign) == ("open", "? not judged")
     assert (badge_of(verdict).state, badge_of(verdict).word) == ("open", "Not judged in full")

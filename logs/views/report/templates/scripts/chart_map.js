@@ -8,7 +8,8 @@ function mapFigure(map, { ground, flights }, theme, width) {
   const names = nameOnce(traces), layout = chartLayout(theme, width, names);
   const [[west, east], [south, north]] = [map.east, map.north].map((side) => side.map(km));
   const inner = width - layout.margin.l - layout.margin.r, aspect = (north - south) / (east - west);
-  const tall = Math.min(Math.max(inner * aspect, 160), 780);
+  // Legend, axes and caption fit the screen together with the map.
+  const tall = Math.max(Math.min(inner * aspect, 0.66 * window.innerHeight), 160);
   layout.margin.t -= 28;
   setHeight(layout, tall);
   layout.hovermode = "closest";

@@ -10,5 +10,6 @@
     startView(view, { scene, ground, moments, model: flown.model, theme, clock });
   }
   if (player) startPlayer(player, clock, moments, flight.legs);
+  startFolds();
   startCharts(pageData("chart-data"), { scene, ground, flights: flown.flights, theme, clock });
 })();
