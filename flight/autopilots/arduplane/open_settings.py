@@ -116,9 +116,12 @@ def _describe_others(
     parameters: ArduPilotParameters, values: dict[str, float], mission: MissionParts, *, by_program: bool
 ) -> Iterator[str]:
     """Describe settings that depend on one another or on the mission."""
+    # `Plane::set_servos_flaps` compares the demanded airspeed in whole m/s, which only a landing demands below the
+    # minimum.
+    slowest = 0 if mission.lands else int(values["AIRSPEED_MIN"])
     for k in (1, 2):
         percent, below = values[f"FLAP_{k}_PERCNT"], values[f"FLAP_{k}_SPEED"]
-        if percent != 0.0 and below > 0.0:
+        if percent != 0.0 and below > 0.0 and slowest <= below:
             yield f"FLAP_{k}_PERCNT {percent:g} below FLAP_{k}_SPEED {below:g} changes the flight and is not flown"
     for name in ("ARSPD_WIND_MAX",) if by_program else ("AHRS_WIND_MAX", "ARSPD_WIND_MAX"):
         if 0.0 < values[name] < mission.wind:

@@ -98,6 +98,10 @@ def test_a_setting_leaves_the_verdict_open_where_its_part_is_flown(line: str, mi
     ("text", "mission", "expected"),
     [
         ("FLAP_1_PERCNT 30\nFLAP_1_SPEED 15", IN_THE_AIR, "FLAP_1_PERCNT 30 below FLAP_1_SPEED 15"),
+        # No airspeed below AIRSPEED_MIN is demanded in the air, and the demand counts in whole m/s.
+        ("FLAP_1_PERCNT 30\nFLAP_1_SPEED 15\nAIRSPEED_MIN 15.9", IN_THE_AIR, "FLAP_1_PERCNT 30 below FLAP_1_SPEED 15"),
+        ("FLAP_1_PERCNT 30\nFLAP_1_SPEED 15\nAIRSPEED_MIN 16", IN_THE_AIR, ""),
+        ("FLAP_1_PERCNT 30\nFLAP_1_SPEED 15\nAIRSPEED_MIN 16", TO_GROUND, "FLAP_1_PERCNT 30 below FLAP_1_SPEED 15"),
         ("FLAP_1_PERCNT 30", IN_THE_AIR, ""),
         ("FLAP_2_SPEED 15", IN_THE_AIR, ""),
         # 12 m/s of wind: that much can lie between the airspeed and the ground speed.
