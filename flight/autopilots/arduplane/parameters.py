@@ -154,7 +154,7 @@ _WHEN_STATED = {
     **dict.fromkeys(("TKOFF_OPTIONS", "TKOFF_TDRAG_ELEV", "TKOFF_FLAP_PCNT", "TKOFF_THR_IDLE"), 0.0),
     **dict.fromkeys(("TECS_TKOFF_IGAIN", "TECS_APPR_SMAX", "TECS_LAND_TDAMP", "TECS_LAND_IGAIN"), 0.0),
     **dict.fromkeys(("LAND_TYPE", "LAND_PF_ARSPD", "LAND_OPTIONS", "LAND_THR_SLEW", "LAND_FLAP_PERCNT"), 0.0),
-    **dict.fromkeys(("RNGFND_LANDING", "TECS_LAND_PDAMP"), 0.0),
+    **dict.fromkeys(("RNGFND_LANDING", "TECS_LAND_PDAMP", "AIRSPEED_STALL"), 0.0),
     "ICE_IDLE_RPM": -1.0,
     "TKOFF_ACCEL_CNT": 1.0,
     "TECS_LAND_DAMP": 0.5,

@@ -44,6 +44,7 @@ AHRS_WIND_MAX 0
 ARSPD_WIND_MAX 0
 MIS_OPTIONS 0
 USE_REV_THRUST 2
+AIRSPEED_STALL 0
 """
 
 
@@ -113,6 +114,8 @@ def test_a_setting_leaves_the_verdict_open_where_its_part_is_flown(line: str, mi
         ("MIS_OPTIONS 3", TO_GROUND, ""),
         ("TRIM_THROTTLE 1", IN_THE_AIR, "TRIM_THROTTLE 1 stops the motor"),
         ("TRIM_THROTTLE 2", IN_THE_AIR, ""),
+        ("AIRSPEED_STALL 8", IN_THE_AIR, "AIRSPEED_STALL 8"),
+        ("AIRSPEED_STALL 8\nSTALL_PREVENTION 0", IN_THE_AIR, ""),
         # By default thrust is reversed on a landing's approach alone, and only with a THR_MIN below 0.
         ("THR_MIN -100", TO_GROUND, "THR_MIN -100 and USE_REV_THRUST 2"),
         ("THR_MIN -100", IN_THE_AIR, ""),

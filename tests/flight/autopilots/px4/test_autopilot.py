@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import Aircraft
+from flight.autopilots.autopilot import MissionParts
 from flight.autopilots.catalog import load_autopilot
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
+from flight.autopilots.px4_sitl.autopilot import Px4Sitl
+from flight.autopilots.px4_sitl.parameters import FLYING
 from flight.mission.return_path import ReturnPlace, choose_target
 from flight.simulation.simulate import Flight, fly_to_end
 from tests.setups import MakeSetup
@@ -82,6 +85,18 @@ def test_where_it_returns_to_is_by_its_type(kind: str, name: str, up: float) -> 
     assert (target.name, target.position[2]) == (name, up)
     assert choose_target(rules, (0.0, 1000.0, 800.0), home, []).name == "home"
     assert bool(rules.instead) is (kind == "RTL_TYPE 3")
+
+
+def test_what_px4s_own_program_flies_leaves_no_verdict_open() -> None:
+    values = {"FW_T_F_ALT_ERR": 20.0, "WEIGHT_BASE": 2.0, "RTL_LAND_DELAY": 5.0, "MIS_COMMAND_TOUT": 5.0}
+    others = {"COM_FLT_TIME_MAX": 60.0, "ASPD_PRIMARY": 0.0, "NAV_MIN_GND_DIST": 9.0}
+    made = Px4Parameters.defaults().changed(**values, **others)
+    mission = MissionParts(returns=True, moves_payload=True)
+    # It gets what begins with `FLYING`, and planfly's physics have no distance sensor.
+    assert all(name.startswith(FLYING) for name in values)
+    assert [text.split()[0] for text in Px4Sitl(made).settings_not_flown(mission)] == [*others]
+    left = [text.split()[0] for text in Px4(made).settings_not_flown(mission)]
+    assert sorted(left) == sorted(values | others)
 
 
 def test_too_high_at_the_last_waypoint_it_circles_down_to_it(make_setup: MakeSetup, aerosonde: Aircraft) -> None:

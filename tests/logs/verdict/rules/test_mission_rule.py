@@ -380,8 +380,9 @@ def test_settings_leave_the_verdict_open_where_an_item_makes_them_matter(lines: 
         ({"WEIGHT_BASE": 0.0, "FW_SERVICE_CEIL": 0.0, "FW_T_F_ALT_ERR": 0.0, "NAV_MIN_GND_DIST": 0.0}, ()),
         ({"FW_SERVICE_CEIL": 3000.0, "FW_T_F_ALT_ERR": 20.0}, ("FW_SERVICE_CEIL 3000", "FW_T_F_ALT_ERR 20")),
         ({"FW_THR_ASPD_MIN": 0.3, "FW_THR_ASPD_MAX": 0.8}, ("FW_THR_ASPD_MIN 0.3", "FW_THR_ASPD_MAX 0.8")),
-        # 0 is the ground speed less the wind, -1 no airspeed at all; 3 is the third sensor.
+        # 0 is the ground speed less the wind, 3 the third sensor, 4 a computed airspeed, which TECS does not use.
         ({"ASPD_PRIMARY": 0.0}, ("ASPD_PRIMARY 0",)),
+        ({"ASPD_PRIMARY": 4.0}, ("ASPD_PRIMARY 4",)),
         ({"ASPD_PRIMARY": 3.0}, ()),
         ({"NAV_MIN_GND_DIST": 15.0}, ("NAV_MIN_GND_DIST 15",)),
         # COM_WIND_MAX_ACT 1 only warns; the wind here is 6 m/s.
