@@ -180,6 +180,7 @@ class MissionParts(NamedTuple):
     returns: True if it returns to launch.
     has_return_path: True if it marks a return path (DO_RETURN_PATH_START).
     takes_off, lands: True if its take-off or its landing is flown from or to the ground.
+    loiters_to_land: True if the place before a landing is a loiter.
     enables_fence: True if it switches the fence on (DO_FENCE_ENABLE).
     moves_payload: True if it commands a gripper, a winch or a gimbal, after which PX4 may wait.
     wind: highest mean wind speed on its route, m/s.
@@ -189,6 +190,7 @@ class MissionParts(NamedTuple):
     has_return_path: bool = False
     takes_off: bool = False
     lands: bool = False
+    loiters_to_land: bool = False
     enables_fence: bool = False
     moves_payload: bool = False
     wind: float = 0.0

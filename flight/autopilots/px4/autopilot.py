@@ -185,6 +185,8 @@ class Px4(Autopilot):
             yield "NPFG_EN_MIN_GSP 0 keeps no minimum ground speed, which is not flown"
         if mission.moves_payload and made["MIS_COMMAND_TOUT"] > 0.0:
             yield f"MIS_COMMAND_TOUT {made['MIS_COMMAND_TOUT']:g} waits for the payload, which is not flown"
+        if mission.loiters_to_land and made["FW_LND_EARLYCFG"] != 0.0:
+            yield "FW_LND_EARLYCFG 1 changes the loiter before the landing and is not flown"
         if not mission.returns:
             return
         if made["RTL_TYPE"] in _ALONG_THE_MISSION:

@@ -153,6 +153,7 @@ _WHEN_STATED = {
     "ASPD_PRIMARY": 1.0,
     "COM_WIND_MAX": -1.0,
     "COM_WIND_MAX_ACT": 0.0,
+    "FW_LND_EARLYCFG": 0.0,
     "MIS_COMMAND_TOUT": 0.0,
     "NAV_MIN_GND_DIST": -1.0,
 }

@@ -192,11 +192,13 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
     """Return the parts of a mission that decide which settings change its flight."""
     items, ways = setup.mission.items, setup.ground_ways
     commands = {item.command for item in items}
+    pairs = itertools.pairwise(_flown_items(setup.mission))
     return MissionParts(
         returns=C.NAV_RETURN_TO_LAUNCH in commands,
         has_return_path=C.DO_RETURN_PATH_START in commands,
         takes_off=ways.take_off is not None,
         lands=ways.approach is not None,
+        loiters_to_land=any(a.command == C.NAV_LOITER_TO_ALT and b.command in LANDINGS for a, b in pairs),
         enables_fence=any(item.command == C.DO_FENCE_ENABLE and item.params[0] == 1.0 for item in items),
         moves_payload=not commands.isdisjoint((C.DO_GRIPPER, C.DO_WINCH, C.DO_GIMBAL_MANAGER_PITCHYAW)),
         wind=setup.scenario.wind.strongest(setup.route.waypoints[:, 2]),

@@ -413,6 +413,7 @@ def unflown_by_px4(values: dict[str, float], *lines: str, version: Px4Version = 
 
 PAYLOAD = (wp(0, 0), wp(0, 900), "2 211 1 0 0 0 0 0 0", wp(900, 900))
 RETURN = (wp(0, 0), wp(0, 900), "2 20 0 0 0 0 0 0 0")
+LOITER, LAND = wp(1500, 0, 100, command=31, p="1 150 0 0"), wp(0, 0, 0, command=21)
 
 
 @pytest.mark.parametrize(
@@ -420,6 +421,9 @@ RETURN = (wp(0, 0), wp(0, 900), "2 20 0 0 0 0 0 0 0")
     [
         ({"MIS_COMMAND_TOUT": 5.0}, PAYLOAD, ["MIS_COMMAND_TOUT 5"]),
         ({"MIS_COMMAND_TOUT": 0.0}, PAYLOAD, []),
+        ({"FW_LND_EARLYCFG": 1.0}, (wp(0, 1500), LOITER, LAND), ["FW_LND_EARLYCFG 1"]),
+        ({"FW_LND_EARLYCFG": 0.0}, (wp(0, 1500), LOITER, LAND), []),
+        ({"FW_LND_EARLYCFG": 1.0}, (wp(0, 1500), LOITER, wp(1500, 1500), LAND), []),
         ({}, RETURN, []),
         ({"RTL_DESCEND_ALT": 50.0}, RETURN, ["RTL_DESCEND_ALT 50"]),
         ({"RTL_DESCEND_ALT": 50.0, "RTL_RETURN_ALT": 50.0}, RETURN, []),
