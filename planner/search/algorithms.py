@@ -41,8 +41,8 @@ class Algorithm:
 
 
 ALGORITHMS: dict[str, Algorithm] = {
-    item.name: item
-    for item in (
+    algorithm.name: algorithm
+    for algorithm in (
         Algorithm(
             "fda-seeded",
             "the default: grid routes, past obstacles on other sides too, shortened; generations where none is safe",
@@ -143,7 +143,7 @@ def algorithm_lines() -> str:
       umda-smooth     UMDA in the rotated frame, graded violations, sampled in a smooth basis, no seeds
     """
     width = max(len(name) for name in ALGORITHMS)
-    return "\n".join(f"  {item.name:<{width}}  {item.summary}" for item in ALGORITHMS.values())
+    return "\n".join(f"  {algorithm.name:<{width}}  {algorithm.summary}" for algorithm in ALGORITHMS.values())
 
 
 def find_algorithm(name: str | None, source: str) -> Algorithm:
@@ -154,11 +154,11 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
     >>> find_algorithm(None, "example.toml").name, find_algorithm("umda-polar", "example.toml").encoding
     ('fda-seeded', 'polar')
     """
-    found = ALGORITHMS.get(DEFAULT if name is None else name)
-    if found is None:
-        allowed = f"not known; allowed: {', '.join(ALGORITHMS)}{did_you_mean(str(name), ALGORITHMS)}"
-        raise ScenarioError.at(source, "planner.algorithm", name, allowed, shown=f"{name!r}")
-    return found
+    algorithm = ALGORITHMS.get(DEFAULT if name is None else name)
+    if algorithm is None:
+        problem = f"not known; allowed: {', '.join(ALGORITHMS)}{did_you_mean(str(name), ALGORITHMS)}"
+        raise ScenarioError.at(source, "planner.algorithm", name, problem, shown=f"{name!r}")
+    return algorithm
 
 
 def limits_for(algorithm: Algorithm, limits: "Limits") -> "Limits":

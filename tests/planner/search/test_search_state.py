@@ -222,7 +222,7 @@ def test_a_search_without_a_result_goes_on_for_some_pauses(
         search.pause()
     with pytest.raises(SearchEnded):
         search.pause()
-    assert search.ended == "over"
+    assert search.end_reason == "over"
     line = encoding.decode(search.archive.vectors)[0]
     np.testing.assert_allclose(line[[0, -1]], [scenario.start, scenario.destination])
     shares = (line - line[0]) @ (line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0]) ** 2
