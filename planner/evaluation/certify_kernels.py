@@ -175,7 +175,7 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
 
 @inner
 def _segment_distance(threats: Records, a: Floats, b: Floats, min_distance: float) -> float:
-    """Return the distance from a-b to the surface of the nearest missile sphere, or `min_distance` if that is smaller."""
+    """Return the distance from a-b to the nearest missile sphere, or `min_distance` if that is smaller."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     length2 = dx * dx + dy * dy + dz * dz
     for k in range(threats.shape[0]):

@@ -339,7 +339,10 @@ def _corner_depth(
     extra_height: float,
     vertices: Floats,
 ) -> float:
-    """Return the depth below the required clearance plus `extra_height` (m), integrated along a flown corner (k, 3), m x km."""
+    """Return the depth below the required clearance, integrated along a flown corner (k, 3), m x km.
+
+    extra_height: height in addition to the required clearance, m.
+    """
     total = 0.0
     for k in range(vertices.shape[0] - 1):
         x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]

@@ -103,11 +103,11 @@ def _score_samples(task: _Task) -> None:
     paper_scores(task.problem.certified, task.path[None])
 
 
-def _rank_front(task: _Task) -> None:
+def _choose(task: _Task) -> None:
     data = task.problem.search
     front_values(data, energy_cost(task.problem.limits.envelope, data.aircraft), task.path[None])
     covering_order(np.eye(FEW), np.full(FEW, 2.0), FEW)
 
 
 _PARTS = (_score, _certify, _shorten, _find_route, _find_side_routes, _score_samples)
-_CALLS = {**dict(zip(PARTS, _PARTS, strict=True)), FRONT: _rank_front}
+_CALLS = {**dict(zip(PARTS, _PARTS, strict=True)), FRONT: _choose}

@@ -188,7 +188,7 @@ def corner_point(
     sample: int,
     out: Floats,
 ) -> None:
-    """Fill `out` (3,) with the position of a sample of the corner at the waypoint `waypoint`, whose turn has this radius, m.
+    """Fill `out` (3,) with the position of a sample of the corner at `waypoint`, whose turn has this radius, m.
 
     Heights are those of the legs, or of the arc between its tangent points, and not lowered.
     """
@@ -229,7 +229,7 @@ def corner_point(
 def corner_slopes(
     data: ProblemArrays, corner: Floats, radius: float, sample: int, gradient: Floats, point: Floats, slopes: Floats
 ) -> None:
-    """Fill the derivatives (3, 3), by a corner's waypoints (3, 3), of a value with the gradient `gradient` (3,) at a sample.
+    """Fill the derivatives (3, 3) of a value by a corner's waypoints (3, 3), given its gradient (3,) at a sample.
 
     point: scratch memory, (3,).
     """

@@ -299,7 +299,7 @@ def relax_stage(
 
 @inner
 def distance_to_goal(columns: int, home: int, remaining_stages: int, step: float, ratio: float, out: Floats) -> None:
-    """Fill the shortest horizontal distance from each position across to the destination, `remaining_stages` away, m."""
+    """Fill the shortest horizontal distance from each position across to the destination, m."""
     for y in range(columns):
         offset = abs(y - home)
         if offset > SIDEWAYS * remaining_stages:

@@ -301,7 +301,7 @@ def _add_travel_cost(data: ProblemArrays, path: Floats, model: LagrangianModel) 
                 model.gradient[row] += leg.slopes[a // 3, a % 3]
                 for b in range(a + 1):
                     if begin + b >= 0:
-                        model.band[row, a - b] += leg.bends[a // 3, a % 3, b // 3, b % 3]
+                        model.band[row, a - b] += leg.curvature[a // 3, a % 3, b // 3, b % 3]
     return total
 
 
