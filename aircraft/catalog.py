@@ -314,7 +314,7 @@ def write_own_folder(target: Path, files: Mapping[str, bytes]) -> None:
     """
     stays = [file.name for file in target.iterdir() if file.suffix not in _SUFFIXES] if target.exists() else []
     new = {name.split("/")[0] for name in files}
-    write_folder(target, files, stays=[name for name in stays if name not in new])
+    write_folder(target, files, kept_names=[name for name in stays if name not in new])
 
 
 def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:

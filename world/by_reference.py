@@ -63,17 +63,19 @@ def by_reference(cls: _Class) -> _Class:
     """
     members = {name: getattr(cls, name) for name in ("__doc__", "__module__", "__qualname__")}
     # A named tuple has no __dict__ to store the layout; its subclass has one.
-    made = type(cls.__name__, (cls,), members | {"_address": property(_address), "__getstate__": lambda _: None})
-    typeof_impl.register(made)(lambda value, _: _layout(value).reference)
-    return cast("_Class", made)
+    marked_class = type(
+        cls.__name__, (cls,), members | {"_address": property(_address), "__getstate__": lambda _: None}
+    )
+    typeof_impl.register(marked_class)(lambda value, _: _layout(value).reference)
+    return cast("_Class", marked_class)
 
 
 def _layout(value: Any) -> _Layout:
-    kept: dict[str, Any] = vars(value)
-    if "_layout" not in kept:
-        held = _by_value(typeof_impl.dispatch(tuple)(value, None))
-        kept["_layout"] = _Layout(Reference(held), _in_memory(held, value))
-    return kept["_layout"]
+    attributes: dict[str, Any] = vars(value)
+    if "_layout" not in attributes:
+        tuple_type = _by_value(typeof_impl.dispatch(tuple)(value, None))
+        attributes["_layout"] = _Layout(Reference(tuple_type), _in_memory(tuple_type, value))
+    return attributes["_layout"]
 
 
 def _address(value: Any) -> int:
@@ -104,25 +106,25 @@ def _in_memory(kind: Any, value: Any) -> Any:
     """Lay out a value of a numba type in memory, as ctypes data with an address."""
     if isinstance(kind, types.Array):
         # Numba's array structure: two owner pointers, both null, then these fields.
-        words = [0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
-        return (ctypes.c_ssize_t * len(words))(*words)
+        array_fields = [0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
+        return (ctypes.c_ssize_t * len(array_fields))(*array_fields)
     if isinstance(kind, types.Record):
         return (ctypes.c_uint8 * kind.size).from_buffer_copy(value.tobytes())
     if _is_tuple(kind):
-        parts = [_in_memory(member, one) for member, one in zip(kind.types, value, strict=True)]
+        parts = [_in_memory(member, member_value) for member, member_value in zip(kind.types, value, strict=True)]
         fields = [(f"field{k}", type(part)) for k, part in enumerate(parts)]
-        made: Any = type("Fields", (ctypes.Structure,), {"_fields_": fields})
-        return made(*parts)
+        structure: Any = type("Fields", (ctypes.Structure,), {"_fields_": fields})
+        return structure(*parts)
     return _NUMBERS[kind](value)
 
 
 def _member(kind: Reference, name: str) -> tuple[int, Any]:
     """Return the index and type of a field; the type is a pointer if the field's class is marked."""
-    number = kind.held.fields.index(name)
-    member = kind.held.types[number]
+    index = kind.held.fields.index(name)
+    member = kind.held.types[index]
     if _is_named(member) and hasattr(member.instance_class, "_address"):
-        return number, Reference(member)
-    return number, member
+        return index, Reference(member)
+    return index, member
 
 
 @register_model(Reference)
@@ -141,11 +143,11 @@ class _Field(AttributeTemplate):
 
 @lower_getattr_generic(Reference)
 def _read_field(context: Any, builder: Any, kind: Reference, pointer: Any, name: str) -> Any:
-    number, member = _member(kind, name)
-    place = cgutils.gep_inbounds(builder, pointer, 0, number)
+    index, member = _member(kind, name)
+    field_pointer = cgutils.gep_inbounds(builder, pointer, 0, index)
     if isinstance(member, Reference):
-        return place
-    return impl_ret_borrowed(context, builder, member, context.unpack_value(builder, member, place))
+        return field_pointer
+    return impl_ret_borrowed(context, builder, member, context.unpack_value(builder, member, field_pointer))
 
 
 @unbox(Reference)
@@ -153,8 +155,8 @@ def _unbox_reference(kind: Reference, value: Any, c: Any) -> Any:
     pointer_type = c.context.get_value_type(kind)
     pointer = cgutils.alloca_once_value(c.builder, ir.Constant(pointer_type, None))
     address = c.pyapi.object_getattr_string(value, "_address")
-    failed = cgutils.is_null(c.builder, address)
-    with c.builder.if_then(c.builder.not_(failed)):
+    has_failed = cgutils.is_null(c.builder, address)
+    with c.builder.if_then(c.builder.not_(has_failed)):
         c.builder.store(c.builder.bitcast(c.pyapi.long_as_voidptr(address), pointer_type), pointer)
         c.pyapi.decref(address)
-    return NativeValue(c.builder.load(pointer), is_error=failed)
+    return NativeValue(c.builder.load(pointer), is_error=has_failed)

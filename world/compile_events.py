@@ -9,7 +9,7 @@ _callbacks: list[BeforeCompiling] = []
 
 
 @contextmanager
-def tell_before_compiling(told: BeforeCompiling) -> Iterator[None]:
+def tell_before_compiling(callback: BeforeCompiling) -> Iterator[None]:
     """Call a function before each kernel that is compiled meanwhile, in any thread.
 
     Only the innermost is called.
@@ -18,11 +18,11 @@ def tell_before_compiling(told: BeforeCompiling) -> Iterator[None]:
     ...     kernel_is_compiled()
     compiling
     """
-    _callbacks.append(told)
+    _callbacks.append(callback)
     try:
         yield
     finally:
-        _callbacks.remove(told)
+        _callbacks.remove(callback)
 
 
 def kernel_is_compiled() -> None:

@@ -72,9 +72,9 @@ class PlanflyError(Exception):
         >>> print(error, "|", error.field, "|", error.value)
         bind 127.0.0.1:70000: a port 0..65535 is expected | bind | 127.0.0.1:70000
         """
-        begin = f"{file}: " if str(file) else ""
-        what = argument if shown == "" else f"{argument} {value if shown is None else shown}"
-        error = cls(f"{begin}{what}: {allowed}", file=file, field=argument, value=value, allowed=allowed)
+        prefix = f"{file}: " if str(file) else ""
+        subject = argument if shown == "" else f"{argument} {value if shown is None else shown}"
+        error = cls(f"{prefix}{subject}: {allowed}", file=file, field=argument, value=value, allowed=allowed)
         error.argument = argument
         return error
 

@@ -88,8 +88,8 @@ def _undulation(transformer: Any) -> Callable[[Floats, Floats], Floats]:
     """Return a function for the geoid's height above the ellipsoid: minus the converted ellipsoidal height 0."""
 
     def heights(lon: Floats, lat: Floats) -> Floats:
-        _, _, below = transformer.transform(lon, lat, np.zeros(np.shape(lon)))
-        return -np.asarray(below, dtype=np.float64)
+        _, _, negated_heights = transformer.transform(lon, lat, np.zeros(np.shape(lon)))
+        return -np.asarray(negated_heights, dtype=np.float64)
 
     return heights
 

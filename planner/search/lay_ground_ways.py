@@ -459,7 +459,7 @@ def _find_descent(site: _Site, strip: LandingStrip, final_law: FinalLaw) -> tupl
     """Return the first accepted approach, or None and the reason."""
     field_altitude = float(site.terrain.height(strip.east, strip.north))
     point = np.array([strip.east, strip.north, field_altitude])
-    landing_course = strip.into(site.scenario.wind, field_altitude)
+    landing_course = strip.landing_course(site.scenario.wind, field_altitude)
     courses = (
         [landing_course]
         if landing_course is not None

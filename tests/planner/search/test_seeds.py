@@ -108,7 +108,7 @@ def test_among_zones_a_later_attempt_follows_the_best_routes_alone(
     for again in (False, True):
         search = search_of(scenario, make_limits(scenario))
         route = GridRoute(np.array([[0.0, 0.0, 150.0], [6000.0, 0.0, 150.0]]), 6000.0)
-        monkeypatch.setattr(seeds_module, "_routes", lambda *_, route=route: [route] * 7)
+        monkeypatch.setattr(seeds_module, "_list_routes", lambda *_, route=route: [route] * 7)
         improved: list[int] = []
         monkeypatch.setattr(
             Search,
