@@ -117,13 +117,13 @@ def density_factor(amsl: float) -> float:
 def _interpolate(table: Floats, airspeed: float, turn: float, ground_speed: float) -> float:
     """Interpolate bilinearly in a table (turns, speeds); use its nearest edge outside it."""
     turns, speeds = table.shape
-    place = min(max(turn / _TURN_STEP_RAD, 0.0), turns - 1.0)
-    other = min(max((ground_speed / airspeed - _FIRST_SPEED_RATIO) / _SPEED_RATIO_STEP, 0.0), speeds - 1.0)
-    i, j = min(int(place), turns - 2), min(int(other), speeds - 2)
-    v, u = place - i, other - j
-    low = table[i, j] + u * (table[i, j + 1] - table[i, j])
-    high = table[i + 1, j] + u * (table[i + 1, j + 1] - table[i + 1, j])
-    return low + v * (high - low)
+    turn_position = min(max(turn / _TURN_STEP_RAD, 0.0), turns - 1.0)
+    speed_position = min(max((ground_speed / airspeed - _FIRST_SPEED_RATIO) / _SPEED_RATIO_STEP, 0.0), speeds - 1.0)
+    i, j = min(int(turn_position), turns - 2), min(int(speed_position), speeds - 2)
+    v, u = turn_position - i, speed_position - j
+    lower_value = table[i, j] + u * (table[i, j + 1] - table[i, j])
+    upper_value = table[i + 1, j] + u * (table[i + 1, j + 1] - table[i + 1, j])
+    return lower_value + v * (upper_value - lower_value)
 
 
 @inlined
