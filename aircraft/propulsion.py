@@ -72,7 +72,7 @@ class Propeller:
         c0, c1, c2 = self.thrust
         return rho * (c0 * n**2 * d**4 + c1 * n * airspeed * d**3 + c2 * airspeed**2 * d**2)
 
-    def torque_torque_xml(self, airspeed: float, rho: float) -> tuple[float, float, float]:
+    def torque_parabola(self, airspeed: float, rho: float) -> tuple[float, float, float]:
         """Return the torque (N m) as a parabola in the propeller speed (rad/s).
 
         The coefficients belong to the square of the speed, the speed, and 1.

@@ -120,7 +120,7 @@ def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
         name=name,
         shape=(rows, cols),
         to_source=lambda lon, lat: _shift_pixels(first.to_source(lon, lat), -left, -top),
-        to_place=lambda col, row: first.to_place_on_grid(col + left, row + top),
+        to_place=lambda col, row: first.to_place(col + left, row + top),
         corners=corners,
         sha256=digest,
         read=read,
@@ -140,7 +140,7 @@ def _place_on_grid(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
         allowed = f"the reference system of {first.name} is expected: tiles lie on one grid"
         raise TerrainError(f"{tile.name}: another reference system: {allowed}", file=tile.name, allowed=allowed)
     rows, cols = tile.shape
-    lon, lat = tile.to_place_on_grid(np.array([0.0, cols - 1.0]), np.array([0.0, rows - 1.0]))
+    lon, lat = tile.to_place(np.array([0.0, cols - 1.0]), np.array([0.0, rows - 1.0]))
     col, row = first.to_source(lon, lat)
     position = (round(float(row[0])), round(float(col[0])))
     offset = max(

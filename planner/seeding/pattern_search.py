@@ -117,12 +117,12 @@ def search_patterns(
         state = _continue_search(data, frames, box, moves, initial_steps, state, pause_count, evaluations)
         if not state.is_done and must_end():
             break
-    if state.feasible_vector_merit <= state.best_merit:
+    if state.feasible_merit <= state.best_merit:
         vectors = [state.feasible_vector]
     elif math.isinf(state.feasible_vector[0]):
-        vectors = [state.best_merit_vector]
+        vectors = [state.best_vector]
     else:
-        vectors = [state.feasible_vector, state.best_merit_vector]
+        vectors = [state.feasible_vector, state.best_vector]
     return np.array(vectors), int(state.evaluations)
 
 
