@@ -320,7 +320,7 @@ def write_own_folder(target: Path, files: Mapping[str, bytes]) -> None:
 
 
 def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
-    """Return the absolute path of a folder in which an aircraft is to be created.
+    """Return the absolute path of the folder of a new aircraft.
 
     overwrite: True accepts the folder of an aircraft that exists.
     Raises FlightError if it exists otherwise, its parent does not, or its name is not valid for a model.

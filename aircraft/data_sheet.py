@@ -324,7 +324,7 @@ def _area_source(sheet: DataSheet) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SizedAircraft:
-    """A model that matches a data sheet, and the values that were guessed for it.
+    """A model that matches a data sheet, and the names of its guessed values.
 
     numbers: numbers of the model.
     sheet: the sheet with every value filled in.
@@ -613,7 +613,7 @@ def _thrust_error(motor: Drive, sheet: DataSheet, drag: Drag, field: str) -> flo
 
 
 def _solve_errors(errors: Callable[[Sequence[float]], list[float]], count: int, sheet: DataSheet) -> list[float]:
-    """Solve for positive numbers near 1 at which all errors vanish. Raises FlightError without a solution."""
+    """Return positive numbers near 1 that make all errors vanish. Raises FlightError without a solution."""
     if not count:
         return []
     for size in (1.0, 0.6, 1.7):
@@ -634,7 +634,7 @@ _THRUST_TOLERANCE_RATIO = 1e-7
 
 
 def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | None:
-    """Solve for numbers within the bound at which the errors vanish, by Newton's method; return None if it fails.
+    """Find the zero of the errors within the bound by Newton's method; return None if it fails.
 
     A step that does not reduce the errors is halved.
     """

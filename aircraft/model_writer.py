@@ -90,7 +90,7 @@ class AeroCoefficients:
 class ModelNumbers:
     """All numbers of a model, in SI units and radians.
 
-    title: for a person.
+    title: title for people.
     source: source of the numbers, a sentence.
     inertia: Jx, Jy, Jz, Jxz about the center of gravity, kg m^2; Jxz is the integral of x z dm.
     throw: travel of elevator, aileron and rudder in either direction.

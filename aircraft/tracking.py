@@ -77,7 +77,7 @@ class TrackingError:
         object.__setattr__(self, "record", record[0])
 
     def corner_acceptance(self, turn: float, ground_speed: float) -> float:
-        """Return the distance before a corner of this turn (rad) at which to turn at a ground speed (m/s), m."""
+        """Return the acceptance distance before a corner for a turn (rad) and a ground speed (m/s), m."""
         return float(_interpolate(np.ascontiguousarray(self.acceptance), self.airspeed, turn, ground_speed))
 
     def corner_excursion(self, turn: float, ground_speed: float) -> float:

@@ -57,7 +57,7 @@ class Certificate:
     available_length: smallest length of a leg between its two turns, m; inf if only the fixed turn limit applies.
     clearance: smallest height above ground minus the required clearance, m.
     bounds: margin to map, floor and ceiling, m.
-    kill_distance: between the path and the surface of the nearest missile sphere, m; negative inside, inf without
+    kill_distance: distance of the path from the nearest missile sphere, m; negative inside, inf without
     missiles.
     zone_distance: outside exclusions and inside inclusions, horizontal or vertical, m; negative if a zone is violated,
     inf without zones.

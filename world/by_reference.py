@@ -39,7 +39,7 @@ class Reference(types.Type):
 
     @property
     def key(self) -> Any:
-        """Key by which numba compares two references."""
+        """Key for numba's comparison of references."""
         return self.held
 
 

@@ -114,7 +114,7 @@ class FlightError(PlanflyError):
 
 
 class CrashError(FlightError):
-    """Error for a controlling program that failed in flight, which is a failure of the machine, not bad input."""
+    """Error for a controlling program that failed in flight: a failure of the machine, not bad input."""
 
 
 class ParameterError(PlanflyError):
@@ -150,7 +150,7 @@ class ArgumentError(PlanflyError, ValueError):
 
 
 class MissingExtraError(PlanflyError, ImportError):
-    """Error for a feature that needs an extra of planfly that is not installed.
+    """Error for a feature whose extra of planfly is not installed.
 
     value: the extra's name.  allowed: the command that installs it.  name: the module that is missing.
     """

@@ -65,7 +65,7 @@ def interrupt(number: int, _frame: FrameType | None = None) -> None:
 
 
 class uninterrupted:
-    """Context manager that completes its block, and raises a signal that arrives meanwhile at the end.
+    """Complete the block, and raise a signal that arrived meanwhile at its end.
 
     >>> import signal
     >>> try:

@@ -44,7 +44,7 @@ def kernel_sources(root: Path) -> dict[str, bytes]:
 
 
 def _imported_paths(content: bytes) -> list[str]:
-    """Return the paths of modules that a source may import, including names in packages, which may be modules."""
+    """Return the paths of modules that a source may import; an imported name may also be a module."""
     paths = []
     for module, names in _IMPORT.findall(content):
         path = module.decode().replace(".", "/")

@@ -86,7 +86,7 @@ def compiled_inline(kernel: _Kernel) -> _Kernel:
 
 
 def inner(kernel: _Kernel) -> _Kernel:
-    """Compile a function that other kernels call, without the wrapper that Python would call it by.
+    """Compile a function for calls by other kernels, without its Python wrapper.
 
     The wrapper takes a seventh of the time to compile a kernel.  Tests may still call the function: a wrapper is then
     compiled and kept separately.
@@ -213,7 +213,7 @@ def read_only(array: _Array) -> _Array:
 def record_dtype(*entries: str | tuple[Any, ...]) -> np.dtype[np.record]:
     """Make the type of a record whose fields are read and set as attributes, in Python and in compiled code.
 
-    entries: in order: the name of a number (float64), or (name, type) or (name, type, shape) as in numpy.
+    entries: fields in order, each the name of a float64, or (name, type) or (name, type, shape) as in numpy.
 
     >>> POINT = record_dtype("east", "north", ("leg", np.int64), ("velocity", np.float64, (3,)))
     >>> points = np.zeros(2, POINT)

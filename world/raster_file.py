@@ -30,7 +30,7 @@ HIGHEST_GROUND_M = 9000.0
 class RasterFile:
     """Elevation file that was opened and checked; its heights are not read yet.
 
-    to_source: from longitude, latitude (deg) to fractional (col, row) of pixel centres; to_place: the inverse.
+    to_source: map from longitude, latitude (deg) to fractional (col, row) of pixel centres; to_place: its inverse.
     shape: (rows, cols).
     corners: (n, 2) longitude, latitude along the outline of the pixel centres, deg.
     grid: affine coefficients (a, b, c, d, e, f) from columns and rows of pixel corners to the reference

@@ -102,7 +102,7 @@ class Scenario:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on zones that were changed or left out on reading, and on zones that are not active at the time."""
+        """Notes on zones changed or omitted on reading, and on inactive zones."""
         notes = list(self.spec.zone_notes or ())
         timed_tables = [table for table in self.spec.zones or () if table.times]
         if timed_tables and self.spec.at is None:

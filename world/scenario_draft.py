@@ -126,7 +126,7 @@ def make_draft(
 def _survey_ground(
     raster: RasterFile, origin: GeoOrigin, places: Mapping[str, Place], endpoints: Floats, margin: float
 ) -> tuple[Floats, float]:
-    """Return the area (2, 2) about two places for which an elevation file has data, and its highest ground, m.
+    """Return an area (2, 2) around two places with elevation data, and its highest ground, m.
 
     places: the two places by their keywords; ends: (2, 2) the same on the map, m.  margin: width of ground on all
     sides, m.  Raises ArgumentError for a place that the file does not cover, and TerrainError.

@@ -161,7 +161,7 @@ def _known_keys(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]
 
 
 def _data_keys(parts: tuple[str | int, ...], data: Any) -> list[str | int]:
-    """Return the parts of a place that are keys of the data, without the branches that pydantic names in unions."""
+    """Return the parts of a place that are keys of the data; pydantic also names the branches of unions."""
     keys = []
     for part in parts:
         known_keys = range(len(data)) if isinstance(data, list) else data if isinstance(data, dict) else ()

@@ -116,7 +116,7 @@ class ZoneTable(ScenarioTable):
     rings_m, rings_deg: several rings, for a zone with holes or several parts: a point is inside the zone if an odd
     number of rings contain it.
     east_m, north_m or lat_deg, lon_deg, with radius_m: a cylinder.
-    floor, ceiling: above mean sea level or above ground; unbounded if neither is given.
+    floor_..., ceiling_...: heights above mean sea level or above ground; unbounded if neither is given.
     times: periods in which the zone is active, as `world.airspace.zone_times` reads them; None for always.
     """
 

@@ -1,6 +1,6 @@
 """Estimate drag and thrust together, from forward acceleration and, if logged, the battery's current.
 
-Level flight alone shows only their difference; climbs, glides and other speeds show more, and the current shows most.
+Level flight shows only their difference; climbs, glides and other speeds show more, and the current shows most.
 Other uncertain properties of motor and accelerometer are estimated with them, within their ranges. Those that belong to
 the aircraft (its motor's resistance, the battery's voltage) are then folded into the parameters: the model has no place
 for them, and without them would fly with another thrust than the measured one.
@@ -136,7 +136,7 @@ def fit_drag(
     thinned = forces.signals
     with_current = bool(np.isfinite(thinned.current).all())
     means, sds = drag_priors(with_current=with_current)
-    # First the forces alone, then both: with the current from the start the first steps would diverge.
+    # First only the forces, then both, because with the current from the start the first steps would diverge.
     fit = _fit_from(forces, _Measurement(thinned, with_current=False), means, sds)
     if with_current:
         fit = _fit_from(forces, _Measurement(thinned, with_current=True), means, sds, fit.estimate)

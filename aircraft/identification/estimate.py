@@ -100,7 +100,7 @@ class Estimate:
         return np.sqrt(np.diag(self.covariance))
 
     def silent(self) -> tuple[str, ...]:
-        """Return the parameters that the logs hardly inform, one line each with the maneuver that would."""
+        """Return a line for each parameter that the logs hardly inform, with an informative maneuver."""
         fractions = self.of_log().tolist()
         return tuple(
             f"{parameter.title}: stays the prior's; fly {parameter.show}"

@@ -19,7 +19,7 @@ VANE_BAND = 8.0
 
 
 class Flow(NamedTuple):
-    """Angle of attack and sideslip, rad, and lift coefficient from the angle of attack alone, (n,) each."""
+    """Angle of attack and sideslip, rad, and lift coefficient from only the angle of attack, (n,) each."""
 
     alpha: Floats
     beta: Floats

@@ -28,7 +28,7 @@ REQUIRED_MARGINS = record_dtype(("number", np.int64), "horizontal", "vertical", 
 
 @by_reference
 class ZonesWithMargins(NamedTuple):
-    """Zones in the order in which kernels visit them: the inclusions, then the exclusions from west to east.
+    """Zones in the kernels' order: the inclusions, then the exclusions from west to east.
 
     records: the zones. required: `REQUIRED_MARGINS` records (z,) with their margins.
     inclusions: number of inclusions.
@@ -53,7 +53,7 @@ class ZoneMargins(NamedTuple):
 
 
 def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, margins: ZoneMargins) -> ZonesWithMargins:
-    """Return zones with the given margins, which are smaller for zones that have a fixed end within the margin.
+    """Return zones with the given margins, reduced for zones with a fixed end inside the margin.
 
     ends: (k, 3) m. An end inside an exclusion, or outside an inclusion, makes its margin 0.
 
@@ -193,7 +193,7 @@ class ShapeView(NamedTuple):
     """Shape as seen from a line, m.
 
     inside: True if the line begins in the shape.
-    distance: from the line to the shape's outline, 0 if they meet; inf if beyond the requested limit.
+    distance: distance from the line to the shape's outline, 0 if they meet; inf if beyond the requested limit.
     right, left: extent of the shape across the line, negative to the right.
     first, last: extent of the shape along the line.
     """
@@ -270,7 +270,8 @@ def _view_circle(along: float, across: float, radius: float, run: float) -> Shap
 
 @inlined
 def _edge_distance2(along: float, across: float, to_along: float, to_across: float, run: float) -> float:
-    """Return the squared distance between the line and an edge that does not cross it, which is at an end of either."""
+    """Return the squared distance between the line and an edge that does not cross it."""
+    # Two pieces that do not cross are nearest at an end of one of them.
     gap = along - min(run, max(0.0, along))
     min_distance2 = gap * gap + across * across
     gap = to_along - min(run, max(0.0, to_along))

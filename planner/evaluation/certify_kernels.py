@@ -102,7 +102,7 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _piece_ends(decay: float, run: float) -> Floats:
-    """Return the fractions of a leg at which its pieces end, increasing; the last is 1."""
+    """Return the end fractions of a leg's pieces, increasing; the last is 1."""
     fractions = np.ones(len(_CUTS) + 3)
     for k in range(len(_CUTS)):
         fractions[k] = min(1.0, _CUTS[k] / max(1e-9, decay))

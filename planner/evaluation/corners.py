@@ -117,7 +117,7 @@ def courses_at(data: ProblemArrays, legs: Records, i: int) -> tuple[float, float
 
 @compiled_inline
 def settling_length(turn_lengths: float, run: float) -> float:
-    """Return the straight length of a leg in which its first turn settles before the second turn begins, m.
+    """Return the straight length of a leg for settling between its two turns, m.
 
     turn_lengths: length of both turns, m.
     """

@@ -146,7 +146,7 @@ class PrecomputedLimits(NamedTuple):
     climb_slope, dive_slope: tangents that no leg may exceed, or, where the aircraft limits slopes, that every leg may
     use.
     slopes_by_aircraft: True if the aircraft limits slopes.
-    straight_distance: from start to destination in three dimensions, m.
+    straight_distance: distance from start to destination in three dimensions, m.
     required: clearance above ground.
     """
 

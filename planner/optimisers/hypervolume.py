@@ -110,7 +110,7 @@ def _greedy(covered: Marks, first_rows: Ints, count: int) -> Ints:
 
 @inner
 def _count_common_marks(marks: Marks, other_marks: Marks) -> int:
-    """Return the number of places (p,) at which both arrays have a mark."""
+    """Return the number of places (p,) with a mark in both arrays."""
     total = 0
     for p in range(marks.size):
         total += marks[p] & other_marks[p]

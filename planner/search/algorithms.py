@@ -21,13 +21,14 @@ Optimiser = Literal["umda", "emna", "chain", "differential", "waypoints"]
 class Algorithm:
     """Search method: its encoding and its extensions of the planner of Yang, Tang and Lozano (CEC 2014).
 
-    name, summary: as shown by commands and their help.
+    name, summary: texts in commands and their help.
     encoding: a name of `planner.evaluation.encoding.ENCODINGS`.
     graded: scores violations by amount along the whole path, and ranks kill exposure before length.
     smooth: draws first samples, and the marginals of UMDA, along the eigenvectors of the Brownian-bridge kernel.
     seeded: starts from grid routes, improved by a pattern search.
     tightened: finally moves all waypoints of the best path at once.
-    optimiser: from `planner.optimisers`; "waypoints" is `planner.search.generations.waypoint_generations`.
+    optimiser: name of an optimiser in `planner.optimisers`; "waypoints" is
+    `planner.search.generations.waypoint_generations`.
     """
 
     name: str

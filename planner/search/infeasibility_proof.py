@@ -61,7 +61,7 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
 
 
 def highest_level_flight(data: ProblemArrays) -> float:
-    """Return the altitude above which the aircraft cannot fly level, so that no waypoint may be higher, m.
+    """Return the highest altitude of level flight, above which no waypoint may be, m.
 
     Return inf without such an altitude, and if the wind is too strong to hold a course. As in
     `planner.evaluation.leg_constraints`, if both slope limits are the aircraft's own.
@@ -182,7 +182,7 @@ def _close_sphere(
     range_tops: Floats,
     range_counts: Ints,
 ) -> None:
-    """Close the altitudes at which a whole column is inside a sphere.
+    """Close the altitudes of columns that are completely inside a sphere.
 
     east, north: distances from the map's corner, m.
     """

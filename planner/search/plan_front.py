@@ -107,7 +107,7 @@ class Front:
 
     asked: requested maximum number of plans.
     fourth: fourth objective, after length, exposure and clearance: "time" or "energy".
-    default: the shortest plan, found by the planner alone, and its values.
+    default: the default planner's plan, which is the shortest, and its values.
     reference: (4,) reference point of the hypervolume, clearance negated; plans beyond it are ignored.
     evaluations: paths evaluated, without the default plan's evaluations.
     refused: number of other plans that were not safe once they were completed.

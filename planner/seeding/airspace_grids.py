@@ -143,7 +143,7 @@ def _set_cell_costs(
     last_across: int,
     price: Floats,
 ) -> None:
-    """Fill the cost per m of a stage's cells (low..high, layers), inf for a cell that no path may enter."""
+    """Fill the cost per m of a stage's cells (across, layers), inf for a cell that no path may enter."""
     near_obstacles, horizontal2 = np.empty(obstacles.shape[0], dtype=np.int64), np.empty(obstacles.shape[0])
     for y in range(first_across, last_across + 1):
         column, count = columns[y], 0

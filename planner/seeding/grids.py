@@ -150,7 +150,7 @@ def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink
 def _add_kill_cost(
     obstacles: Records, along: float, grid: Grid, first_across: int, last_across: int, price: Floats
 ) -> None:
-    """Add the cost per m inside kill spheres, increasing inwards, to a stage's cells (layers, low..high)."""
+    """Add the cost per m inside kill spheres, increasing inwards, to a range across of a stage's cells."""
     across, layers = grid.across, grid.layers
     pitch = across[1] - across[0] if across.size > 1 else 1.0
     for k in range(obstacles.shape[0]):
@@ -185,7 +185,7 @@ def set_cell_costs(
     last_across: int,
     price: Floats,
 ) -> None:
-    """Fill the cost per m of a stage's cells (layers, low..high), inf for a cell too close to the ground."""
+    """Fill the cost per m of a range across of a stage's cells, inf for a cell too close to the ground."""
     across, layers = grid.across, grid.layers
     step = frame.length / grid.stages
     steps = _pixel_steps(data, frame, stage * step, grid.spread * step if stage < grid.stages else 0.0)
@@ -321,7 +321,7 @@ def prune(
     first_across: int,
     last_across: int,
 ) -> None:
-    """Drop cells low..high from which no route reaches the destination within the bound, and fill the remaining spans.
+    """Drop cells without a route to the destination within the bound, and fill the remaining spans.
 
     spans: `SPAN` records (layers,) to fill. goal_distances: (across,) horizontal distance to the destination, m. rises:
     (layers,) height difference to it, m.

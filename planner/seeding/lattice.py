@@ -407,7 +407,7 @@ def ceiling_route(
 
     step: m.
     depth: depth to which the route may enter missiles' spheres, m.
-    pause: as in `lattice_route`.
+    pause: see `lattice_route`.
     """
     start, destination = (np.array([*end[:2], data.ceiling]) for end in (data.start, data.destination))
     for end in (start, destination):

@@ -221,7 +221,7 @@ def continue_grid_costs(
 
 @inlined
 def side_of(lateral_offset: float, vertical_offset: float) -> int:
-    """Return the side on which a point lies, from its offsets to the left of an obstacle's centre and above it."""
+    """Return the side of a point, given its offsets to the left of an obstacle's centre and above it, m."""
     if abs(lateral_offset) >= abs(vertical_offset):
         return LEFT if lateral_offset >= 0.0 else RIGHT
     return OVER if vertical_offset > 0.0 else UNDER
@@ -273,7 +273,7 @@ SAME_WAY = 100.0
 
 
 def sides_passed(points: Floats, obstacles: Records) -> Ints:
-    """Return the sides on which a route's points (s, 3) along, across, up pass obstacles, (k,); -1 beyond its ends.
+    """Return the sides on which a route (s, 3) along, across, up passes obstacles, (k,); -1 beyond its ends.
 
     Routes with the same sides can be deformed into each other without touching an obstacle. Routes with different sides
     are assumed not to be, although a route over a sphere on the ground can be moved to either side.

@@ -46,7 +46,7 @@ class _Sweeps(NamedTuple):
 class WaypointChains(NamedTuple):
     """Best paths through candidates (w, k).
 
-    cost: of the best path through each, in m of path; inf if none is within the bound.
+    cost: cost of the best path through each, in m of path; inf if none is within the bound.
     before, after: (w, k) previous and next candidate on that path.
     legs: number of legs evaluated.
     """
