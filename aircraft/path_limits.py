@@ -171,7 +171,7 @@ class Limits:
         )
 
 
-def derated(
+def derate(
     table: PerformanceTable,
     climb_fraction: float,
     sink_fraction: float,
@@ -185,7 +185,7 @@ def derated(
 
     >>> nothing = np.zeros(2)
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, nothing, np.array([0.2, -0.1]), nothing)
-    >>> derated(table, 0.5, 1.0).climb.tolist(), derated(table, 0.9, 0.9, unused_climb=3.0).climb.round(3).tolist()
+    >>> derate(table, 0.5, 1.0).climb.tolist(), derate(table, 0.9, 0.9, unused_climb=3.0).climb.round(3).tolist()
     ([0.1, -0.1], [0.079, -0.1])
     """
     speeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
@@ -204,11 +204,11 @@ def derated(
     return table._replace(climb=climb, descent=descent)
 
 
-def within_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -> PerformanceTable:
+def limit_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -> PerformanceTable:
     """Return the performance limited to these climb and sink rates, m/s; inf for no limit.
 
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, *(np.full(2, 0.3) for _ in range(3)))
-    >>> slower = within_rates(table, 5.0, math.inf)
+    >>> slower = limit_rates(table, 5.0, math.inf)
     >>> slower.climb.round(3).tolist(), slower.descent.tolist()
     ([0.201, 0.201], [0.3, 0.3])
     """

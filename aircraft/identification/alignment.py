@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from aircraft.identification.flight_record import GRID_HZ, FlightRecord, derivative, lagged, low_pass, shifted
+from aircraft.identification.flight_record import GRID_HZ, FlightRecord, apply_delay, apply_lag, derivative, low_pass
 from world.arrays import Floats, Ints
 
 
@@ -111,7 +111,7 @@ class Signals:
         """Return values delayed by ``delay`` (s), each stretch separately."""
         delayed_values = np.empty_like(values)
         for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
-            delayed_values[first:last] = shifted(values[first:last], delay)
+            delayed_values[first:last] = apply_delay(values[first:last], delay)
         return delayed_values
 
 
@@ -147,7 +147,7 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
     for record, clock in zip(records, clocks, strict=True):
 
         def delay_signal(values: Floats, clock: Clocks = clock) -> Floats:
-            return shifted(lagged(values, clock.lag), clock.delay)
+            return apply_delay(apply_lag(values, clock.lag), clock.delay)
 
         rates = delay_signal(record.rates)
         aligned = {
@@ -159,8 +159,8 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
             "wind": record.wind,
             "airspeed": delay_signal(low_pass(record.airspeed, _AIRSPEED_CUTOFF_HZ)),
             "density": record.density,
-            "surfaces": delay_signal(lagged(record.controls[:, :3], clock.servo_lag)),
-            "throttle": delay_signal(lagged(record.controls[:, 3], motor_lag)),
+            "surfaces": delay_signal(apply_lag(record.controls[:, :3], clock.servo_lag)),
+            "throttle": delay_signal(apply_lag(record.controls[:, 3], motor_lag)),
             "current": record.current,
             "voltage": record.voltage,
         }

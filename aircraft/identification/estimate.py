@@ -21,7 +21,7 @@ from aircraft.identification.drag import FORCE_THINNING, AlphaDoubt, fit_drag
 from aircraft.identification.fixed_parameters import HELD_FIXED, NOISE
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from aircraft.identification.flow import motor_of, vane
-from aircraft.identification.level import LEVEL_SD, levelled
+from aircraft.identification.level import LEVEL_SD, level_signals
 from aircraft.identification.lift import fit_lift
 from aircraft.identification.moments import AXES, MOMENT_THINNING, fit_moments
 from aircraft.identification.parameters import PARAMETERS, Group, prior_means, prior_sds
@@ -164,7 +164,7 @@ def _noise_bias(nominal: Estimate, noisier: Estimate) -> Floats:
 
 def aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], base: BaseModel) -> Signals:
     """Return all stretches on the clocks of their accelerometers, leveled, with wind-triangle airspeed."""
-    signals = levelled(align(records, clocks, base.motor_lag))
+    signals = level_signals(align(records, clocks, base.motor_lag))
     return with_airspeed_scale(signals, vane(signals, base, prior_means()))
 
 

@@ -93,10 +93,10 @@ def low_pass(values: Floats, cutoff: float, hertz: float = GRID_HZ) -> Floats:
     return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=length))
 
 
-def shifted(values: Floats, delay: float) -> Floats:
+def apply_delay(values: Floats, delay: float) -> Floats:
     """Delay (n,) or (n, k) by ``delay`` seconds with linear interpolation; a negative delay advances.
 
-    >>> shifted(np.arange(5.0), 0.02)
+    >>> apply_delay(np.arange(5.0), 0.02)
     array([0., 0., 1., 2., 3.])
     """
     rows = np.arange(len(values)) - delay * GRID_HZ
@@ -107,12 +107,12 @@ def shifted(values: Floats, delay: float) -> Floats:
     return np.asarray(values[lower_rows] * (1.0 - fraction) + values[upper_rows] * fraction)
 
 
-def lagged(values: Floats, time_constant: float) -> Floats:
+def apply_lag(values: Floats, time_constant: float) -> Floats:
     """Return (n,) or (n, k) after a first-order lag with this time constant, s.
 
     It is exact for values held over a sample.
 
-    >>> lagged(np.array([0.0, 1.0, 1.0]), 0.0)
+    >>> apply_lag(np.array([0.0, 1.0, 1.0]), 0.0)
     array([0., 1., 1.])
     """
     if time_constant <= 1e-4:

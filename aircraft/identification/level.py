@@ -38,7 +38,7 @@ def forward_excess(signals: Signals) -> list[float]:
     return excesses
 
 
-def levelled(signals: Signals) -> Signals:
+def level_signals(signals: Signals) -> Signals:
     """Return signals with the forward excess divided between the level and the accelerometer."""
     level_fraction = LEVEL_SD**2 / (LEVEL_SD**2 + (FORWARD_SD / GRAVITY) ** 2)
     attitude, acceleration = signals.attitude.copy(), signals.acceleration.copy()

@@ -169,13 +169,13 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
 def fly_by_vertices(
     aircraft: PerformanceTable, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float
 ) -> Floats:
-    """Return vertices (k, 3) of the flown path past the waypoint `waypoint`; see `blended_vertices`."""
+    """Return vertices (k, 3) of the flown path past `waypoint`; see `blended_vertices`."""
     return blended_vertices(half_blend_length(aircraft, waypoint[2]), previous, waypoint, next_waypoint, radius)
 
 
 @inner
 def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float) -> Floats:
-    """Return vertices (k, 3) of a path past the waypoint `waypoint` that is nowhere higher than the flight.
+    """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flight.
 
     The vertices are a point on the leg where the blend of slopes begins, the fly-by arc of this radius from tangent
     point to tangent point, and a point on the next leg where the blend ends. Height is linear along the arc; where the
@@ -236,7 +236,7 @@ def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_wayp
 def legs_about(
     previous: Floats, waypoint: Floats, next_waypoint: Floats, length_before: float, length_after: float
 ) -> Floats:
-    """Return the parts of both legs next to the waypoint `waypoint`, of the given lengths (m), as vertices (3, 3)."""
+    """Return the parts of both legs next to `waypoint`, of the given lengths (m), as vertices (3, 3)."""
     vertices = np.empty((3, 3))
     for row, neighbour, length in ((0, previous, length_before), (2, next_waypoint, length_after)):
         run = math.hypot(waypoint[0] - neighbour[0], waypoint[1] - neighbour[1])
@@ -266,15 +266,15 @@ def fly_by_radii(data: ProblemArrays, path: Floats) -> Floats:
         return np.zeros(path.shape[0])
     tangents = turn_tangents(data.aircraft, path)
     count = path.shape[0]
-    leg_fits = np.ones(count, dtype=np.bool_)
+    arc_fits = np.ones(count, dtype=np.bool_)
     if not data.legs_hold_turns:
         for i in range(count - 1):
             if tangents[i] + tangents[i + 1] > math.hypot(path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]):
-                leg_fits[i] = False
-                leg_fits[i + 1] = False
+                arc_fits[i] = False
+                arc_fits[i + 1] = False
     radii = np.zeros(count)
     for i in range(1, count - 1):
-        if not leg_fits[i]:
+        if not arc_fits[i]:
             continue
         turn = turning_angle(path[i - 1, 0], path[i - 1, 1], path[i, 0], path[i, 1], path[i + 1, 0], path[i + 1, 1])
         half_turn_tangent = math.tan(0.5 * min(turn, math.pi - 1e-6))

@@ -94,9 +94,8 @@ def _mean_detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: fl
 def _min_height(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float, min_height: float) -> float:
     """Return the minimum height above ground at samples of leg d from a and of earlier legs, m; -inf off the terrain.
 
-    min_height: minimum height of the legs before, m. Samples are skipped where, by the steepest slope nearby, the
-    ground
-        cannot be closer.
+    min_height: minimum height of the legs before, m. Samples are skipped where the steepest slope nearby shows that the
+        ground cannot be closer.
     """
     run = math.sqrt(dx * dx + dy * dy)
     count = 1 + int(run / data.sample_pitch)

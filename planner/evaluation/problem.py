@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aircraft.path_limits import Limits, PerformanceTable, derated, within_rates
+from aircraft.path_limits import Limits, PerformanceTable, derate, limit_rates
 from aircraft.tracking import no_tracking
 from planner.airspace.zone_limits import PlannerAirspace, ZoneMargins, make_airspace
 from planner.evaluation.encoding import Space
@@ -419,12 +419,12 @@ def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable
     """Return the aircraft's performance, reduced for turbulence and within the rates that the autopilot demands."""
     slope_fraction, tracking = TURBULENCE_SHARE[scenario.wind.turbulence], limits.tracking
     if tracking is None:
-        return derated(limits.performance(), slope_fraction, slope_fraction, limits.reserve_climb, limits.reserve_sink)
+        return derate(limits.performance(), slope_fraction, slope_fraction, limits.reserve_climb, limits.reserve_sink)
     climb_fraction, sink_fraction = (
         min(slope_fraction, own_fraction) for own_fraction in (tracking.own_climb_share, tracking.own_sink_share)
     )
-    table = derated(limits.performance(), climb_fraction, sink_fraction, limits.reserve_climb, limits.reserve_sink)
-    return within_rates(table, tracking.climb_rate, tracking.sink_rate)
+    table = derate(limits.performance(), climb_fraction, sink_fraction, limits.reserve_climb, limits.reserve_sink)
+    return limit_rates(table, tracking.climb_rate, tracking.sink_rate)
 
 
 def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:

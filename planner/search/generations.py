@@ -55,7 +55,7 @@ def path_generations(search: Search, population: int, generations: int, starts: 
     )
     optimiser = _make_optimiser(search, lambda scores: ranks(scores, levels), population, initial)
     optimiser.tell(search.evaluate(optimiser.ask()))
-    search.record()
+    search.record_history()
     best_scores = [_best_row(optimiser.scores)]
     full_evaluations = population + generations * (population // 2)
     for generation in range(generations):
@@ -67,10 +67,10 @@ def path_generations(search: Search, population: int, generations: int, starts: 
         ):
             break
         optimiser.tell(search.evaluate(optimiser.ask()))
-        search.record()
+        search.record_history()
         best_scores.append(_best_row(optimiser.scores))
         search.done += 1
-        search.report(generations - generation - 1)
+        search.report_progress(generations - generation - 1)
     return np.asarray(optimiser.samples[best_first(optimiser.scores)[0]])
 
 
@@ -191,10 +191,10 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
         search.legs += chains.legs
         search.evaluations += math.ceil(chains.legs / (inner_count + 1))
         _evaluate_best(search, rows, chains)
-        search.record()
+        search.record_history()
         search.done += 1
-        search.report(generation_count - generation - 1)
-        if search.must_end() or search.first_safe_found() or legs_left(search) <= 0:
+        search.report_progress(generation_count - generation - 1)
+        if search.must_end() or search.first_safe_found() or count_remaining_legs(search) <= 0:
             break
         if generation < generation_count - 1:
             cost = chains.cost[1:-1]
@@ -219,7 +219,7 @@ def _limit_generations(search: Search, generations: int) -> int:
     return min(generations, SEEDED_GENERATIONS if search.algorithm.seeded else MAX_GENERATIONS)
 
 
-def legs_left(search: Search) -> int:
+def count_remaining_legs(search: Search) -> int:
     """Return the number of legs that the search may still evaluate."""
     settings = search.problem.scenario.planner
     if settings.budget is not None:
@@ -229,7 +229,7 @@ def legs_left(search: Search) -> int:
 
 def may_try_again(search: Search) -> bool:
     """Return True if enough legs are left for another attempt."""
-    return legs_left(search) >= RETRY_SHARE * _count_attempt_legs(search)
+    return count_remaining_legs(search) >= RETRY_SHARE * _count_attempt_legs(search)
 
 
 def _count_attempt_legs(search: Search) -> int:
@@ -259,7 +259,7 @@ def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointCha
     bounds: tuple[float, ...] = FIRST_BOUNDS
     if len(search.archive.scores) and search.best_is_safe():
         bounds = (float(search.archive.scores[0, LENGTH]) * (1.0 + slack), *FIRST_BOUNDS)
-    legs, remaining_legs = 0, legs_left(search)
+    legs, remaining_legs = 0, count_remaining_legs(search)
     for bound in bounds:
         if math.isinf(bound):
             max_candidates = max(
@@ -287,5 +287,5 @@ def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None
     intervals = np.arange(len(rows))
     vectors = np.array([rows[intervals, list(candidate_numbers)].ravel() for candidate_numbers in sorted(chosen)])
     search.evaluate(vectors)
-    if not search.archive.feasible():
+    if not search.archive.is_feasible():
         search.improve(search.archive.vectors[0], REPAIR_EVALUATIONS)

@@ -28,10 +28,10 @@ from planner.search.pose_chains import (
     Spot,
     TurnLengths,
     arc_lengths,
-    chains,
-    fallen,
-    measure,
-    risen,
+    candidate_chains,
+    climb_altitudes,
+    descent_altitudes,
+    measure_path,
 )
 from world.airfield import STEEPEST_STRIP, LandingStrip, Launch, strip_slopes
 from world.arrays import Floats
@@ -231,19 +231,23 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
     low_problem = make_problem(replace(scenario, zones=zones), algorithm_limits)
     low_problem = replace(low_problem, certified=low_problem.certified._replace(clearance=-1e5))
     altitude = float(max(scenario.start[2], scenario.destination[2]))
-    radius = max(algorithm_limits.turn_radius(course, course + math.pi, altitude) for course in (0.0, 0.5 * math.pi))
-    turning = arc_lengths(radius)
+    turn_radius = max(
+        algorithm_limits.turn_radius(course, course + math.pi, altitude) for course in (0.0, 0.5 * math.pi)
+    )
+    turn_lengths = arc_lengths(turn_radius)
     if (tracking := algorithm_limits.tracking) is not None:
         # An estimate, as ground speeds depend on the course; the certificate decides.
         speed_ratio = 1.0 + _WIND_FRACTION * scenario.wind.speed / algorithm_limits.airspeed
-        before, after = (_turn_lengths_at(table, speed_ratio) for table in (tracking.before, tracking.after))
-        turning = TurnLengths(
+        lengths_before, lengths_after = (
+            _turn_lengths_at(table, speed_ratio) for table in (tracking.before, tracking.after)
+        )
+        turn_lengths = TurnLengths(
             *(
                 tuple(map(max, error_lengths, arc_row))
-                for error_lengths, arc_row in zip((before, after), turning, strict=True)
+                for error_lengths, arc_row in zip((lengths_before, lengths_after), turn_lengths, strict=True)
             )
         )
-    return _Site(plan, algorithm_limits, home, terrain, problem, low_problem, radius, turning)
+    return _Site(plan, algorithm_limits, home, terrain, problem, low_problem, turn_radius, turn_lengths)
 
 
 def _turn_lengths_at(table: Floats, speed_ratio: float) -> list[float]:
@@ -331,7 +335,7 @@ def _make_climb_out(
     goal_altitude, top_altitude = float(first_waypoint[2]), max(takeoff_altitude, float(first_waypoint[2]))
     certificate = None
     for slope_factor in _SLOPE_FACTORS:
-        heights = risen(
+        heights = climb_altitudes(
             spots,
             float(site.home[2]),
             partial(_scaled_slope, site, slope_factor, 0, top_altitude),
@@ -419,10 +423,10 @@ def _list_departures(site: _Site, launches: Sequence[_Start], laps: int) -> Iter
     min_length = site.min_path_length(float(target[2] - site.home[2]), 0) + math.dist(end, next_point)
     for course, takeoff_end, begin in launches:
         tailwind = site.scenario.wind.along(course, float(site.home[2]))[0]
-        for corners in chains(begin, course, end, next_course, site.turn_radius, laps):
+        for corners in candidate_chains(begin, course, end, next_course, site.turn_radius, laps):
             spots = [home, begin, *corners, end]
             measures, takeoff_run = (
-                measure([takeoff_end, *spots[1:], next_point], site.turn_lengths),
+                measure_path([takeoff_end, *spots[1:], next_point], site.turn_lengths),
                 math.dist(home, takeoff_end),
             )
             if measures.fits and takeoff_run + measures.length >= min_length:
@@ -591,8 +595,11 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
     extra_length += sum(math.dist(a, b) for a, b in pairwise(previous_spots))
     min_length = site.min_path_length(end_altitude - line_up_altitude, side) + extra_length
     for laps in _lap_counts(site, end_altitude - line_up_altitude, side):
-        paths = [[begin, *corners, end] for corners in chains(begin, course, end, final.course, site.turn_radius, laps)]
-        measured = [(measure([*previous_spots, *spots, glide_start], site.turn_lengths), spots) for spots in paths]
+        paths = [
+            [begin, *corners, end]
+            for corners in candidate_chains(begin, course, end, final.course, site.turn_radius, laps)
+        ]
+        measured = [(measure_path([*previous_spots, *spots, glide_start], site.turn_lengths), spots) for spots in paths]
         fitting = [
             (measures.cost, spots) for measures, spots in measured if measures.fits and measures.length >= min_length
         ]
@@ -629,7 +636,7 @@ def _approach_altitudes(
     """Return the altitudes of a path between two altitudes at a fraction of its slope limits, (n,) m AMSL."""
     top_altitude = max(begin_altitude, end_altitude)
     climb, dive = (partial(_scaled_slope, site, slope_factor, side, top_altitude) for side in (0, 1))
-    return fallen(spots, begin_altitude, climb, dive, end_altitude)
+    return descent_altitudes(spots, begin_altitude, climb, dive, end_altitude)
 
 
 def _scaled_slope(site: _Site, factor: float, side: int, altitude: float, course: float) -> float:

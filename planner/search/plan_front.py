@@ -165,7 +165,7 @@ def plan_front(
     if default is None:
         default = finish(plan_path(scenario, limits, seed=seed, progress=progress, stop=stop))
     path = with_waypoints(default.waypoints, waypoints or 0)
-    task = fitted_task(task, path)
+    task = fit_margins(task, path)
     first = _with_values(task, default)
     reference = reference_point(task, first)
     if not default.safe or len(path) == 2:
@@ -255,7 +255,7 @@ def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:
     )
 
 
-def fitted_task(task: FrontTask, default: Floats) -> FrontTask:
+def fit_margins(task: FrontTask, default: Floats) -> FrontTask:
     """Reduce the task's margins to those of the default path (w, 3), so that others may pass equally narrow gaps."""
     for fraction in MARGINS:
         task = task._replace(scored=_with_margins(task.problem, fraction))

@@ -19,7 +19,7 @@ from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.generations import may_try_again, path_generations, waypoint_generations
 from planner.search.infeasibility_proof import is_closed
-from planner.search.search_cheapest import search_cheapest, wanted_cost
+from planner.search.search_cheapest import objective_cost, search_cheapest
 from planner.search.search_state import (
     Archive,
     Improved,
@@ -36,7 +36,7 @@ from planner.search.seeds import (
     search_turning_back,
     shorten_best,
     starting_vectors,
-    straight_line,
+    try_straight_line,
 )
 from world.arrays import Floats
 from world.errors import ScenarioError
@@ -99,7 +99,7 @@ def plan_path(
     found_algorithm = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
     _check_options(scenario, limits.airspeed)
     problem = make_problem(scenario, limits_for(found_algorithm, limits))
-    cost = wanted_cost(scenario, limits, problem)
+    cost = objective_cost(scenario, limits, problem)
     encoding = ENCODINGS[found_algorithm.encoding](problem.space, scenario.planner.waypoints)
     # A path is never further from missile spheres than its own ends.
     end_distance = min(
@@ -145,14 +145,14 @@ def _search_repeatedly(search: Search, previous: Floats | None) -> tuple[Floats,
         try:
             _run_attempt(search, attempt, previous)
         except SearchEnded:
-            search.record()
+            search.record_history()
         result = search.best_path()
         # A later attempt replaces an earlier result only if it is better.
         if best is None or (result[1].ok, result[1].kill_distance) > (best[1].ok, best[1].kill_distance):
             best = result
         if attempt == 0 and not search.is_closed and may_turn_back(search, best[1]):
             best = search_turning_back(search, best)
-        if search.finished(best[1]) or search.is_closed or search.must_end() or not may_try_again(search):
+        if search.meets_goal(best[1]) or search.is_closed or search.must_end() or not may_try_again(search):
             break
     if best is None:  # pragma: no cover - the loop always runs
         raise ScenarioError(
@@ -212,13 +212,13 @@ def _run_attempt(search: Search, attempt: int, previous: Floats | None) -> None:
     settings = search.problem.scenario.planner
     grids, population_factor = ATTEMPTS[attempt]
     population, algorithm = settings.population * population_factor, search.algorithm
-    if algorithm.seeded and attempt == 0 and straight_line(search):
-        search.record()
-        search.report(0)
+    if algorithm.seeded and attempt == 0 and try_straight_line(search):
+        search.record_history()
+        search.report_progress(0)
         return
     starts = starting_vectors(search, grids, previous, again=attempt > 0)
     if len(search.archive.scores) and (search.first_safe_found() or search.must_end()):
-        search.record()
+        search.record_history()
         return
     if algorithm.seeded:
         # Without a safe path the first attempt has tried other sides with the margins of later attempts, too.
@@ -226,8 +226,8 @@ def _run_attempt(search: Search, attempt: int, previous: Floats | None) -> None:
             search_other_sides(search)
         if attempt == 0 and not search.has_safe() and is_closed(search.problem.certified):
             search.is_closed = True
-            search.record()
-            search.report(0)
+            search.record_history()
+            search.report_progress(0)
             return
     last_vector = None
     if algorithm.optimiser == "waypoints":
@@ -242,7 +242,7 @@ def _run_attempt(search: Search, attempt: int, previous: Floats | None) -> None:
 
 def _finish_search(search: Search, last_vector: Floats | None) -> None:
     """Shorten or tighten the best path, and the result of the generations, if any, (d,)."""
-    if search.shortens:
+    if search.can_shorten:
         if last_vector is not None:
             search.shorten(search.encoding.decode(last_vector[None])[0])
         shorten_best(search)
@@ -254,5 +254,5 @@ def _finish_search(search: Search, last_vector: Floats | None) -> None:
             if search.must_end():
                 break
             search.tighten(search.archive.vectors[0], LAST_ROUNDS, scale, LAST_SEARCH)
-    search.record()
-    search.report(0)
+    search.record_history()
+    search.report_progress(0)

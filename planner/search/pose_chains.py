@@ -1,8 +1,8 @@
 """Construct paths of a few straight legs from one place and course to another, also with laps.
 
-The legs of a path must hold its turns, and the path must gain or lose a height.  `chains` lists horizontal candidates,
-`measure` computes their lengths and checks that the legs hold the turns, and `risen` and `fallen` give the altitudes of
-the corners.
+The legs of a path must hold its turns, and the path must gain or lose a height.  `candidate_chains` lists horizontal
+candidates, `measure_path` computes their lengths and checks that the legs hold the turns, and `climb_altitudes` and
+`descent_altitudes` give the altitudes of the corners.
 """
 
 import math
@@ -45,7 +45,7 @@ LAP_SIDE = 5.5
 MAX_LAPS = 8
 
 
-def chains(
+def candidate_chains(
     begin: Spot, course: float, end: Spot, end_course: float, turn_radius: float, laps: int
 ) -> Iterator[list[Spot]]:
     """Yield lists of corners between two places: none, or one near the start and up to two before the end.
@@ -99,7 +99,7 @@ class TurnLengths(NamedTuple):
     before: tuple[float, ...]
     after: tuple[float, ...]
 
-    def of(self, turn: float) -> tuple[float, float]:
+    def lengths(self, turn: float) -> tuple[float, float]:
         """Return the lengths before and after the corner of a turn (rad), m."""
         position = min(turn / STEP, len(self.before) - 1.001)
         k = int(position)
@@ -113,14 +113,14 @@ class TurnLengths(NamedTuple):
 def arc_lengths(radius: float) -> TurnLengths:
     """Return the turn lengths of arcs of the given radius (m), which are the lengths of their tangents.
 
-    >>> [round(length) for length in arc_lengths(150.0).of(math.radians(90.0))]
+    >>> [round(length) for length in arc_lengths(150.0).lengths(math.radians(90.0))]
     [150, 150]
     """
     tangents = tuple(radius * math.tan(0.5 * STEP * k) for k in range(STEPS))
     return TurnLengths(tangents, tangents)
 
 
-class Measured(NamedTuple):
+class PathMeasures(NamedTuple):
     """Horizontal measures of a path.
 
     length: m.  cost: length plus a cost of sharp turns, as their arcs are shorter, and so steeper, than the legs.
@@ -139,12 +139,12 @@ class Measured(NamedTuple):
         return self.max_turn <= SHARPEST and self.max_fraction <= TURN_SHARE
 
 
-def measure(spots: Sequence[Spot], turn_lengths: TurnLengths) -> Measured:
+def measure_path(spots: Sequence[Spot], turn_lengths: TurnLengths) -> PathMeasures:
     """Measure a path; with plain numbers for speed, as tens of thousands of paths are measured.
 
-    >>> measure([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(150.0)).fits
+    >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(150.0)).fits
     True
-    >>> measure([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(990.0)).fits
+    >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(990.0)).fits
     False
     """
     length = max_turn = max_fraction = squared_turns = length_taken = east = north = leg_length = 0.0
@@ -152,18 +152,18 @@ def measure(spots: Sequence[Spot], turn_lengths: TurnLengths) -> Measured:
         to_east, to_north = spots[k + 1][0] - spots[k][0], spots[k + 1][1] - spots[k][1]
         to_length = math.hypot(to_east, to_north)
         if to_length < 1.0:
-            return Measured(length, math.inf, math.pi, math.inf)
+            return PathMeasures(length, math.inf, math.pi, math.inf)
         if k:
             turn = abs(math.atan2(east * to_north - north * to_east, east * to_east + north * to_north))
             max_turn, squared_turns = max(max_turn, turn), squared_turns + turn * turn
-            before, after = turn_lengths.of(turn)
+            before, after = turn_lengths.lengths(turn)
             max_fraction, length_taken = max(max_fraction, (length_taken + before) / leg_length), after
         length, east, north, leg_length = length + to_length, to_east, to_north, to_length
     max_fraction = max(max_fraction, length_taken / leg_length) if leg_length else math.inf
-    return Measured(length, length + _TURN_COST_M * squared_turns, max_turn, max_fraction)
+    return PathMeasures(length, length + _TURN_COST_M * squared_turns, max_turn, max_fraction)
 
 
-def risen(
+def climb_altitudes(
     spots: Sequence[Spot], begin_altitude: float, climb: Slope, min_altitude: float, end_altitude: float
 ) -> Floats:
     """Return the altitudes of a path that climbs as steeply as allowed, at its n places, (n,) m.
@@ -172,7 +172,7 @@ def risen(
     min_altitude: minimum altitude except at the end, m.
     end_altitude: final altitude, which is not exceeded, m; the last altitude is lower if the path is too short.
 
-    >>> risen([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 0.0, lambda course: 0.1, 20.0, 100.0).tolist()
+    >>> climb_altitudes([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 0.0, lambda course: 0.1, 20.0, 100.0).tolist()
     [20.0, 50.0, 100.0]
     """
     points = np.array(spots)
@@ -183,17 +183,19 @@ def risen(
     return altitudes
 
 
-def fallen(spots: Sequence[Spot], begin_altitude: float, climb: Slope, dive: Slope, end_altitude: float) -> Floats:
+def descent_altitudes(
+    spots: Sequence[Spot], begin_altitude: float, climb: Slope, dive: Slope, end_altitude: float
+) -> Floats:
     """Return the altitudes of a path that descends late or climbs early, at its n places, (n,) m.
 
     The first or the last altitude differs from the requested one if the path is too short.
 
-    >>> fallen([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 200.0, lambda _: 0.1, lambda _: 0.1, 50.0).tolist()
+    >>> descent_altitudes([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 200.0, lambda _: 0.1, lambda _: 0.1, 50.0).tolist()
     [200.0, 150.0, 50.0]
     """
     points = np.array(spots)
     if end_altitude > begin_altitude:
-        return risen(spots, begin_altitude, climb, begin_altitude, end_altitude)
+        return climb_altitudes(spots, begin_altitude, climb, begin_altitude, end_altitude)
     descents = [dive(course) * run for course, run in zip(leg_courses(points), leg_runs(points), strict=True)]
     reachable = end_altitude + np.concatenate([np.cumsum(descents[::-1])[::-1], [0.0]])
     return np.minimum(begin_altitude, reachable)

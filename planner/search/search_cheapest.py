@@ -54,7 +54,7 @@ SHARES = (1.0, 0.75, 0.5, 0.25, 0.1)
 _CertifiedPath = tuple[Floats, Certificate]
 
 
-def wanted_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelCost:
+def objective_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelCost:
     """Return the cost that a scenario's plan minimises. Raises ScenarioError for energy if the power is unknown."""
     objective = scenario.planner.objective or "length"
     cost = make_travel_cost(objective, limits.envelope, problem.search.aircraft)
@@ -67,7 +67,7 @@ def wanted_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelC
 def search_cheapest(search: Search, shortest: _CertifiedPath, cost: TravelCost) -> _CertifiedPath:
     """Return the cheapest path and its certificate, or the shortest path if no equally safe path costs less."""
     is_by_length = cost.time == 0.0 and cost.energy == 0.0
-    if is_by_length or not search.finished(shortest[1]):
+    if is_by_length or not search.meets_goal(shortest[1]):
         return shortest
     data = search.problem.search._replace(travel=cost)
     cheapest = shortest
@@ -128,7 +128,7 @@ def _choose_cheaper(search: Search, data: ProblemArrays, start: Floats, best: _C
         for fraction in SHARES if is_limited(data.airspace) else SHARES[:1]:
             candidate = np.ascontiguousarray(best[0] + fraction * (path - best[0]))
             certificate = certify(search.problem, candidate)
-            if search.finished(certificate) and _cost_or_inf(data, candidate) < best_cost:
+            if search.meets_goal(certificate) and _cost_or_inf(data, candidate) < best_cost:
                 if search.improved is not None:
                     search.improved(candidate)
                 return candidate, certificate

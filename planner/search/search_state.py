@@ -52,14 +52,14 @@ def no_scores() -> Floats:
     return np.empty((0, SCORE_COLUMNS))
 
 
-def violated(scores: Floats) -> Flags:
+def are_violated(scores: Floats) -> Flags:
     """Flag the scores (..., 8) of paths that violate a constraint, (...,)."""
     return np.asarray(scores[..., : len(Violation)].any(axis=-1))
 
 
-def safe(scores: Floats) -> Flags:
+def are_safe(scores: Floats) -> Flags:
     """Flag the scores (..., 8) of paths without violations and without exposure to missiles, (...,)."""
-    return np.asarray(~violated(scores) & ~(scores[..., KILL] > 0.0))
+    return np.asarray(~are_violated(scores) & ~(scores[..., KILL] > 0.0))
 
 
 def best_first(scores: Floats) -> Ints:
@@ -112,9 +112,9 @@ class Archive:
     vectors: Floats
     scores: Floats
 
-    def feasible(self) -> bool:
+    def is_feasible(self) -> bool:
         """Return True if the best path meets the constraints; False if the archive is empty."""
-        return len(self.scores) > 0 and not violated(self.scores[0])
+        return len(self.scores) > 0 and not are_violated(self.scores[0])
 
     def insert(self, vectors: Floats, scores: Floats) -> None:
         """Insert new rows in rank order; among equals, older rows stay first.
@@ -122,8 +122,8 @@ class Archive:
         Once any row is feasible, infeasible rows are dropped, because there can be thousands of them to rank. A full
         archive accepts only rows better than its last.
         """
-        is_kept = ~violated(scores)
-        if self.feasible():
+        is_kept = ~are_violated(scores)
+        if self.is_feasible():
             if len(self.scores) == ARCHIVE_SIZE:
                 last = self.scores[-1]
                 shorter = (scores[:, KILL] == last[KILL]) & (scores[:, LENGTH] < last[LENGTH])
@@ -249,7 +249,7 @@ class Search:
         old_best = self.archive.vectors[:1]
         self.archive.insert(vectors, scores)
         new_best = self.archive.vectors[:1]
-        if self.improved is None or not self.archive.feasible() or np.array_equal(old_best, new_best):
+        if self.improved is None or not self.archive.is_feasible() or np.array_equal(old_best, new_best):
             return
         ratio = self.archive.scores[0][LENGTH]
         if self.shortest is None or ratio * self._straight_length() < path_length(self.shortest[0]):
@@ -275,7 +275,7 @@ class Search:
         return self.improve(moved, max_evaluations)
 
     @property
-    def shortens(self) -> bool:
+    def can_shorten(self) -> bool:
         """True if shortening may move waypoints out of their intervals; False among zones, which shortening ignores."""
         return self.algorithm.tightened and not is_limited(self.problem.search.airspace)
 
@@ -303,7 +303,7 @@ class Search:
             if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight_length():
                 return False
             certificate = certify(self.problem, path)
-            if self.finished(certificate):
+            if self.meets_goal(certificate):
                 self.shortest = path, certificate
                 if self.improved is not None:
                     self.improved(path)
@@ -328,13 +328,13 @@ class Search:
 
     def best_is_safe(self) -> bool:
         """Return True if the archive's best path violates nothing and is exposed to no missile."""
-        return bool(safe(self.archive.scores[0]))
+        return bool(are_safe(self.archive.scores[0]))
 
     def first_safe_found(self) -> bool:
         """Return True if the search should end with the first safe path, and one is finished."""
-        if not self.first_safe or (self.shortest is None and not self.archive.feasible()):
+        if not self.first_safe or (self.shortest is None and not self.archive.is_feasible()):
             return False
-        return self.shortest is not None or self.finished(self.best_certified()[1])
+        return self.shortest is not None or self.meets_goal(self.best_certified()[1])
 
     def has_safe(self) -> bool:
         """Return True if a path is known that violates nothing and is exposed to no missile."""
@@ -351,7 +351,7 @@ class Search:
         shortest = float(path_length(self.shortest[0])) / self._straight_length()
         return min(ratio, shortest) if self.best_is_safe() else shortest
 
-    def finished(self, certificate: Certificate) -> bool:
+    def meets_goal(self, certificate: Certificate) -> bool:
         """Return True if this certificate meets the goal of the search."""
         return certificate.ok and certificate.kill_distance >= self.required_distance
 
@@ -359,7 +359,7 @@ class Search:
         budget = self.problem.scenario.planner.budget
         return math.inf if budget is None else budget
 
-    def record(self) -> None:
+    def record_history(self) -> None:
         """Append the best path to the history."""
         best = self.archive.scores[0]
         violations = best[: len(Violation)]
@@ -368,14 +368,14 @@ class Search:
         row = (self.length_ratio(), 0.0, 0.0) if has_shortened else (best[LENGTH], best[KILL], float(count))
         self.history.append(row)
 
-    def report(self, remaining_generations: int) -> None:
+    def report_progress(self, remaining_generations: int) -> None:
         """Report progress, with `remaining_generations` as the number of generations that may follow."""
         if self.progress is not None:
             best = self.archive.scores[0]
             remark = f"length ratio {self.length_ratio():.4f}, kill exposure {best[KILL]:.3g}"
             if self.shortest is not None:
                 remark = f"length ratio {self.length_ratio():.4f}, kill exposure 0"
-            is_infeasible = self.shortest is None and violated(best)
+            is_infeasible = self.shortest is None and are_violated(best)
             self.progress(
                 self.done, self.done + remaining_generations, "no feasible path yet" if is_infeasible else remark
             )
@@ -411,7 +411,9 @@ class Search:
     def best_path(self) -> tuple[Floats, Certificate]:
         """Return the shorter of the archive's certified path and the shortened path, and its certificate."""
         best = self.best_certified()
-        if self.shortest is None or (self.finished(best[1]) and path_length(best[0]) <= path_length(self.shortest[0])):
+        if self.shortest is None or (
+            self.meets_goal(best[1]) and path_length(best[0]) <= path_length(self.shortest[0])
+        ):
             return best
         return self.shortest
 

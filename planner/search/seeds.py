@@ -23,7 +23,7 @@ from planner.evaluation.encoding import (
     sample_route,
 )
 from planner.plan import Certificate
-from planner.search.search_state import Search, SearchEnded, best_first, safe, with_narrow_margins
+from planner.search.search_state import Search, SearchEnded, are_safe, best_first, with_narrow_margins
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.grids import GridRoute, grid_routes
 from planner.seeding.lattice import MAX_EXPANDED, ceiling_route, lattice_route, make_lattice, turning_step
@@ -46,16 +46,16 @@ MAX_FOLLOWED = 2
 MAX_FOLLOWED_AGAIN = 3
 
 
-def straight_line(search: Search) -> bool:
+def try_straight_line(search: Search) -> bool:
     """Return True if the straight line is a safe path, so that no shorter path exists and the search is finished."""
     if search.encoding.name != "rotated":
         return False
     vectors = search.straight_vectors()
     scores = search.score(vectors)
-    if not safe(scores[0]):
+    if not are_safe(scores[0]):
         return False
     search.evaluate(vectors)
-    return search.finished(search.best_certified()[1])
+    return search.meets_goal(search.best_certified()[1])
 
 
 def starting_vectors(
@@ -80,7 +80,7 @@ def starting_vectors(
     is_among_zones = is_limited(airspace)
     # Among zones `search_other_sides` does not apply: the first attempt follows all routes.
     max_followed = math.inf if is_among_zones else MAX_FOLLOWED
-    if search.shortens and search.algorithm.optimiser == "waypoints":
+    if search.can_shorten and search.algorithm.optimiser == "waypoints":
         max_followed = 0
     for index, route in enumerate(_list_routes(search, grids, again) if search.algorithm.seeded else ()):
         if search.must_end() or search.first_safe_found() or (index >= max_followed and search.best_is_safe()):
@@ -107,7 +107,7 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], again: bool
     frame = rotated_frame(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     candidates, scores = [], []
-    shortens_routes = search.shortens and search.algorithm.optimiser == "waypoints" and not search.first_safe
+    shortens_routes = search.can_shorten and search.algorithm.optimiser == "waypoints" and not search.first_safe
     is_among_zones = is_limited(data.airspace)
     routes = (
         airspace_routes(data, frame, span, grids, search.pause, finer_only=again)
@@ -171,7 +171,7 @@ def search_other_sides(search: Search) -> None:
     if not len(search.archive.scores):
         # A search needs a result, even if the grids have no route.
         search.evaluate(search.straight_vectors())
-    if search.shortens and search.has_safe():
+    if search.can_shorten and search.has_safe():
         shorten_best(search)
     length = search.length_ratio() if search.has_safe() else MAX_DETOUR
     if is_limited(search.problem.search.airspace) or length < 1.0 + MIN_DETOUR:
@@ -271,7 +271,7 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
     """Return True if the straight frame has no safe path, or only a long one, so that a path may have to turn back."""
     if not search.algorithm.seeded or search.encoding.name != "rotated" or search.must_end():
         return False
-    if not search.finished(certificate):
+    if not search.meets_goal(certificate):
         return True
     return search.length_ratio() > LONG_DETOUR
 
@@ -295,11 +295,11 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
         remaining_states -= expanded
         if not len(route):
             continue
-        is_safe = search.finished(best[1])
+        is_safe = search.meets_goal(best[1])
         if is_safe and path_length(route) > MAX_ROUTE_SHARE * path_length(best[0]):
             break
         path, certificate, is_shortened = _search_along(search, route)
-        if search.finished(certificate) and (not is_safe or path_length(path) < path_length(best[0])):
+        if search.meets_goal(certificate) and (not is_safe or path_length(path) < path_length(best[0])):
             return (path, certificate) if is_shortened else _follow_shortened(search, (path, certificate))
         if not is_safe and (certificate.ok, certificate.kill_distance) > (best[1].ok, best[1].kill_distance):
             best = path, certificate
@@ -308,7 +308,7 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
 
 def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
     """Return the best path along the shortened, unsafe form of `best` if it is shorter; otherwise return `best`."""
-    if not search.shortens:
+    if not search.can_shorten:
         return best
     for extra_margin in FOLLOWED_MARGINS:
         if search.must_end():
@@ -317,7 +317,7 @@ def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple
         route, evaluations = shorten_path(search.problem.search, path, extra_margin=extra_margin, corners_too=True)
         search.evaluations += evaluations
         path, certificate, _ = _search_along(search, route)
-        if search.finished(certificate) and path_length(path) < path_length(best[0]):
+        if search.meets_goal(certificate) and path_length(path) < path_length(best[0]):
             best = path, certificate
     return best
 
@@ -358,7 +358,7 @@ def _improve_along(search: Search, vector: Floats, routes: tuple[Floats, ...]) -
         if search.must_end() or search.first_safe_found():
             return
         search.tighten(search.archive.vectors[0], ROUNDS, scale, LATER_SEARCH)
-    if search.shortens:
+    if search.can_shorten:
         for route in routes:
             search.shorten(resample(route, search.encoding.waypoints))
         shorten_best(search)

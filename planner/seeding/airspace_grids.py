@@ -240,7 +240,7 @@ class AirspaceSearch(NamedTuple):
     """A search for the cheapest route over a grid, which can be continued.
 
     obstacles: `OBSTACLE` records. columns: `COLUMN` records (stages + 1, across). cells: (stages + 1, across, layers),
-    the parent of each cell, as across x layers. cost, after, price: (across, layers) of the last stage reached, and
+    the parent of each cell, as across x layers. cost, next_cost, price: (across, layers) of the last stage reached, and
     scratch. home: index across of both ends. stage: the last one reached.
     """
 
@@ -248,7 +248,7 @@ class AirspaceSearch(NamedTuple):
     columns: Records
     cells: Codes
     cost: Floats
-    after: Floats
+    next_cost: Floats
     price: Floats
     home: int
     stage: int

@@ -139,7 +139,7 @@ def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown:
 def arc_room(
     previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float, sign: float, max_slope: float
 ) -> float:
-    """Return the arc's length past the waypoint `waypoint` minus the length of its climb (sign 1) or descent (-1), m.
+    """Return the arc's length past `waypoint` minus the length of its climb (sign 1) or descent (-1), m.
 
     Slopes are those of `aircraft.path_limits.arc_slope`; max_slope: tangent of the maximum slope.
     """

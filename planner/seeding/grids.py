@@ -345,15 +345,15 @@ def prune(
 class GridSearch(NamedTuple):
     """A search for the cheapest route over a grid, which can be continued; arrays are (layers, across).
 
-    parents: (stages + 1, layers, across).  cost: costs of the last stage reached.  after: scratch.  price: cost per m,
-    scratch.  spans: `SPAN` records (layers,) of the cells with a finite cost.  stage: the last one reached.
+    parents: (stages + 1, layers, across).  cost: costs of the last stage reached.  next_cost: scratch.  price: cost per
+    m, scratch.  spans: `SPAN` records (layers,) of the cells with a finite cost.  stage: the last one reached.
     """
 
     step_layers: Records
     obstacles: Records
     parents: Codes
     cost: Floats
-    after: Floats
+    next_cost: Floats
     price: Floats
     spans: Records
     start: int

@@ -180,14 +180,14 @@ def check_ends(zones: Sequence[Zone], source: str, ends: Sequence[tuple[str, Flo
             raise ScenarioError.at(source, "zones", zone.name, f"{key} lies {side}")
 
 
-def zone_broken_at(zones: Sequence[Zone], point: Floats, ground: Terrain | None) -> Zone | None:
+def first_violated_zone(zones: Sequence[Zone], point: Floats, ground: Terrain | None) -> Zone | None:
     """Return the first zone that a position (3,) m violates, or None.
 
     Unknown ground is treated as within the band.
 
     >>> from world.airspace.zones import Cylinder
     >>> mast = Zone("mast", "exclusion", Cylinder(0.0, 0.0, 200.0), ceiling=ZoneLevel(300.0, "amsl"))
-    >>> [zone_broken_at([mast], np.array([0.0, 0.0, up]), None) is mast for up in (290.0, 310.0)]
+    >>> [first_violated_zone([mast], np.array([0.0, 0.0, up]), None) is mast for up in (290.0, 310.0)]
     [True, False]
     """
     return _first_violated(zones, zone_records(zones), point, ground)
