@@ -58,9 +58,9 @@ def _add_twice(values: np.ndarray, out: np.ndarray) -> None:
 def test_what_python_calls_inner_functions_by_is_kept_of_each() -> None:
     for kernel, product in ((_twice, 10.0), (_thrice, 15.0)):
         assert kernel(5.0) == product
-        del vars(kernel)["_around"]
+        del vars(kernel)["_wrapper"]
         assert kernel(5.0) == product
-        around: Any = vars(kernel)["_around"]
+        around: Any = vars(kernel)["_wrapper"]
         assert sum(around.stats.cache_hits.values()) == 1
 
 
