@@ -5,7 +5,7 @@ flight with take-off or landing, so that a flight in the air still loads the sam
 own.
 
 Positions and stiffness scale with span and mass, from an Aerosonde (11 kg, 2.9 m) that took off and landed in JSBSim
-under ArduPlane: a belly of 3000 N/m per skid, 0.18 m below the center of gravity at rest, friction 0.5 and 0.4.
+under ArduPlane: a belly of 3000 N/m per skid, 0.18 m below the centre of gravity at rest, friction 0.5 and 0.4.
 """
 
 import math
@@ -29,7 +29,7 @@ _KILOGRAMS_PER_UNIT = {"KG": 1.0, "LBS": 0.45359237}
 # Smallest depth of the points that a model without wheels stands on, as a ratio to the deepest point.
 _MIN_SKID_DEPTH_RATIO = 0.75
 
-# Positions relative to the center of gravity, forward, right and down, in spans. Points to the right have a twin to the
+# Positions relative to the centre of gravity, forward, right and down, in spans. Points to the right have a twin to the
 # left, so that belly and wheels have three points each.
 _BELLY_POINTS = {"belly front": (0.12, 0.025, 0.069), "belly rear": (-0.12, 0.0, 0.069)}
 # Wheels.
@@ -51,7 +51,7 @@ class Contact:
     """A point that may touch the ground.
 
     name: name in the model.
-    forward, right, down: position relative to the center of gravity, m.
+    forward, right, down: position relative to the centre of gravity, m.
     stands: True if the aircraft stands and slides on it; other points must not touch the ground at speed.
     wheel: True if it rolls.
     """
@@ -161,7 +161,7 @@ def _read_contacts(model: bytes) -> list[Contact]:
 
 
 def _center_of_gravity(model: bytes) -> Floats:
-    """Return the loaded aircraft's center of gravity, (3,) m aft, right, up.
+    """Return the loaded aircraft's centre of gravity, (3,) m aft, right, up.
 
     It is relative to the model's reference point, and includes the empty aircraft, its point masses and the initial
     contents of its tanks, as JSBSim sums them up.

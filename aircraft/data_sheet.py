@@ -488,51 +488,51 @@ def _match_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[
 # Motor and propeller that give the stated climb at cruise and the stated top speed.
 
 
-def _size_motor(stated: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[ElectricMotor, DataSheet]:
+def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[ElectricMotor, DataSheet]:
     """Size motor and propeller for a sheet, and return them with the sheet's resulting climb and top speed.
 
     A stated propeller fixes diameter and pitch, a stated motor its speed per volt; free values are chosen to meet the
     climb, and the throttle of level flight or the top speed. If motor and propeller are both stated, climb and top
     speed follow from them where the sheet states none.
     """
-    if stated.motor and stated.propeller[0]:
-        target_fields = [name for name in ("climb", "top") if getattr(stated, name)]
-        motor, result = _solve_motor(stated, sheet, drag, target_fields)
+    if stated_sheet.motor and stated_sheet.propeller[0]:
+        target_fields = [name for name in ("climb", "top") if getattr(stated_sheet, name)]
+        motor, result = _solve_motor(stated_sheet, sheet, drag, target_fields)
         if result.climb <= STEEPEST_CLIMB:
             return motor, result
         # Limit the climb of an aircraft with more thrust than that.
-        return _solve_motor(stated, replace(sheet, climb=STEEPEST_CLIMB), drag, ["climb"])
-    if (stated.climb and stated.top) or not (stated.top or stated.trim_throttle):
-        return _solve_motor(stated, sheet, drag, ["climb", "top"])
-    if stated.climb:
+        return _solve_motor(stated_sheet, replace(sheet, climb=STEEPEST_CLIMB), drag, ["climb"])
+    if (stated_sheet.climb and stated_sheet.top) or not (stated_sheet.top or stated_sheet.trim_throttle):
+        return _solve_motor(stated_sheet, sheet, drag, ["climb", "top"])
+    if stated_sheet.climb:
         with contextlib.suppress(FlightError):
-            return _solve_motor(stated, sheet, drag, ["climb", "trim_throttle"])
+            return _solve_motor(stated_sheet, sheet, drag, ["climb", "trim_throttle"])
         # The climb that an autopilot is configured with is often less than the motor gives.
-        return _solve_motor(stated, sheet, drag, ["climb", "top"])
+        return _solve_motor(stated_sheet, sheet, drag, ["climb", "top"])
     # A propeller of the usual size, and the speed per volt from the top speed or the throttle: either determines the
     # climb better than a guess.
-    unstated = replace(stated, top=0.0, trim_throttle=0.0)
+    unstated = replace(stated_sheet, top=0.0, trim_throttle=0.0)
     usual_motor, _ = _solve_motor(unstated, replace(sheet, top=USUAL_TOP * sheet.cruise), drag, ["climb", "top"])
-    propeller = stated.propeller if stated.propeller[0] else (usual_motor.propeller.diameter, 0.0)
-    target_fields = ["top"] if stated.top else ["trim_throttle"]
-    motor, result = _solve_motor(replace(stated, propeller=propeller), sheet, drag, target_fields)
+    propeller = stated_sheet.propeller if stated_sheet.propeller[0] else (usual_motor.propeller.diameter, 0.0)
+    target_fields = ["top"] if stated_sheet.top else ["trim_throttle"]
+    motor, result = _solve_motor(replace(stated_sheet, propeller=propeller), sheet, drag, target_fields)
     if result.climb <= STEEPEST_CLIMB:
         return motor, result
-    return _solve_motor(replace(stated, trim_throttle=0.0), sheet, drag, ["climb", "top"])
+    return _solve_motor(replace(stated_sheet, trim_throttle=0.0), sheet, drag, ["climb", "top"])
 
 
 def _solve_motor(
-    stated: DataSheet, sheet: DataSheet, drag: Drag, target_fields: list[str]
+    stated_sheet: DataSheet, sheet: DataSheet, drag: Drag, target_fields: list[str]
 ) -> tuple[ElectricMotor, DataSheet]:
     """Return the motor that meets these fields of the sheet, with as many free numbers.
 
     The last free number is the motor's speed per volt, or the propeller's pitch.
     """
-    volts, (diameter, pitch) = sheet.volts, stated.propeller
+    volts, (diameter, pitch) = sheet.volts, stated_sheet.propeller
     # With the Aerosonde's blade shape the ratio of pitch to diameter is the zero-thrust ratio.
     pitch_ratio = pitch / diameter / BOOK_PROPELLER.zero_thrust_ratio if pitch else 1.0
     base = BOOK_PROPELLER.scaled(diameter=diameter / BOOK_PROPELLER.diameter if diameter else 1.0, pitch=pitch_ratio)
-    emf = 60.0 / (2.0 * math.pi * stated.motor) if stated.motor else 0.0
+    emf = 60.0 / (2.0 * math.pi * stated_sheet.motor) if stated_sheet.motor else 0.0
     initial_size = 1.0 if diameter else math.sqrt(sheet.mass / 11.0)
     # Initial guess: unloaded propeller speed slightly above the speed for the top airspeed, rad/s.
     initial_speed = 1.2 * sheet.top / base.zero_thrust_ratio / (base.diameter * initial_size) * 2.0 * math.pi
@@ -571,7 +571,7 @@ def _motor_on_battery(propeller: Propeller, volts: float, emf: float, cruise: fl
     return motor
 
 
-def _size_engine(stated: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelEngine, DataSheet]:
+def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelEngine, DataSheet]:
     """Return an engine whose torque meets the climb or the top speed.
 
     If both are stated, the propeller's pitch is chosen too.
@@ -585,7 +585,7 @@ def _size_engine(stated: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelE
     )
     initial_torque = 0.12 * needed_thrust * base.diameter
     # A stated top speed determines the climb better than a guess.
-    target_fields = [name for name in ("climb", "top") if getattr(stated, name)] or ["climb"]
+    target_fields = [name for name in ("climb", "top") if getattr(stated_sheet, name)] or ["climb"]
 
     def make_engine(free: Sequence[float]) -> FuelEngine:
         torque, pitch_factor = (*free, 1.0)[:2]

@@ -72,9 +72,9 @@ class Envelope:
     def air_angles(self, airspeed: float, amsl: float) -> tuple[float, float]:
         """Return the steepest climb and descent relative to the air, rad, by bilinear interpolation.
 
-        Both are positive. NaN at an airspeed outside the table or below the slowest level flight; between that speed
-        and the slowest trim of the table the values of that trim are used. Altitudes outside the table use its nearest
-        edge.
+        Both are positive. They are NaN at an airspeed outside the table or below the slowest level flight; between that
+        speed and the slowest trim of the table the values of that trim are used. Altitudes outside the table use its
+        nearest edge.
         """
         if not airspeed >= float(np.interp(amsl, self.amsl, self.level_speed_min)):
             return math.nan, math.nan
@@ -118,11 +118,10 @@ class Envelope:
     ) -> tuple[float, float]:
         """Return the steepest climb and dive over the ground on a leg in this steady wind, rad.
 
-        Both are positive.
         tailwind, crosswind: m/s along and across the leg's course.
 
-        A tailwind flattens the slope over the ground, a headwind steepens it. NaN if the aircraft cannot make progress
-        along the leg, or where `air_angles` is NaN.
+        Both slopes are positive. A tailwind flattens the slope over the ground, a headwind steepens it. NaN if the
+        aircraft cannot make progress along the leg, or where `air_angles` is NaN.
         """
         climb, descent = self.air_angles(airspeed, amsl)
         return (

@@ -92,11 +92,11 @@ class ModelNumbers:
 
     title: title for people.
     source: source of the numbers, a sentence.
-    inertia: Jx, Jy, Jz, Jxz about the center of gravity, kg m^2; Jxz is the integral of x z dm.
+    inertia: Jx, Jy, Jz, Jxz about the centre of gravity, kg m^2; Jxz is the integral of x z dm.
     throw: travel of elevator, aileron and rudder in either direction.
     rate: rate limit of the surfaces, rad/s.
     lag: lag of surfaces and of the motor, s.
-    lift_behind: distance of the wing's forces behind the center of gravity, m.
+    lift_behind: distance of the wing's forces behind the centre of gravity, m.
     """
 
     title: str

@@ -93,8 +93,9 @@ class Limits:
     def slopes(self, course: float, amsl: float, airspeed: float | None = None) -> tuple[float, float]:
         """Return the steepest climb and dive over the ground on a course (rad) at an altitude (m), rad.
 
-        Both are positive, and 0 if the aircraft cannot make progress along the course.
         airspeed: m/s; None for the airspeed of the limits.
+
+        Both slopes are positive, and 0 if the aircraft cannot make progress along the course.
         """
         climb, dive = aircraft_slopes(self.performance(airspeed), course, amsl)
         return float(climb), float(dive)

@@ -21,7 +21,7 @@ class Propulsion(Protocol):
     """Interface of a kind of propulsion for `aircraft.model_writer`.
 
     direction: direction of the thrust in body axes.
-    place: point where it acts, m forward, right and below the center of gravity.
+    place: point where it acts, m forward, right and below the centre of gravity.
     """
 
     @property

@@ -160,17 +160,17 @@ MIN_CORRIDOR = 30.0
 CORRIDOR_RADII = 2.0
 
 
-def corridor_half_width(stated: float | None, acceptance_radius: float | None) -> float:
+def corridor_half_width(stated_half_width: float | None, acceptance_radius: float | None) -> float:
     """Return the half-width of the corridor around the legs of a path, m.
 
     It is stated by the scenario, or follows from the autopilot's acceptance radius.
-    stated: `[limits] corridor_m`, None if not stated.
+    stated_half_width: `[limits] corridor_m`, None if not stated.
     acceptance_radius: radius at which the autopilot accepts a waypoint unless the mission states another, m; None for
         guidance that flies corners as planned.
 
     >>> corridor_half_width(None, None), corridor_half_width(None, 90.0), corridor_half_width(12.0, 90.0)
     (30.0, 180.0, 12.0)
     """
-    if stated is not None:
-        return stated
+    if stated_half_width is not None:
+        return stated_half_width
     return max(MIN_CORRIDOR, CORRIDOR_RADII * (acceptance_radius or 0.0))

@@ -67,7 +67,7 @@ def flown_as(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
     """Return sink (rad), power (W) and climb (rad) at cruise for these unknowns, including nuisance parameters."""
     own = int(_IS_DRAG_PARAMETER.sum())
     resistance, idle, voltage, elevator = unknown[own + 1 : own + 5]
-    motor = base.motor.changed(resistance=1.0 + resistance, idle=1.0 + idle)
+    motor = base.motor.with_factors(resistance=1.0 + resistance, idle=1.0 + idle)
     assert isinstance(motor, ElectricMotor)
     c = base.coefficients
     changed = replace(

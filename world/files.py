@@ -124,7 +124,7 @@ def toml_table(text: str) -> dict[str, Any]:
 def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
     r"""Decode a file's bytes to text without a byte order mark.
 
-    Raise ``error`` with line and byte if not UTF-8.
+    Raises ``error``, with line and byte, if they are not UTF-8.
 
     >>> from world.errors import MissionError
     >>> utf8_text("\ufeffWind 3 m/s".encode(), Path("a.txt"), MissionError)

@@ -191,10 +191,10 @@ class PolyMap:
     def from_rows(rows: Floats, residual: float) -> "PolyMap":
         """Make a map from the rows of `to_rows`; n is at most `MAX_TERMS`."""
         size = rows.shape[1]
-        return PolyMap(_record(rows[0, :2], rows[1, :2], rows[2 : 2 + size], rows[2 + size :]), residual)
+        return PolyMap(_make_record(rows[0, :2], rows[1, :2], rows[2 : 2 + size], rows[2 + size :]), residual)
 
 
-def _record(centre: Floats, half_widths: Floats, u: Floats, v: Floats) -> PolyMapRecord:
+def _make_record(centre: Floats, half_widths: Floats, u: Floats, v: Floats) -> PolyMapRecord:
     """Make a record of `POLYMAP` with these (n, n) coefficients."""
     size = len(u)
     record = np.zeros(1, dtype=POLYMAP)[0]
@@ -242,7 +242,7 @@ def fit_polymap(
             solution = least_squares(basis, np.asarray(values, dtype=np.float64))
             for (i, j), coefficient in zip(powers, solution, strict=True):
                 block[i, j] = coefficient
-        record = _record(centre, half_widths, *blocks)
+        record = _make_record(centre, half_widths, *blocks)
         check_results = _polymap_many(
             record, centre[0] + half_widths[0] * check_u, centre[1] + half_widths[1] * check_v
         )

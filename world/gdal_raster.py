@@ -46,13 +46,13 @@ _HORIZONTAL_TAG = re.compile(r"horiz|linear|planar|xy", re.IGNORECASE)
 
 def open_geotiff(file: Path, _name: str) -> RasterFile:
     """Open a GeoTIFF in any reference system, with heights in metres.  Raises TerrainError."""
-    return _open(file, "GTiff", "not a readable GeoTIFF file")
+    return _open_raster_file(file, "GTiff", "not a readable GeoTIFF file")
 
 
 def open_hgt(file: Path, _name: str) -> RasterFile:
     """Open an SRTM tile, whose name gives its position.  Raises TerrainError."""
     expected = "a name such as N46E008.hgt and the bytes of 1201 x 1201 or 3601 x 3601 heights are expected"
-    return _open(file, "SRTMHGT", f"not a readable SRTM tile: {expected}")
+    return _open_raster_file(file, "SRTMHGT", f"not a readable SRTM tile: {expected}")
 
 
 def _open_dataset(file: Path, driver: str) -> Any:
@@ -62,7 +62,7 @@ def _open_dataset(file: Path, driver: str) -> Any:
     return rasterio.open(os.fspath(file.resolve()), driver=driver)
 
 
-def _open(file: Path, driver: str, unreadable: str) -> RasterFile:
+def _open_raster_file(file: Path, driver: str, unreadable: str) -> RasterFile:
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
@@ -91,7 +91,7 @@ def _open(file: Path, driver: str, unreadable: str) -> RasterFile:
         except (RasterioError, OSError) as error:
             raise TerrainError(f"{file}: cannot be read: {_first_error_line(error)}", file=file) from error
 
-    return _georeferenced(file, shape, grid, crs, unit, read)
+    return _make_raster_file(file, shape, grid, crs, unit, read)
 
 
 def _first_error_line(error: BaseException) -> str:
@@ -149,7 +149,9 @@ def _unit_of(unit: str, tags: Iterable[tuple[str, str]]) -> str:
     return unit
 
 
-def _georeferenced(file: Path, shape: tuple[int, int], grid: Grid, crs: str | None, unit: str, read: Any) -> RasterFile:
+def _make_raster_file(
+    file: Path, shape: tuple[int, int], grid: Grid, crs: str | None, unit: str, read: Any
+) -> RasterFile:
     """Return a raster file with its georeferencing; its heights must be in metres.  Raises TerrainError."""
     a, b, c, d, e, f = grid
     determinant = a * e - b * d

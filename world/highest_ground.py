@@ -42,21 +42,21 @@ def _fill_cells(heights: Heights, to_pixel: PolyMapRecord, west: float, south: f
             if j < columns:
                 end[0], end[1] = west + (j + 1) * cell, begin[1]
                 side_height = -segment_clearance(heights, to_pixel, begin, end)[0]
-                _raise(out, i - 1, j, side_height)
-                _raise(out, i, j, side_height)
+                _raise_cell(out, i - 1, j, side_height)
+                _raise_cell(out, i, j, side_height)
             if i < rows:
                 end[0], end[1] = begin[0], south + (i + 1) * cell
                 side_height = -segment_clearance(heights, to_pixel, begin, end)[0]
-                _raise(out, i, j - 1, side_height)
-                _raise(out, i, j, side_height)
+                _raise_cell(out, i, j - 1, side_height)
+                _raise_cell(out, i, j, side_height)
     for i in range(rows):
         for j in range(columns):
             if not math.isnan(out[i, j]):
-                _raise(out, i, j, _highest_pixel(heights, to_pixel, west + j * cell, south + i * cell, cell))
+                _raise_cell(out, i, j, _highest_pixel(heights, to_pixel, west + j * cell, south + i * cell, cell))
 
 
 @inner
-def _raise(out: Floats, i: int, j: int, height: float) -> None:
+def _raise_cell(out: Floats, i: int, j: int, height: float) -> None:
     """Raise cell (i, j) of `out` to a height if it is lower; ignore a cell outside the array, and keep NaN."""
     if 0 <= i < out.shape[0] and 0 <= j < out.shape[1] and (height > out[i, j] or math.isnan(height)):
         out[i, j] = height

@@ -97,14 +97,14 @@ def can_write(folder: Path) -> bool:
         return False
 
 
-def usable_folder(wanted: Path) -> Path | None:
-    """Return the wanted folder for compiled kernels if it can be written, or else a temporary folder.
+def usable_folder(preferred_folder: Path) -> Path | None:
+    """Return the preferred folder for compiled kernels if it can be written, or else a temporary folder.
 
     A temporary folder serves this process and its children, and is removed at exit.  Returns None if no folder can be
     written.
     """
-    if can_write(wanted):
-        return wanted
+    if can_write(preferred_folder):
+        return preferred_folder
     try:
         folder = Path(tempfile.mkdtemp(prefix="planfly-kernels-"))
     except OSError:

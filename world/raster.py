@@ -348,7 +348,7 @@ def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
 def _check_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
     """Raise TerrainError if a pixel without data contributes to a height inside the box.
 
-    per_metre: (2, 2) columns and rows per metre of the map, in the center of the box.
+    per_metre: (2, 2) columns and rows per metre of the map, in the centre of the box.
     """
     rows, cols = np.nonzero(np.isnan(terrain.heights))
     if not rows.size:

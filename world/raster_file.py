@@ -54,7 +54,7 @@ class RasterFile:
 
     @property
     def centre(self) -> GeoOrigin:
-        """The center of the tile, with a longitude in -180..180 even if the tile lies across the 180th meridian."""
+        """The centre of the tile, with a longitude in -180..180 even if the tile lies across the 180th meridian."""
         lat = (self.corners[:, 1].min() + self.corners[:, 1].max()) / 2
         lon = longitude_near(self.corners[:, 0], float(self.corners[0, 0]))
         return GeoOrigin(float(lat), float(longitude_near((lon.min() + lon.max()) / 2, 0.0)))

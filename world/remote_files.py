@@ -103,7 +103,7 @@ class RemoteFile:
 
     def _fetch_part(self, begin: int, end: int, on_bytes: OnBytes) -> None:
         headers = {"Range": f"bytes={begin}-{end - 1}"} | ({"If-Range": self.version} if self.version else {})
-        with _open(self.url, headers) as answer:
+        with _open_url(self.url, headers) as answer:
             if answer.status == 200:
                 # A server without range requests sends the whole file; so does a server whose file has changed.
                 if _content_length(answer) != self.size or _version(answer) != self.version:
@@ -151,7 +151,7 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
     answer: http.client.HTTPResponse | None = None
     for attempt in range(_MAX_ATTEMPTS):
         try:
-            with _open(url, {}, "HEAD") as answer:
+            with _open_url(url, {}, "HEAD") as answer:
                 size, version = _content_length(answer), _version(answer)
             break
         except urllib.error.HTTPError as error:
@@ -176,7 +176,7 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
     return remote
 
 
-def _open(url: str, headers: dict[str, str], method: str = "GET") -> http.client.HTTPResponse:
+def _open_url(url: str, headers: dict[str, str], method: str = "GET") -> http.client.HTTPResponse:
     request = urllib.request.Request(url, headers={"User-Agent": "planfly"} | headers, method=method)
     return _make_opener().open(request, timeout=_ANSWER_TIMEOUT_S)
 

@@ -536,13 +536,13 @@ def with_threats(
     scenario: Scenario,
     added: Sequence[tuple[float, float, float, float]],
     source: str,
-    kept: Sequence[ThreatTable] = (),
+    existing: Sequence[ThreatTable] = (),
 ) -> Scenario:
     """Return a scenario with additional threats on the ground.
 
     added: east, north, kill radius and detection radius of each, m; a radius of 0 for no missile or radar.  The ratio
     of scale to radius is the median of the scenario's threats, or a quarter for kill and a third for detection.
-    source: name of the threats in messages.  kept: tables to insert before the added threats.
+    source: name of the threats in messages.  existing: tables to insert before the added threats.
     Raises ScenarioError for a threat that is not allowed in a scenario file.
 
     >>> more = with_threats(load_scenario("tight"), [(1300.0, 90.0, 20.0, 0.0)], "--threat")
@@ -557,9 +557,9 @@ def with_threats(
     threats = scenario.threats
     kill_ratio = scale_ratio(threats.kill_radius, threats.kill_scale, 1.0 / 4.0)
     detection_ratio = scale_ratio(threats.detection_radius, threats.detection_scale, 1.0 / 3.0)
-    tables = [*scenario.spec.threats, *kept]
+    tables = [*scenario.spec.threats, *existing]
     for index, (east, north, kill, detection) in enumerate(added):
-        data: dict[str, Any] = {"name": f"pop-up {len(kept) + index + 1}", "east_m": east, "north_m": north}
+        data: dict[str, Any] = {"name": f"pop-up {len(existing) + index + 1}", "east_m": east, "north_m": north}
         if kill != 0.0:
             data |= {"kill_radius_m": kill, "kill_scale_m": kill * kill_ratio}
         if detection != 0.0:

@@ -28,7 +28,7 @@ class Clocks:
     servo_lag: float = 0.05
 
     @property
-    def behind(self) -> float:
+    def total_lag(self) -> float:
         """Total lag of the accelerometers behind the gyros, s."""
         return self.lag + self.delay
 

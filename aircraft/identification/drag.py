@@ -98,7 +98,7 @@ class ForwardForces:
     def _raw(self, unknown: Floats) -> tuple[Floats, Floats]:
         """Return both before the low-pass."""
         zero_lift, induced, thrust, speed, torque, bias, resistance, idle, voltage, elevator_drag, *tilts = unknown
-        motor = self.base.motor.changed(thrust, speed, torque, 1.0 + resistance, 1.0 + idle)
+        motor = self.base.motor.with_factors(thrust, speed, torque, 1.0 + resistance, 1.0 + idle)
         signals = self.signals
         thrust_force, current = motor.thrust_and_current(
             signals.airspeed, signals.throttle, signals.density, self.volts * (1.0 + voltage)

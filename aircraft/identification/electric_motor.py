@@ -32,7 +32,7 @@ class ElectricMotor:
     voltage: float
     windmill: float = 1.0
 
-    def changed(
+    def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> "ElectricMotor":
         """Return a motor with factors on thrust, speed per volt, torque, resistance and idle current.

@@ -40,12 +40,12 @@ class FixedParameter:
         return with_current or not self.of_current
 
 
-def _one_sd_further(value: float, relative_sd: float, min_sd: float) -> float:
+def _move_one_sd(value: float, relative_sd: float, min_sd: float) -> float:
     """Return `value` moved away from 0 by one standard deviation.
 
     relative_sd, min_sd: standard deviation as a ratio to the value, and its smallest value.
 
-    >>> _one_sd_further(-2.0, 0.5, 0.1), _one_sd_further(0.0, 0.5, 0.1)
+    >>> _move_one_sd(-2.0, 0.5, 0.1), _move_one_sd(0.0, 0.5, 0.1)
     (-3.0, 0.1)
     """
     return value + float(np.copysign(max(relative_sd * abs(value), min_sd), value))
@@ -53,7 +53,7 @@ def _one_sd_further(value: float, relative_sd: float, min_sd: float) -> float:
 
 def _change_coefficient(name: str, relative_sd: float, min_sd: float = 0.0) -> Callable[[Signals, BaseModel], Changed]:
     def change(signals: Signals, base: BaseModel) -> Changed:
-        value = _one_sd_further(getattr(base.coefficients, name), relative_sd, min_sd)
+        value = _move_one_sd(getattr(base.coefficients, name), relative_sd, min_sd)
         return signals, replace(base, coefficients=replace(base.coefficients, **{name: value}))
 
     return change
@@ -68,7 +68,7 @@ def _change_product_of_inertia(relative_sd: float, min_sd_ratio: float) -> Calla
 
     def change(signals: Signals, base: BaseModel) -> Changed:
         ixx, iyy, izz, ixz = base.inertia
-        new_ixz = _one_sd_further(ixz, relative_sd, min_sd_ratio * float(np.sqrt(ixx * izz)))
+        new_ixz = _move_one_sd(ixz, relative_sd, min_sd_ratio * float(np.sqrt(ixx * izz)))
         return signals, replace(base, inertia=(ixx, iyy, izz, new_ixz))
 
     return change

@@ -38,7 +38,7 @@ def lift_curve(base: BaseModel, values: Floats) -> tuple[float, float]:
 def motor_of(base: BaseModel, values: Floats) -> Motor:
     """Return the motor with one set of values (n,)."""
     thrust, speed, torque = (float(values[INDEX[name]]) for name in ("thrust", "motor-speed", "propeller-torque"))
-    return base.motor.changed(thrust, speed, torque)
+    return base.motor.with_factors(thrust, speed, torque)
 
 
 def voltage_of(signals: Signals, base: BaseModel) -> Floats | float:

@@ -140,5 +140,5 @@ def _thrust(
     """Return thrust, N, and battery current, A, (m,)."""
     # Arrays over the draws replace the motor's constants: its formulas accept them unchanged.
     thrust, speed, torque = (values[:, INDEX[name]] for name in ("thrust", "motor-speed", "propeller-torque"))
-    motors = base.motor.changed(thrust, speed, torque)  # type: ignore[arg-type]
+    motors = base.motor.with_factors(thrust, speed, torque)  # type: ignore[arg-type]
     return motors.thrust_and_current(np.zeros(len(values)) + airspeed, throttle, np.full(len(values), density))

@@ -34,7 +34,7 @@ class PropellerDisc:
     nominal: float
     power: float = 1.0
 
-    def changed(
+    def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> "PropellerDisc":
         """Return a disc with factors on thrust, exit speed, power for a thrust, and losses.

@@ -66,10 +66,10 @@ def _summarise_faults(faults: list[_Fault]) -> list[str]:
     """Return one line on faults of one kind, with the worst fault and the other places; no line without faults."""
     if not faults:
         return []
-    (_, where, what), *others = sorted(faults, key=lambda fault: fault[0])
+    (_, place, problem), *others = sorted(faults, key=lambda fault: fault[0])
     other_places = ", ".join(name for _, name, _ in others[:_NAMED])
     remainder = f", {len(others) - _NAMED} more" if len(others) > _NAMED else ""
-    return [f"{where}: {what}" + (f" (also {other_places}{remainder})" if others else "")]
+    return [f"{place}: {problem}" + (f" (also {other_places}{remainder})" if others else "")]
 
 
 def _turn_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
@@ -167,9 +167,9 @@ def _leg_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
     return min_margin
 
 
-def _slope_fault_text(slope: float, climb: float, dive: float, where: str = "") -> str:
+def _slope_fault_text(slope: float, climb: float, dive: float, place_text: str = "") -> str:
     verb, limit = ("climbs", climb) if slope > 0 else ("sinks", dive)
-    return f"{verb} {math.degrees(abs(slope)):.1f} deg{where}, allowed {math.degrees(limit):.1f} deg"
+    return f"{verb} {math.degrees(abs(slope)):.1f} deg{place_text}, allowed {math.degrees(limit):.1f} deg"
 
 
 def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:

@@ -26,7 +26,7 @@ from world.kernels import compiled, inner
 UP = 2
 # Half-step of the finite difference in height, m.
 HEIGHT_STEP = 2.0
-# Ground speed assumed on a leg that cannot be held, as a fraction of the airspeed, so that a search avoids it.
+# Ground speed assumed on a leg that is not flyable, as a fraction of the airspeed, so that a search avoids it.
 UNFLYABLE_SHARE = 0.01
 # Fractions of a leg for Simpson's rule.
 _SHARES = (0.0, 0.5, 1.0)
@@ -116,9 +116,9 @@ def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[f
 
 
 class LegTime(NamedTuple):
-    """Time of a leg (s) and its derivatives by the leg (s/m); D of `leg_time`.
+    """Time of a leg (s), its derivatives by the leg (s/m), and D of `leg_time`.
 
-    Also returns True if the leg can be held.
+    is_flyable: True if the aircraft can hold the leg's course in the wind.
     """
 
     seconds: float
@@ -126,7 +126,7 @@ class LegTime(NamedTuple):
     by_north: float
     by_up: float
     root: float
-    held: bool
+    is_flyable: bool
 
 
 @inner
@@ -190,7 +190,7 @@ def _at_height(travel: TravelCost, table: PerformanceTable, amsl: float) -> _Fli
 def _timed_cost(
     travel: TravelCost, table: PerformanceTable, dx: float, dy: float, dz: float, amsl: float
 ) -> tuple[float, bool]:
-    """Return the cost of the time and the energy of a leg flown at one height, and True if the leg can be held."""
+    """Return the cost of the time and the energy of a leg flown at one height, and True if the leg is flyable."""
     conditions, (wx, wy) = _at_height(travel, table, amsl), downwind(table)
     time = leg_time(dx, dy, dz, conditions.wind * wx, conditions.wind * wy, conditions.airspeed)
     cost = travel.time * time.seconds
@@ -199,19 +199,19 @@ def _timed_cost(
         cost += (
             travel.energy * time.seconds * (conditions.level + sine * (conditions.linear + conditions.square * sine))
         )
-    return cost, time.held
+    return cost, time.is_flyable
 
 
 @inner
 def leg_cost(travel: TravelCost, table: PerformanceTable, a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Return the cost of the leg a-b; inf if it cannot be held."""
+    """Return the cost of the leg a-b; inf if it is not flyable."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     total = travel.length * math.sqrt(dx * dx + dy * dy + dz * dz)
     if travel.time == 0.0 and travel.energy == 0.0:
         return total
     for k in range(3):
-        cost, held = _timed_cost(travel, table, dx, dy, dz, a[2] + _SHARES[k] * dz)
-        if not held:
+        cost, is_flyable = _timed_cost(travel, table, dx, dy, dz, a[2] + _SHARES[k] * dz)
+        if not is_flyable:
             return math.inf
         total += _WEIGHTS[k] * cost
     return total
@@ -219,7 +219,7 @@ def leg_cost(travel: TravelCost, table: PerformanceTable, a: NDArray[np.float64]
 
 @compiled
 def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> float:
-    """Return the cost of a path (w, 3) world m, the sum over its legs; inf if a leg cannot be held.
+    """Return the cost of a path (w, 3) world m, the sum over its legs; inf if a leg is not flyable.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -323,7 +323,7 @@ def _fill_time_curvature(curvature: Floats, time: LegTime, conditions: _FlightCo
     for axis in range(3):
         for other_axis in range(3):
             value = 1.0 if axis == other_axis else 0.0
-            if time.held:
+            if time.is_flyable:
                 value -= wind[axis] * gradient[other_axis] + gradient[axis] * wind[other_axis]
                 value -= speed2_difference * gradient[axis] * gradient[other_axis]
             curvature[axis, other_axis] = value / time.root

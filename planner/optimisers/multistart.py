@@ -86,7 +86,7 @@ class Gaussian:
     def draw(self, rng: np.random.Generator) -> Floats:
         """Draw a generation (population, d) in the unit box."""
         self._draws = rng.standard_normal((self.population, self.mean.size))
-        return reflected(self.mean + self.deviation * times_lower(self._draws, self._factor))
+        return reflect_into_box(self.mean + self.deviation * times_lower(self._draws, self._factor))
 
     def learn(self, points: Floats, scores: Floats, rank: Callable[[Floats], Ints], noise: Floats) -> None:
         """Take the scores (n, c) of the last generation (n, d).  noise: (n,) random numbers that break ties."""
@@ -120,7 +120,7 @@ class Gaussian:
         self._generations += 1
         steps = times_lower(draws, self._factor)
         draw, step = (self.weights[:, None] * draws).sum(axis=0), (self.weights[:, None] * steps).sum(axis=0)
-        self.mean = reflected(self.mean + self.deviation * step)
+        self.mean = reflect_into_box(self.mean + self.deviation * step)
         rate = self._step_rate
         self._step_path = (1.0 - rate) * self._step_path + math.sqrt(rate * (2.0 - rate) * self._effective) * draw
         length = math.sqrt(float((self._step_path**2).sum()))
@@ -266,7 +266,7 @@ class Multistart(BoxSearch):
         return search
 
 
-def reflected(points: Floats) -> Floats:
+def reflect_into_box(points: Floats) -> Floats:
     """Return points (n, d) or (d,) reflected into the unit box at its sides."""
     folded = np.mod(points, 2.0)
     return np.where(folded > 1.0, 2.0 - folded, folded)

@@ -169,14 +169,14 @@ class _Site:
     def slopes(self, course: float, amsl: float) -> tuple[float, float]:
         """Return the climb and dive slopes (m per m) for a course (rad) at an altitude (m AMSL)."""
         certified = aircraft_slopes(self.problem.certified.aircraft, course, amsl)
-        stated = (self.limits.max_climb, self.limits.max_dive)
+        stated_limits = (self.limits.max_climb, self.limits.max_dive)
         slopes = []
-        for aircraft_slope, certified_slope, stated_slope in zip(
-            self.limits.slopes(course, amsl), certified, stated, strict=True
+        for aircraft_slope, certified_slope, stated_limit in zip(
+            self.limits.slopes(course, amsl), certified, stated_limits, strict=True
         ):
             slope = min(SHARE * math.tan(aircraft_slope), math.tan(max(0.0, certified_slope - 1.1 * ANGLE_MARGIN)))
             slopes.append(
-                slope if stated_slope is None else min(slope, math.tan(max(0.0, stated_slope - 1.1 * ANGLE_MARGIN)))
+                slope if stated_limit is None else min(slope, math.tan(max(0.0, stated_limit - 1.1 * ANGLE_MARGIN)))
             )
         return slopes[0], slopes[1]
 

@@ -216,7 +216,7 @@ def _run_attempt(search: Search, attempt: int, previous: Floats | None) -> None:
         search.record_history()
         search.report_progress(0)
         return
-    starts = starting_vectors(search, grids, previous, again=attempt > 0)
+    starts = starting_vectors(search, grids, previous, is_retry=attempt > 0)
     if len(search.archive.scores) and (search.first_safe_found() or search.must_end()):
         search.record_history()
         return

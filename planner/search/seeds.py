@@ -59,13 +59,13 @@ def try_straight_line(search: Search) -> bool:
 
 
 def starting_vectors(
-    search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None, *, again: bool = False
+    search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None, *, is_retry: bool = False
 ) -> Floats:
     """Return the start vectors of a search, (n, d): the seed that is best after improvement, and the previous path.
 
     The marginals of several routes at once describe none of them, so only one seed is used. It is used in its form
     before the improvement: afterwards it is so close to every limit that hardly any sample around it is feasible.
-    again: True if an earlier attempt has failed; then, among zones, grids that are no finer than another grid are
+    is_retry: True if an earlier attempt has failed; then, among zones, grids that are no finer than another grid are
     skipped, and only the best routes are followed.
     """
     encoding, space, waypoints = search.encoding, search.problem.space, search.encoding.waypoints
@@ -82,10 +82,10 @@ def starting_vectors(
     max_followed = math.inf if is_among_zones else MAX_FOLLOWED
     if search.can_shorten and search.algorithm.optimiser == "waypoints":
         max_followed = 0
-    for index, route in enumerate(_list_routes(search, grids, again) if search.algorithm.seeded else ()):
+    for index, route in enumerate(_list_routes(search, grids, is_retry) if search.algorithm.seeded else ()):
         if search.must_end() or search.first_safe_found() or (index >= max_followed and search.best_is_safe()):
             break
-        if is_among_zones and again and index >= MAX_FOLLOWED_AGAIN:
+        if is_among_zones and is_retry and index >= MAX_FOLLOWED_AGAIN:
             break
         path = fit_waypoints(search.problem.search, frame, route.points, waypoints)
         starts.append(rotated_vectors(space, encoding, path[None])[0])
@@ -96,10 +96,10 @@ def starting_vectors(
     return np.array([starts[order[0]], *previous_vectors])
 
 
-def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], again: bool) -> list[GridRoute]:
+def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: bool) -> list[GridRoute]:
     """Return the routes of the grids, ordered by their quickly fitted paths, best first.
 
-    Each fitted path is archived as soon as it is found. again: as in `starting_vectors`.
+    Each fitted path is archived as soon as it is found. is_retry: as in `starting_vectors`.
     """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     if search.progress is not None:
@@ -110,7 +110,7 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], again: bool
     shortens_routes = search.can_shorten and search.algorithm.optimiser == "waypoints" and not search.first_safe
     is_among_zones = is_limited(data.airspace)
     routes = (
-        airspace_routes(data, frame, span, grids, search.pause, finer_only=again)
+        airspace_routes(data, frame, span, grids, search.pause, finer_only=is_retry)
         if is_among_zones
         else grid_routes(data, frame, span, grids, search.pause)
     )

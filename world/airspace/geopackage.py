@@ -40,10 +40,10 @@ def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str
                 names = [entry[0] for entry in cursor.description]
                 code = _crs_code(database, system)
                 for number, row in enumerate(cursor, 1):
-                    where = f"{table} row {number}"
+                    location = f"{table} row {number}"
                     columns = dict(zip(names, row, strict=True))
-                    shape = _shape(columns.pop(column, None), code, f"{source}: {where}")
-                    yield where, {"type": "Feature", "properties": _plain_columns(columns), "geometry": shape}
+                    shape = _read_shape(columns.pop(column, None), code, f"{source}: {location}")
+                    yield location, {"type": "Feature", "properties": _plain_columns(columns), "geometry": shape}
     except sqlite3.Error as error:
         raise ScenarioError(f"{source}: cannot be read as a GeoPackage: {error}", file=source) from error
 
@@ -68,7 +68,7 @@ def _plain_columns(columns: dict[str, Any]) -> dict[str, Any]:
     return plain if name is None else plain | {"name": str(name)}
 
 
-def _shape(blob: Any, code: str, source: str) -> dict[str, Any]:
+def _read_shape(blob: Any, code: str, source: str) -> dict[str, Any]:
     allowed = "a polygon, a multipolygon or a point is expected"
     try:
         if blob[:2] != b"GP":

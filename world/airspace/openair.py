@@ -77,27 +77,30 @@ def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] 
     block: _Block | None = None
     for number, raw_line in enumerate(text.splitlines(), 1):
         line = _clean_line(raw_line)
-        word, _, rest = line.partition(" ")
-        word, rest = word.upper(), rest.strip()
-        if word == "AC":
+        command, _, argument_text = line.partition(" ")
+        command, argument_text = command.upper(), argument_text.strip()
+        if command == "AC":
             if block is not None:
                 yield _finish_block(block, source)
-            block = _Block(number, rest.upper())
-        elif word in _COMMANDS:
+            block = _Block(number, argument_text.upper())
+        elif command in _COMMANDS:
             if block is None:
                 raise ScenarioError(
-                    f"{source}: line {number}: {word}: no airspace has begun: an AC is missing before it", file=source
+                    f"{source}: line {number}: {command}: no airspace has begun: an AC is missing before it",
+                    file=source,
                 )
             try:
-                _COMMANDS[word](block, rest)
+                _COMMANDS[command](block, argument_text)
             except ValueError as error:
                 allowed = str(error)
-                message = f"{source}: line {number}: {word} {rest[:40]!r}: {allowed}"
-                raise ScenarioError(message, file=source, field=word, value=rest, allowed=allowed) from error
-        elif word.startswith("D"):
+                message = f"{source}: line {number}: {command} {argument_text[:40]!r}: {allowed}"
+                raise ScenarioError(
+                    message, file=source, field=command, value=argument_text, allowed=allowed
+                ) from error
+        elif command.startswith("D"):
             shape_commands = ", ".join(name for name in _COMMANDS if name.startswith("D"))
-            message = f"{source}: line {number}: {word[:10]!r}: unknown; shapes are {shape_commands}"
-            raise ScenarioError(message, file=source, field=word, allowed=shape_commands)
+            message = f"{source}: line {number}: {command[:10]!r}: unknown; shapes are {shape_commands}"
+            raise ScenarioError(message, file=source, field=command, allowed=shape_commands)
     if block is not None:
         yield _finish_block(block, source)
 
@@ -115,25 +118,25 @@ def _clean_line(line: str) -> str:
 
 def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
     name = "".join(character for character in block.name if character.isprintable())[:80]
-    where = f"line {block.line}" + (f" ({name})" if name else "")
+    location = f"line {block.line}" + (f" ({name})" if name else "")
     label = ", ".join(part for part in (block.airspace_class, block.kind) if part)
     if block.airspace_class in _FREE_CLASSES and block.kind in _FREE_TYPES:
-        return where, f"class {label}, open to all"
+        return location, f"class {label}, open to all"
     entries: dict[str, Any] = {"name": f"{name or f'line {block.line}'} ({label})"[:100]}
-    entries |= published_entries(block.limits, f"{source}: {where}")
+    entries |= published_entries(block.limits, f"{source}: {location}")
     if block.times:
         entries["times"] = block.times
     shapes = [bool(block.corners), bool(block.airway), block.circle is not None]
     if not any((*shapes, block.name, block.limits)):
-        return where, "without name, limits and shape"
+        return location, "without name, limits and shape"
     if sum(shapes) != 1:
         allowed = "one shape is expected: corners and arcs, a circle, or an airway"
-        raise ScenarioError(f"{source}: {where}: {allowed}", file=source, allowed=allowed)
+        raise ScenarioError(f"{source}: {location}: {allowed}", file=source, allowed=allowed)
     if block.circle is not None:
         (lat, lon), radius = block.circle
-        return where, entries | {"lat_deg": lat, "lon_deg": lon, "radius_m": radius}
-    rings = [block.corners] if block.corners else _airway_rings(block, f"{source}: {where}")
-    return where, entries | {"rings_deg": [[list(corner) for corner in ring] for ring in rings]}
+        return location, entries | {"lat_deg": lat, "lon_deg": lon, "radius_m": radius}
+    rings = [block.corners] if block.corners else _airway_rings(block, f"{source}: {location}")
+    return location, entries | {"rings_deg": [[list(corner) for corner in ring] for ring in rings]}
 
 
 def _airway_rings(block: _Block, source: str) -> list[list[_Place]]:
@@ -217,7 +220,8 @@ def _read_arc_by_bearings(block: _Block, text: str) -> None:
         raise ValueError("radius, first and last bearing are expected: 5, 270, 290")
     radius, first_bearing, last_bearing = _parse_length(parts[0]), _parse_number(parts[1]), _parse_number(parts[2])
     _add_corners(
-        block.corners, _arc(_required_centre(block), (radius, radius), first_bearing, last_bearing, block.clockwise)
+        block.corners,
+        _arc_places(_required_centre(block), (radius, radius), first_bearing, last_bearing, block.clockwise),
     )
 
 
@@ -226,9 +230,11 @@ def _read_arc_by_points(block: _Block, text: str) -> None:
     if len(ends) != 2:
         raise ValueError("two points are expected: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
     centre = _required_centre(block)
-    (first_bearing, first_radius), (last_bearing, last_radius) = (_polar(centre, place) for place in ends)
+    (first_bearing, first_radius), (last_bearing, last_radius) = (
+        _bearing_and_distance(centre, place) for place in ends
+    )
     # The end points are kept as stated, even if they do not agree with the centre.
-    arc = _arc(centre, (first_radius, last_radius), first_bearing, last_bearing, block.clockwise)
+    arc = _arc_places(centre, (first_radius, last_radius), first_bearing, last_bearing, block.clockwise)
     _add_corners(block.corners, [ends[0], *arc[1:-1], ends[1]])
 
 
@@ -312,13 +318,13 @@ def _required_centre(block: _Block) -> _Place:
     return block.centre
 
 
-def _polar(centre: _Place, place: _Place) -> tuple[float, float]:
+def _bearing_and_distance(centre: _Place, place: _Place) -> tuple[float, float]:
     """Return the bearing, degrees, and distance, m, of a place from a centre."""
     east, north = to_map(GeoOrigin(*centre), *place)
     return math.degrees(math.atan2(east, north)), math.hypot(east, north)
 
 
-def _arc(
+def _arc_places(
     centre: _Place, radii: Sequence[float], first_bearing: float, last_bearing: float, clockwise: bool
 ) -> list[_Place]:
     """Return places along an arc, including its ends.

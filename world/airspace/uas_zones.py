@@ -64,19 +64,21 @@ def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
     """
     key = "features" if "features" in data else "UASZoneList"
     for k, feature in enumerate(_features(data)):
-        where = f"{key}[{k}]"
+        location = f"{key}[{k}]"
         volumes = feature.get("geometry") if isinstance(feature, dict) else None
         if not isinstance(volumes, list) or not volumes:
-            raise _value_error(source, where, "geometry", "a list of volumes is expected")
+            raise _value_error(source, location, "geometry", "a list of volumes is expected")
         name = _one_line_name(feature.get("name")) or _one_line_name(feature.get("identifier")) or f"zone {k + 1}"
-        where += f" ({name})"
+        location += f" ({name})"
         if (restriction := _upper_word(feature.get("restriction"))) == _NO_RESTRICTION:
-            yield where, restriction
+            yield location, restriction
             continue
-        time_entries = {"times": times} if (times := _times(feature.get("applicability"), f"{source}: {where}")) else {}
+        time_entries = (
+            {"times": times} if (times := _times(feature.get("applicability"), f"{source}: {location}")) else {}
+        )
         for number, volume in enumerate(volumes, 1):
             label = f"{name} {number}/{len(volumes)}" if len(volumes) > 1 else name
-            yield where, {**_ed269_volume(volume, f"{source}: {where}"), "name": label, **time_entries}
+            yield location, {**_ed269_volume(volume, f"{source}: {location}"), "name": label, **time_entries}
 
 
 def _features(data: Mapping[str, Any]) -> Any:
@@ -103,30 +105,30 @@ def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
     raise _value_error(source, "", "horizontalProjection.type", "allowed Polygon, Circle")
 
 
-def ed318_zones(feature: Mapping[str, Any], where: str, index: int, source: str) -> Iterator[_FoundZone]:
+def ed318_zones(feature: Mapping[str, Any], location: str, index: int, source: str) -> Iterator[_FoundZone]:
     """Yield the entries of each layer of an ED-318 feature, in the form of `ed269_zones`.
 
-    where: place of the feature in the file, for messages.  index: index of the feature, from 0.
+    location: place of the feature in the file, for messages.  index: index of the feature, from 0.
     """
     properties = _zone_properties(feature["properties"])
     name = _one_line_name(properties.get("name")) or _one_line_name(properties.get("identifier")) or f"zone {index + 1}"
-    where = f"{where} ({name})"
+    location = f"{location} ({name})"
     if (restriction := _upper_word(properties["type"])) == _NO_RESTRICTION:
-        yield where, restriction
+        yield location, restriction
         return
     applicability = properties.get("limitedApplicability")
     if applicability is None and any(properties.get(key) for key in _PERIOD_KEYS):
         applicability = [{**properties, "schedule": [properties]}]
-    times = _times(applicability, f"{source}: {where}")
+    times = _times(applicability, f"{source}: {location}")
     time_entries = {"times": times} if times else {}
     vertical_layer = properties.get("verticalLayer")
     geometries = list(_geometries(feature.get("geometry")))
     for k, geometry in enumerate(geometries, 1):
         label = f"{name} {k}/{len(geometries)}" if len(geometries) > 1 else name
         for entries in _ed318_layer(
-            geometry, vertical_layer if isinstance(vertical_layer, dict) else properties, f"{source}: {where}"
+            geometry, vertical_layer if isinstance(vertical_layer, dict) else properties, f"{source}: {location}"
         ):
-            yield where, {**entries, "name": label, **time_entries}
+            yield location, {**entries, "name": label, **time_entries}
 
 
 def _geometries(geometry: Any) -> Iterator[Any]:
@@ -299,6 +301,6 @@ def _minute_of_day(value: Any, *, rounds_up: bool = False) -> int | None:
     return time.hour * 60 + time.minute + bool(has_fraction) - int(offset.total_seconds() // 60)
 
 
-def _value_error(source: str, where: str, field: str, allowed: str) -> ScenarioError:
-    label = f"{source}: {where}" if where else source
+def _value_error(source: str, location: str, field: str, allowed: str) -> ScenarioError:
+    label = f"{source}: {location}" if location else source
     return ScenarioError(f"{label}: {field}: {allowed}", file=source, field=field, allowed=allowed)

@@ -59,11 +59,11 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
         features_by_place = [("feature", data)]
     else:
         features_by_place = [("geometry", {"type": "Feature", "geometry": data})]
-    for k, (where, feature) in enumerate(features_by_place):
+    for k, (location, feature) in enumerate(features_by_place):
         if is_ed318(feature):
-            yield from ed318_zones(feature, where, k, source)
+            yield from ed318_zones(feature, location, k, source)
         else:
-            yield _geojson_zone(feature, where, k, source)
+            yield _geojson_zone(feature, location, k, source)
 
 
 def _reject_constant(name: str) -> float:
@@ -83,16 +83,16 @@ def _check_crs(data: dict[str, Any], source: str) -> None:
         )
 
 
-def _geojson_zone(feature: Any, where: str, index: int, source: str) -> tuple[str, dict[str, Any]]:
+def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple[str, dict[str, Any]]:
     if not isinstance(feature, dict) or feature.get("type") != "Feature":
-        raise ScenarioError(f"{source}: {where}: a Feature is expected", file=source, field=where)
+        raise ScenarioError(f"{source}: {location}: a Feature is expected", file=source, field=location)
     properties, geometry = feature.get("properties"), feature.get("geometry")
     properties = properties if isinstance(properties, dict) else {}
     name = properties.get("name") or f"zone {index + 1}"
     if isinstance(name, str):
         # Latvia's file has a tab before a name.
         name = " ".join(name.split())
-    label = f"{where} ({name})" if isinstance(name, str) and name.isprintable() else where
+    label = f"{location} ({name})" if isinstance(name, str) and name.isprintable() else location
     geometry = geometry if isinstance(geometry, dict) else {}
     kind = geometry.get("type")
     coordinates: Any = geometry.get("coordinates")
@@ -246,14 +246,14 @@ def _positions(element: _Element, source: str) -> list[tuple[float, float, float
     for coordinates in _descendants(element, "coordinates"):
         for position in (coordinates.text or "").split():
             try:
-                lon, lat, *rest = (float(part) for part in position.split(","))
+                lon, lat, *altitudes = (float(part) for part in position.split(","))
             except ValueError as error:
                 allowed = "lon,lat or lon,lat,up is expected"
                 message = f"{source}: coordinates {position[:40]!r}: {allowed}"
                 raise ScenarioError(
                     message, file=source, field="coordinates", value=position, allowed=allowed
                 ) from error
-            out.append((lon, lat, rest[0] if rest else 0.0))
+            out.append((lon, lat, altitudes[0] if altitudes else 0.0))
     return out
 
 
@@ -360,7 +360,7 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
     file_zones, unrestricted = FileZones(), Counter[str]()
     repaired_names: dict[str, list[str]] = {_SELF_CROSSING: [], _SWAPPED: [], _NO_BAND: [], _EMPTY: []}
     corners = crossings = 0
-    for where, entries in _read_format(path, suffix, source):
+    for location, entries in _read_format(path, suffix, source):
         if isinstance(entries, str):
             unrestricted[entries] += 1
             continue
@@ -371,15 +371,15 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
         if corners > MAX_FILE_CORNERS:
             allowed = f"at most {MAX_FILE_CORNERS:,}"
             raise ScenarioError(f"{source}: too many corners: {allowed}", file=source, allowed=allowed)
-        outline_notes, crossing_count = _repair_outline(entries, MAX_CROSSINGS - crossings, f"{source}: {where}")
+        outline_notes, crossing_count = _repair_outline(entries, MAX_CROSSINGS - crossings, f"{source}: {location}")
         crossings += crossing_count
         for note in outline_notes:
             repaired_names[note].append(str(entries["name"]))
         if _EMPTY in outline_notes:
             continue
         if entries.get("rings_deg") == []:
-            raise ScenarioError(f"{source}: {where}: its outline encloses no area", file=source, field="rings_deg")
-        file_zones.zones.append(_zone_table(entries, f"{source}: {where}"))
+            raise ScenarioError(f"{source}: {location}: its outline encloses no area", file=source, field="rings_deg")
+        file_zones.zones.append(_zone_table(entries, f"{source}: {location}"))
     if not file_zones.zones and not unrestricted and not repaired_names[_EMPTY]:
         raise ScenarioError(f"{source}: there is no zone in it", file=source)
     for reason, count in unrestricted.items():
@@ -415,8 +415,8 @@ def _read_format(path: Path, suffix: str, source: str) -> Iterator[Found]:
     """Yield the zones of a file in the format of its suffix."""
     if suffix == GEOPACKAGE:
         _check_size(path, source)
-        for k, (where, feature) in enumerate(geopackage_features(path, source)):
-            yield _geojson_zone(feature, where, k, source)
+        for k, (location, feature) in enumerate(geopackage_features(path, source)):
+            yield _geojson_zone(feature, location, k, source)
         return
     yield from FORMATS[suffix](_read_text(path, source, openair=FORMATS[suffix] is openair_zones), source)
 

@@ -64,22 +64,22 @@ def parse_period(text: str) -> Period | None:
     if text.upper() == BY_NOTAM:
         return None
     allowed = 'allowed "START/END [DAYS] [HH:MM/HH:MM]" in UTC, .. for an open end, or "BY NOTAM"'
-    span, *rest = text.split()
+    span, *fields = text.split()
     ends = span.split("/")
-    if len(ends) != 2 or len(rest) > 2:
+    if len(ends) != 2 or len(fields) > 2:
         raise ValueError(f"{text[:60]!r}: {allowed}")
     try:
         start, end = (None if end_text == OPEN else _parse_part(end_text) for end_text in ends)
         days: frozenset[int] = frozenset()
-        if rest and ":" not in rest[0]:
-            days = frozenset(WEEKDAYS.index(day) for day in rest.pop(0).upper().split(","))
+        if fields and ":" not in fields[0]:
+            days = frozenset(WEEKDAYS.index(day) for day in fields.pop(0).upper().split(","))
         first = last = None
-        if rest:
-            hours = _HOURS.fullmatch(rest.pop(0))
+        if fields:
+            hours = _HOURS.fullmatch(fields.pop(0))
             if hours is None:
                 raise ValueError
             first, last = (int(hours[k]) * 60 + int(hours[k + 1]) for k in (1, 3))
-        if rest or max(first or 0, last or 0) > 24 * 60:
+        if fields or max(first or 0, last or 0) > 24 * 60:
             raise ValueError
     except ValueError:
         raise ValueError(f"{text[:60]!r}: {allowed}") from None

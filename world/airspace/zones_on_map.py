@@ -81,7 +81,7 @@ def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, grou
     for k, table in enumerate(tables):
         label = f"{source}: zones[{k}] ({table.name})"
         try:
-            shape = _shape(table, origin)
+            shape = _make_shape(table, origin)
             corners = add_corners(corners, shape)
         except ValueError as error:
             raise ScenarioError(f"{label}: {error}", file=source, field=f"zones[{k}]") from error
@@ -147,7 +147,7 @@ def _is_near(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
     )
 
 
-def _shape(table: ZoneTable, origin: GeoOrigin) -> Polygon | Cylinder:
+def _make_shape(table: ZoneTable, origin: GeoOrigin) -> Polygon | Cylinder:
     if table.radius_m is not None:
         east, north = table.east_m, table.north_m
         if east is None or north is None:
@@ -260,7 +260,7 @@ def _ring_area(ring: Floats) -> float:
 def level_heights(level: ZoneLevel | None, ground: Floats, default: float) -> Floats:
     """Return the altitudes (n,) of a floor or a ceiling over ground (n,), m AMSL.
 
-    `default` if the level is None.
+    default: altitude if the level is None, m AMSL.
 
     >>> level_heights(ZoneLevel(120.0, "ground"), np.array([10.0, 30.0]), 0.0).tolist()
     [130.0, 150.0]

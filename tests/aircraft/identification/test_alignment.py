@@ -14,7 +14,7 @@ from tests.instrumented_flights import drawn_sensors
 def test_accelerometers_are_found_to_be_as_late_as_they_were_made() -> None:
     sensors = drawn_sensors(3)
     (clock, *_) = flown_truth().estimate.clocks
-    assert clock.behind == pytest.approx(sensors.lag + sensors.delay, abs=0.012)
+    assert clock.total_lag == pytest.approx(sensors.lag + sensors.delay, abs=0.012)
     # The servo's own lag, and what the pulses wait at 25 Hz before they are seen.
     assert 0.04 < clock.servo_lag < 0.09
 

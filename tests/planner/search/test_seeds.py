@@ -121,7 +121,7 @@ def test_among_zones_a_later_attempt_follows_the_best_routes_alone(
             "improve",
             lambda self, *_, improved=improved: improved.append(0) or self.evaluate(straight(self))[0],
         )
-        starting_vectors(search, GRIDS, None, again=again)
+        starting_vectors(search, GRIDS, None, is_retry=again)
         followed.append(len(improved))
     assert followed == [7, 3]
 
