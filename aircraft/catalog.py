@@ -312,7 +312,7 @@ def make_own_folder(
 def write_own_folder(target: Path, files: Mapping[str, bytes]) -> None:
     """Write the files of an aircraft into a folder, completely or not at all.
 
-    In a folder that exists they replace the aircraft's files; files of other kinds stay.
+    In an existing folder the aircraft's files are replaced; files of other kinds stay.
     """
     other_files = [file.name for file in target.iterdir() if file.suffix not in _SUFFIXES] if target.exists() else []
     new_names = {name.split("/")[0] for name in files}

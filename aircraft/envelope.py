@@ -120,8 +120,8 @@ class Envelope:
 
         tailwind, crosswind: m/s along and across the leg's course.
 
-        Both slopes are positive. A tailwind flattens the slope over the ground, a headwind steepens it. NaN if the
-        aircraft cannot make progress along the leg, or where `air_angles` is NaN.
+        Both slopes are positive. A tailwind flattens the slope over the ground, a headwind steepens it. Both are
+        NaN if the aircraft cannot make progress along the leg, and where `air_angles` is NaN.
         """
         climb, descent = self.air_angles(airspeed, amsl)
         return (
@@ -134,8 +134,8 @@ class Envelope:
 
         air_angle: angle relative to the air, rad, positive in a climb.
 
-        Interpolated by the parabola through idle, level and full throttle, and constant beyond them. NaN if power is
-        unknown or the airspeed is outside the table.
+        It follows the parabola through idle, level flight and full throttle, and is constant beyond idle and full
+        throttle. It is NaN if power is unknown or the airspeed is outside the table.
         """
         if not self.power_level.size:
             return math.nan
@@ -165,7 +165,7 @@ class Envelope:
 def ground_slope(air_angle: float, airspeed: float, tailwind: float, crosswind: float) -> float:
     """Return the path angle over the ground of a steady climb at ``air_angle`` to the air, rad.
 
-    NaN without progress.
+    It is NaN if the aircraft cannot make progress over the ground.
     """
     speed_over_ground = ground_speed(airspeed * math.cos(air_angle), tailwind, crosswind)
     return math.atan2(airspeed * math.sin(air_angle), speed_over_ground)

@@ -121,7 +121,7 @@ class Limits:
     def climb_rates(self, waypoints: Floats) -> Floats:
         """Return the rate of climb (legs, 2) of each leg of a path (w, 3) at its start and at its end, m/s.
 
-        Negative in a descent; NaN if the wind does not let the aircraft hold the leg.
+        The rate is negative in a descent, and NaN if the wind does not let the aircraft hold the leg.
         """
         legs, table = zip(leg_courses(waypoints), leg_slopes(waypoints), strict=True), self.performance()
         return np.array(
@@ -336,7 +336,8 @@ def corner_tangent(
 ) -> tuple[float, float]:
     """Return the tangent length of the fly-by arc between the unit courses u and v, and its radius, m.
 
-    R tan(theta/2) = R |sin| / (1 + cos); 0 without a turn, inf for a U-turn. w: `downwind`.
+    The tangent length R tan(theta/2) = R |sin theta| / (1 + cos theta) is 0 without a turn and inf for a U-turn.
+    w: `downwind`.
     """
     cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
     if abs(cross) < 1e-9 and dot > 0.0:
@@ -368,8 +369,8 @@ def fly_over_run(turn: float) -> float:
 
     turn: rad.
 
-    With overshoot angle phi, cos phi = (1 + cos turn)/2, the distance is sin turn + 2 sin phi; beyond its maximum the
-    maximum is returned, so that it never decreases with the angle.
+    The distance is sin turn + 2 sin phi, with the overshoot angle phi given by cos phi = (1 + cos turn)/2. For turns
+    beyond its maximum the maximum is returned, so that the result never decreases with the turn.
     """
     # The maximum of sin turn + 2 sin phi is 2 sqrt 2, at this angle.
     angle = min(turn, math.acos(-1.0 / 3.0))
@@ -381,7 +382,9 @@ def fly_over_run(turn: float) -> float:
 def turn_tangents(table: PerformanceTable, waypoints: Floats) -> Floats:
     """Return the tangent length of the fly-by arc at each waypoint, (w,) m; 0 at the ends.
 
-    waypoints: (w, 3). R tan(theta/2); inf for a U-turn, which has no tangent point.
+    waypoints: (w, 3).
+
+    The length is R tan(theta/2), and inf for a U-turn, which has no tangent point.
     """
     count = waypoints.shape[0]
     tangents = np.zeros(count)
@@ -412,7 +415,9 @@ def roll_reversal_length(
 
     radius_in, radius_out: radii of the two arcs, m.
 
-    u: the leg's unit course. w: `downwind`. 0 if the aircraft cannot make progress along the leg.
+    u: the leg's unit course. w: `downwind`.
+
+    The length is 0 if the aircraft cannot make progress along the leg.
     """
     wind = wind_speed_at(table, amsl)
     airspeed = true_airspeed(table, amsl)

@@ -48,7 +48,7 @@ class Launch:
     """Launch of the aircraft at home.
 
     method: "catapult", "hand" or "runway".
-    course: rad clockwise from north; None for along the mission's first leg.
+    course: rad clockwise from north; None for the course of the mission's first leg.
     speed: ground speed at the end of the launch, m/s; None for the method's default, see `release_speed`.
     length: length of the rail, the throw or the runway, m; None for the method's default, see `run`.
     incline: angle of the launch above level, rad.
@@ -99,7 +99,7 @@ class LandingStrip:
     """Landing strip of a mission.
 
     east, north: landing point, the centre of the strip, m on the map.
-    course: landing course, rad clockwise from north; None for into the wind, see `landing_course`.
+    course: landing course, rad clockwise from north; None for a landing into the wind, see `landing_course`.
     length, width: size of the ground that is suitable for landing, m.
     approach: length of the straight final before the landing point, m.
     slope: glide slope of the final, rad below level.
@@ -132,7 +132,7 @@ class LandingStrip:
 def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[float, float]:
     """Return the ground slope of a strip along a landing course (rad) and across it to the right, m per m.
 
-    Each is the mean slope between the two ends; NaN if the ground height at an end is not known.
+    Each is the mean slope between the two ends, or NaN if the ground height at an end is not known.
     """
     slopes = []
     for heading, length in ((course, strip.length), (course + 0.5 * math.pi, max(_MIN_MEASURED_WIDTH_M, strip.width))):

@@ -12,7 +12,7 @@ _callbacks: list[BeforeCompiling] = []
 def tell_before_compiling(callback: BeforeCompiling) -> Iterator[None]:
     """Call a function before each kernel that is compiled meanwhile, in any thread.
 
-    Only the innermost is called.
+    Of nested callbacks only the innermost is called.
 
     >>> with tell_before_compiling(lambda: print("compiling")):
     ...     kernel_is_compiled()

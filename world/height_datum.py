@@ -42,7 +42,7 @@ class HeightDatum:
 def is_above_ellipsoid(crs: str) -> bool:
     """Return True if a reference system's heights are above an ellipsoid.
 
-    False for a system without heights.
+    Return False for a system without heights.
 
     >>> is_above_ellipsoid("EPSG:4979"), is_above_ellipsoid("EPSG:4326+5773"), is_above_ellipsoid("EPSG:4326")
     (True, False, False)

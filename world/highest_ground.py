@@ -17,7 +17,7 @@ from world.terrain import Terrain, segment_clearance
 def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, rows: int, columns: int) -> Floats:
     """Return the highest ground (rows, columns) in square cells with their sides, m.
 
-    NaN if part of a cell has no data.
+    The height is NaN if part of the cell has no data.
     west, south: outer corner of the first cell, m.  cell: side of a cell, m.  Rows go north, columns east.
 
     >>> from world.terrain import gridded
@@ -64,9 +64,9 @@ def _raise_cell(out: Floats, i: int, j: int, height: float) -> None:
 
 @inner
 def _highest_pixel(heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float) -> float:
-    """Return the highest pixel in a cell that is straight in pixels, -inf without a pixel.
+    """Return the height of the highest pixel in a cell whose sides are straight in pixel coordinates.
 
-    NaN if one has no data.
+    It is -inf without a pixel in the cell, and NaN if one of them has no data.
     """
     col, row = polymap(to_pixel, west, south)
     east_col, east_row = polymap(to_pixel, west + cell, south)

@@ -515,7 +515,7 @@ STEEPEST_RUNWAY = 5.0
 class LaunchTable(ScenarioTable):
     """[launch]: the launch of the aircraft at home.
 
-    course_deg: clockwise from north; None for along the mission's first leg.
+    course_deg: clockwise from north; None for the course of the mission's first leg.
     speed_mps: speed at the end of the rail or throw.
     length_m, incline_deg: length of the rail, throw or runway, and its angle above level.
     A value that is not given takes the method's default (`world.airfield`).

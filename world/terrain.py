@@ -65,7 +65,9 @@ class Terrain:
     def clearance(self, a: ArrayLike, b: ArrayLike) -> tuple[float, float]:
         """Return the smallest height above ground on the segment a-b, and the fraction of the segment there.
 
-        a, b: (3,) m.  Exact for the bilinear surface.  NaN if the segment leaves the raster or its data.
+        a, b: (3,) m.
+
+        It is exact for the bilinear surface, and NaN if the segment leaves the raster or its data.
         """
         start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
         clearance, fraction = segment_clearance(self.heights, self.to_pixel.record, start, end)
@@ -81,7 +83,7 @@ def _make_locked(heights: Heights, *others: Any) -> Terrain:
 def pixel_height(heights: Heights, col: float, row: float) -> float:
     """Return the bilinear height at fractional pixel coordinates.
 
-    NaN over `EDGE` beyond the outer pixel centres.
+    It is NaN further than `EDGE` beyond the outer pixel centres.
     """
     rows, cols = heights.shape
     if not (-EDGE <= col <= cols - 1 + EDGE and -EDGE <= row <= rows - 1 + EDGE):
@@ -101,7 +103,7 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:
 def steepest_slopes(heights: Heights, pitch: float) -> Heights:
     """Return the steepest possible slope of the bilinear ground in each tile of `TILE` x `TILE` cells, m per m.
 
-    From the steps between pixels and their pitch (m).  NaN is ignored.
+    It follows from the steps between pixels and their pitch (m).  Pixels without data (NaN) are ignored.
     """
     rows, cols = heights.shape
     tiles = np.zeros(((rows - 2) // TILE + 1, (cols - 2) // TILE + 1), dtype=np.float32)
@@ -137,9 +139,9 @@ def _heights_many(heights: Heights, to_pixel: PolyMapRecord, east: Floats, north
 
 @compiled
 def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats) -> tuple[float, float]:
-    """Return the smallest height above the bilinear ground on a-b and its fraction.
+    """Return the smallest height above the bilinear ground on the segment a-b, and the fraction of the segment there.
 
-    (NaN, fraction) off the raster.
+    The height is NaN if the segment leaves the raster.
     """
     pieces = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE))
     min_clearance = math.inf
@@ -177,7 +179,7 @@ def _piece_clearance(
 ) -> tuple[float, float]:
     """Return the smallest height above ground on a piece straight in pixels, and its fraction.
 
-    Off the data it returns (NaN, fraction).
+    The height is NaN if the piece leaves the data.
     col, row, up: coordinates of the two ends.  Within a cell the height above the bilinear ground is a parabola.
     """
     dc, dr, du = col1 - col0, row1 - row0, up1 - up0

@@ -85,7 +85,7 @@ def time_cost(table: PerformanceTable) -> TravelCost:
 def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
     """Return the cost of a path's energy, in m of level flight in still air.
 
-    None if the aircraft's power is unknown.
+    Return None if the aircraft's power is unknown.
     Power is as in `Envelope.power`: the parabola through idle at the steepest descent, level flight and full
     throttle. At heights without level flight, it is the power at the nearest height with level flight.
     """
@@ -102,7 +102,7 @@ def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | Non
 def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
     """Return the coefficients of power by the sine of the climb angle, and the bounds of this sine.
 
-    NaN if power is unknown.
+    All are NaN if power is unknown.
     """
     climb, descent = envelope.air_angles(airspeed, amsl)
     min_sine, max_sine = -math.sin(descent), math.sin(climb)
@@ -131,9 +131,9 @@ class LegTime(NamedTuple):
 
 @inner
 def leg_time(dx: float, dy: float, dz: float, wind_east: float, wind_north: float, airspeed: float) -> LegTime:
-    """Return time of a leg (m) at an airspeed in a wind (m/s): the smaller positive T with |d - w T| = V T.
+    """Return the time of a leg (m) at an airspeed in a wind (m/s): the smaller positive T with |d - w T| = V T.
 
-    From |d|^2 - 2 T w.d - (V^2 - w^2) T^2 = 0: T = |d|^2 / (w.d + D), D^2 = (w.d)^2 + (V^2 - w^2) |d|^2, and its
+    It solves |d|^2 - 2 T w.d - (V^2 - w^2) T^2 = 0: T = |d|^2 / (w.d + D), D^2 = (w.d)^2 + (V^2 - w^2) |d|^2. Its
     derivative by d is (d - w T) / D.
     """
     length2 = max(1e-6, dx * dx + dy * dy + dz * dz)

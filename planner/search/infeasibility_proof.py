@@ -38,8 +38,8 @@ def column_side(data: ProblemArrays) -> float:
 def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float = 0.0) -> bool:
     """Return True if no path stays above the clearance, below the ceiling and outside all missiles.
 
-    missiles: (m,) True for the `data.threats` that are considered; None for all. margin: distance from their spheres,
-    m. Return False if nothing is proven.
+    missiles: (m,) True for the `data.threats` to consider; None for all. margin: distance from their spheres, m.
+    Return False if nothing is proven.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -63,8 +63,8 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
 def highest_level_flight(data: ProblemArrays) -> float:
     """Return the highest altitude of level flight, above which no waypoint may be, m.
 
-    Return inf without such an altitude, and if the wind is too strong to hold a course. As in
-    `planner.evaluation.leg_constraints`, if both slope limits are the aircraft's own.
+    Return inf if no such altitude exists, or if the wind is too strong to hold a course. The limit applies only if
+    both slope limits are the aircraft's own, as in `planner.evaluation.leg_constraints`.
     """
     table = data.aircraft
     if not (math.isnan(data.max_climb) and math.isnan(data.max_dive) and table.equivalent > 0.0):

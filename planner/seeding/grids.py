@@ -89,7 +89,7 @@ def _min_height(
 ) -> float:
     """Return the minimum height in a cell, the highest ground of 3 x 3 samples plus the clearance; inf outside the map.
 
-    steps: steps between the samples; 0 along for only the middle sample.
+    steps: steps between the samples; a step of 0 along the frame leaves only the middle sample.
     """
     east, north = position_of(frame, along, across)
     if not (data.west <= east <= data.east and data.south <= north <= data.north):

@@ -395,7 +395,7 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
 def _repair_outline(entries: dict[str, Any], max_crossings: int, source: str) -> tuple[list[str], int]:
     """Repair the outline of an authority's zone; return the notes about it and the number of its crossings.
 
-    Leave other zones as they are.  max_crossings: maximum number of crossings; more raise ScenarioError.
+    Leave other zones as they are.  Raises ScenarioError for more crossings than ``max_crossings``.
     """
     published = entries.pop(PUBLISHED, False)
     notes = [note for flag, note in ((UPSIDE_DOWN, _SWAPPED), (NO_BAND, _NO_BAND)) if entries.pop(flag, False)]

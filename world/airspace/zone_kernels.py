@@ -168,7 +168,7 @@ def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> fl
 def outside_band(zone: Record, up: float, ground: float) -> float:
     """Return the height below a zone's floor or above its ceiling, m.
 
-    Negative between them, to the nearer one.
+    It is negative between them: minus the distance to the nearer one.
     zone: a record of `ZONE`.  up: m above mean sea level.  ground: height of the ground there, NaN if not known; the
     result is then NaN for a zone with levels above ground.
     """
