@@ -34,7 +34,7 @@ class PerformanceTable(NamedTuple):
     tan_max_bank: tangent of the bank limit.
     wind_speed: mean wind (m/s) at `wind_reference_amsl` (m).
     wind_to: direction towards which the wind blows, rad clockwise from north.
-    wind_gradient: increase per meter of altitude, 1/s.
+    wind_gradient: increase per metre of altitude, 1/s.
     gust_sigma: standard deviation of the gusts, m/s.
     amsl: (h,) m, increasing; altitudes of the two tables.
     climb, descent: (h,) rad, steepest angles relative to the air, positive in the direction of their name.

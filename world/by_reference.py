@@ -31,16 +31,16 @@ _NUMBERS: dict[Any, Any] = {
 class Reference(types.Type):
     """Numba's type of a pointer to the fields of a named tuple in memory."""
 
-    def __init__(self, held: Any) -> None:
+    def __init__(self, tuple_type: Any) -> None:
         """Point to this named tuple type, under a short name that keeps the names of compiled functions short."""
-        self.held = held
-        digest = hashlib.sha256(held.name.encode()).hexdigest()[:16]
-        super().__init__(f"{held.instance_class.__name__}_{digest}")
+        self.tuple_type = tuple_type
+        digest = hashlib.sha256(tuple_type.name.encode()).hexdigest()[:16]
+        super().__init__(f"{tuple_type.instance_class.__name__}_{digest}")
 
     @property
     def key(self) -> Any:
         """Key for numba's comparison of references."""
-        return self.held
+        return self.tuple_type
 
 
 class _Layout(NamedTuple):
@@ -58,7 +58,7 @@ def by_reference(cls: _Class) -> _Class:
 
     >>> import numba
     >>> from world.airspace.zone_kernels import zone_records
-    >>> numba.typeof(zone_records([])).held.fields
+    >>> numba.typeof(zone_records([])).tuple_type.fields
     ('zones', 'edges')
     """
     members = {name: getattr(cls, name) for name in ("__doc__", "__module__", "__qualname__")}
@@ -73,7 +73,7 @@ def by_reference(cls: _Class) -> _Class:
 def _layout(value: Any) -> _Layout:
     attributes: dict[str, Any] = vars(value)
     if "_layout" not in attributes:
-        tuple_type = _by_value(typeof_impl.dispatch(tuple)(value, None))
+        tuple_type = _value_type(typeof_impl.dispatch(tuple)(value, None))
         attributes["_layout"] = _Layout(Reference(tuple_type), _in_memory(tuple_type, value))
     return attributes["_layout"]
 
@@ -82,15 +82,15 @@ def _address(value: Any) -> int:
     return ctypes.addressof(_layout(value).memory)
 
 
-def _by_value(kind: Any) -> Any:
+def _value_type(kind: Any) -> Any:
     """Return the type with references replaced by their named tuples, as they are laid out in memory."""
     if isinstance(kind, Reference):
-        return kind.held
+        return kind.tuple_type
     if isinstance(kind, types.Array):
         # Writable and read-only arrays share a kernel; copies in another process may be writable.
         return kind.copy(readonly=True)
     if _is_named(kind):
-        return types.BaseTuple.from_types([_by_value(member) for member in kind.types], kind.instance_class)
+        return types.BaseTuple.from_types([_value_type(member) for member in kind.types], kind.instance_class)
     return kind
 
 
@@ -120,8 +120,8 @@ def _in_memory(kind: Any, value: Any) -> Any:
 
 def _member(kind: Reference, name: str) -> tuple[int, Any]:
     """Return the index and type of a field; the type is a pointer if the field's class is marked."""
-    index = kind.held.fields.index(name)
-    member = kind.held.types[index]
+    index = kind.tuple_type.fields.index(name)
+    member = kind.tuple_type.types[index]
     if _is_named(member) and hasattr(member.instance_class, "_address"):
         return index, Reference(member)
     return index, member
@@ -130,7 +130,7 @@ def _member(kind: Reference, name: str) -> tuple[int, Any]:
 @register_model(Reference)
 class _Pointer(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Reference) -> None:
-        super().__init__(manager, kind, ir.PointerType(manager[kind.held].get_data_type()))
+        super().__init__(manager, kind, ir.PointerType(manager[kind.tuple_type].get_data_type()))
 
 
 @infer_getattr
@@ -138,7 +138,7 @@ class _Field(AttributeTemplate):
     key = Reference
 
     def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]  # numba names no argument
-        return _member(kind, name)[1] if name in kind.held.fields else None
+        return _member(kind, name)[1] if name in kind.tuple_type.fields else None
 
 
 @lower_getattr_generic(Reference)

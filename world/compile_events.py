@@ -10,7 +10,7 @@ _callbacks: list[BeforeCompiling] = []
 
 @contextmanager
 def tell_before_compiling(callback: BeforeCompiling) -> Iterator[None]:
-    """Call a function before each kernel that is compiled meanwhile, in any thread.
+    """Call a function before each kernel that is compiled within the block, in any thread.
 
     Of nested callbacks only the innermost is called.
 

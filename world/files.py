@@ -242,7 +242,7 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
 
 
 def remove_temporary_folders(process: int) -> bool:
-    """Remove the folders of `temporary_folder` that a killed process has left.
+    """Remove the folders of `temporary_folder` that a killed process has left behind.
 
     Return True if there were none.
 
@@ -262,7 +262,7 @@ def remove_temporary_folders(process: int) -> bool:
 def hold(path: Path) -> Iterator[None]:
     """Lock an existing file or folder for this process.
 
-    Another process that tries to lock it is refused meanwhile.
+    Another process that tries to lock it within the block is refused.
     The system releases the lock when the process ends, in any way.  Raises PlanflyError if another process holds the
     lock, and OSError if the file cannot be opened.
 

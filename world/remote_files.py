@@ -59,14 +59,14 @@ class RemoteFile:
     """File on a server, and its copy.
 
     size: size in bytes.  version: its ETag or its time of change; "" if the server states neither.
-    held: the parts that the copy holds, [begin, end), and the SHA-256 of each.
+    parts: the parts that the copy holds, [begin, end), and the SHA-256 of each.
     """
 
     url: str
     size: int
     version: str
     copy: Path
-    held: dict[tuple[int, int], str] = field(default_factory=dict)
+    parts: dict[tuple[int, int], str] = field(default_factory=dict)
 
     def missing(self, begin: int, end: int) -> list[tuple[int, int]]:
         """Return the parts of [begin, end) that the copy does not hold yet.
@@ -75,7 +75,7 @@ class RemoteFile:
         [(20, 30), (40, 50)]
         """
         parts = []
-        for part_begin, part_end in [*sorted(self.held), (end, end)]:
+        for part_begin, part_end in [*sorted(self.parts), (end, end)]:
             if part_begin > begin:
                 parts.append((begin, min(part_begin, end)))
             begin = max(begin, part_end)
@@ -126,8 +126,8 @@ class RemoteFile:
                 # The bytes are on the disk before the notes list them, even if the power fails.
                 os.fsync(file.fileno())
             if position > begin:
-                self.held[begin, position] = digest.hexdigest()
-                write_whole(_notes_path(self.copy), json.dumps([[*chunk, text] for chunk, text in self.held.items()]))
+                self.parts[begin, position] = digest.hexdigest()
+                write_whole(_notes_path(self.copy), json.dumps([[*chunk, text] for chunk, text in self.parts.items()]))
             if is_slow and position < end:
                 raise _IncompleteAnswer(f"the server sends fewer than {_MIN_BYTES_PER_S:,.0f} bytes a second")
             if position < end:
@@ -136,7 +136,7 @@ class RemoteFile:
     def forget(self) -> None:
         """Start over with an empty copy.  Raises OSError."""
         _notes_path(self.copy).unlink(missing_ok=True)
-        self.held = {}
+        self.parts = {}
         # A new file, so that another process that reads the old one can go on.
         with tempfile.NamedTemporaryFile(dir=self.copy.parent, delete=False) as file:
             os.truncate(file.fileno(), self.size)
@@ -172,7 +172,7 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
     remote = RemoteFile(url, size, version, copy)
     if not (copy.is_file() and copy.stat().st_size == size):
         remote.forget()
-    remote.held = _read_notes(copy, size)
+    remote.parts = _read_notes(copy, size)
     return remote
 
 

@@ -412,7 +412,7 @@ class Steering(NamedTuple):
 class FlightTable(ScenarioTable):
     """[flight].  None means not stated; `steering` gives the default.
 
-    autopilot: name of the autopilot; only guidance means "planfly", only params "ardupilot".
+    autopilot: name of the autopilot; if it is not stated, guidance implies "planfly", and params "ardupilot".
     autopilot_from: file that the autopilot was inferred from, see `planfly.workflow.file_autopilots`.
     params: file with the autopilot's parameters.
     px4_version: release of autopilot = "px4", as releases fly differently; None for the newest.
@@ -448,9 +448,9 @@ class FlightTable(ScenarioTable):
 
     @property
     def steering(self) -> Steering:
-        """Autopilot, guidance law and navigation.
+        """Autopilot, guidance law and navigation accuracy.
 
-        By default "perfect" for planfly's guidance, "gnss" for others.
+        The default accuracy is "perfect" for planfly's guidance, and "gnss" for other autopilots.
         """
         implied_autopilot = DEFAULT_AUTOPILOT
         if self.guidance is not None:
@@ -483,7 +483,10 @@ class WindTable(ScenarioTable):
 
 
 class HomeTable(PositionTable):
-    """[home]: the place on the ground where the mission begins: a position, or place = "start" for below the start."""
+    """[home]: the place on the ground where the mission begins.
+
+    It is a position, or place = "start" for the ground below the start.
+    """
 
     place: Literal["start"] | None = None
 
@@ -555,7 +558,7 @@ def _check_course(value: Any) -> Any:
 class LandingTable(PositionTable):
     """[landing]: the landing strip at the end of the mission.
 
-    course_deg: landing course, clockwise from north, or "wind" for into the wind.
+    course_deg: landing course, clockwise from north, or "wind" for a landing into the wind.
     length_m, width_m: size of the strip, which is centred on the landing point.
     approach_m: length of the straight final before the landing point.
     slope_deg: glide slope of the final, below level.

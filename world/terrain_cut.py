@@ -194,7 +194,7 @@ def _fetch_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) -> R
 
     A copy that cannot be read, for example after a power cut or because of a proxy, is fetched a second time.
     """
-    for is_last in (not remote.held, True):
+    for is_last in (not remote.parts, True):
         try:
             tile = _open_copy(remote, count, (_DIRECTORY_BYTES, remote.size) if is_last else (_DIRECTORY_BYTES,))
             window = _padded_window(tile, box)

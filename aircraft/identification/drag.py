@@ -32,7 +32,7 @@ NUISANCES = {
     "angle of attack": 1.0,
     "angle of attack by lift": 1.0,
 }
-# The last two are in standard deviations of `AlphaDoubt`.
+# The last two are in standard deviations of `AlphaUncertainty`.
 
 # True for quantities of the aircraft, False for quantities of its sensors.
 _IS_OF_AIRCRAFT = np.array([name.split()[0] in ("resistance", "idle", "voltage", "drag") for name in NUISANCES])
@@ -57,16 +57,16 @@ _MAX_LAST_STEP = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class AlphaDoubt:
+class AlphaUncertainty:
     """Uncertainty of the angle of attack from the lift curve.
 
-    angle: standard deviation at a lift coefficient, ``middle``, rad.
-    by_lift: standard deviation of its change with that coefficient, rad.
+    angle: standard deviation at the lift coefficient ``mean_lift``, rad.
+    by_lift: standard deviation of its change per unit of lift coefficient, rad.
     """
 
     angle: float = float(np.radians(0.3))
     by_lift: float = 0.02
-    middle: float = 0.6
+    mean_lift: float = 0.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +122,7 @@ class ForwardForces:
 
 
 def fit_drag(
-    signals: Signals, base: BaseModel, values: Floats, flow: Flow, doubt: AlphaDoubt | None = None
+    signals: Signals, base: BaseModel, values: Floats, flow: Flow, uncertainty: AlphaUncertainty | None = None
 ) -> tuple[Fit, Floats, Floats]:
     """Fit drag and motor; return the fit, the parameters' values (5,), and their covariance (5, 5).
 
@@ -130,9 +130,9 @@ def fit_drag(
     as the fit does with its own.
 
     values: (n,) of all parameters, of which the parameters of lift are used.
-    doubt: uncertainty of the lift curve.
+    uncertainty: uncertainty of the lift curve.
     """
-    forces = forward_forces(signals, base, values, flow, AlphaDoubt() if doubt is None else doubt)
+    forces = forward_forces(signals, base, values, flow, AlphaUncertainty() if uncertainty is None else uncertainty)
     thinned = forces.signals
     with_current = bool(np.isfinite(thinned.current).all())
     means, sds = drag_priors(with_current=with_current)
@@ -218,10 +218,12 @@ def _fit_from(
     return Fit(estimate, fit.covariance, fit.predicted, fit.residual, fit.explained)
 
 
-def forward_forces(signals: Signals, base: BaseModel, values: Floats, flow: Flow, doubt: AlphaDoubt) -> ForwardForces:
+def forward_forces(
+    signals: Signals, base: BaseModel, values: Floats, flow: Flow, uncertainty: AlphaUncertainty
+) -> ForwardForces:
     """Return the part of the forward force from each unknown over the thinned signals.
 
-    values, doubt: see `fit_drag`.
+    values, uncertainty: see `fit_drag`.
     """
     coefficients, (slope, zero) = base.coefficients, lift_curve(base, values)
     thinned = signals.thinned(FORCE_THINNING, {"alpha": flow.alpha})
@@ -233,7 +235,8 @@ def forward_forces(signals: Signals, base: BaseModel, values: Floats, flow: Flow
         signals=thinned,
         base=base,
         known=pressure * (lift + other_lift(thinned, base)) * np.sin(alpha),
-        tilts=tilt * np.vstack([np.full(len(alpha), doubt.angle), doubt.by_lift * (lift - doubt.middle)]),
+        tilts=tilt
+        * np.vstack([np.full(len(alpha), uncertainty.angle), uncertainty.by_lift * (lift - uncertainty.mean_lift)]),
         drags=forward_pressure
         * np.vstack([np.full(len(alpha), coefficients.drag_zero), coefficients.drag_induced * np.square(lift_excess)]),
         elevator=forward_pressure * coefficients.drag_elevator * thinned.surfaces[:, 0],

@@ -17,7 +17,7 @@ import numpy as np
 from aircraft.identification.airspeed import SCALE_SD, with_airspeed_scale
 from aircraft.identification.alignment import Clocks, Signals, align, find_clocks, invert_first_order_lag
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.drag import FORCE_THINNING, AlphaDoubt, fit_drag
+from aircraft.identification.drag import FORCE_THINNING, AlphaUncertainty, fit_drag
 from aircraft.identification.fixed_parameters import HELD_FIXED, NOISE
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from aircraft.identification.flow import motor_of, vane
@@ -229,7 +229,7 @@ def fit_all(
     values, covariance = prior_means(), np.diag(np.square(prior_sds()))
     fits: dict[Group, Fit] = {}
 
-    doubt: AlphaDoubt | None = None
+    uncertainty: AlphaUncertainty | None = None
 
     def store(group: Group, estimate: Floats, spread: Floats) -> None:
         is_in_group = np.array([parameter.group == group for parameter in PARAMETERS])
@@ -243,9 +243,9 @@ def fit_all(
         if lift is None:
             fits["lift"], curve, spread = fit_lift(signals, base, flow.lift, level)
             store("lift", curve, spread)
-            doubt = alpha_doubt(fits["lift"], flow.lift)
+            uncertainty = alpha_uncertainty(fits["lift"], flow.lift)
             flow = vane(signals, base, values)
-        fits["drag"], drag_values, spread = fit_drag(signals, base, values, flow, doubt)
+        fits["drag"], drag_values, spread = fit_drag(signals, base, values, flow, uncertainty)
         store("drag", drag_values, spread)
     moments = fit_moments(signals, base, flow.alpha, flow.beta, motor_of(base, values)) if dynamics else {}
     for axis, fit in moments.items():
@@ -260,10 +260,10 @@ def fit_all(
     return Estimate(values, covariance, (), equations, with_current=has_current, dynamics=dynamics)
 
 
-def alpha_doubt(fit: Fit, lift: Floats) -> AlphaDoubt:
+def alpha_uncertainty(fit: Fit, lift: Floats) -> AlphaUncertainty:
     """Return the uncertainty of the angle of attack from a fit of the lift curve and from the level."""
-    by_lift, angle = np.sqrt(np.diag(fit.covariance)).tolist()
-    return AlphaDoubt(float(np.hypot(angle, LEVEL_SD)), by_lift, float(lift.mean()))
+    slope_sd, offset_sd = np.sqrt(np.diag(fit.covariance)).tolist()
+    return AlphaUncertainty(float(np.hypot(offset_sd, LEVEL_SD)), slope_sd, float(lift.mean()))
 
 
 def _equation(group: Group, fit: Fit) -> Equation:

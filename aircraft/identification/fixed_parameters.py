@@ -19,7 +19,7 @@ class FixedParameter:
     """One quantity that is held fixed.
 
     name: name for people, with its standard deviation.
-    change: function for signals and model with the quantity one standard deviation higher.
+    change: function that returns signals and model with the quantity one standard deviation higher.
     level: change of the autopilot's level, rad.
     air: change of the vertical air velocity, m/s.
     of_current: True if it applies only to logs with the battery's current.

@@ -124,7 +124,7 @@ class PlannerAirspace(NamedTuple):
 
     zones: exclusions and inclusions with their margins.
     max_height: maximum height above ground, inf for none.
-    buffer: margin below it, and start_buffer and destination_buffer at the ends.
+    buffer: margin below the maximum height; start_buffer, destination_buffer: margin at the ends.
     depths: negated heights of the ground, so that staying below the maximum height is a clearance problem as above the
     ground.
     """
