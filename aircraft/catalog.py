@@ -25,7 +25,7 @@ MAX_MODEL_BYTES = 32 * 2**20
 # Folder of the embedded aircraft.
 _ROOT = Path(__file__).parent
 # Radians in one degree.
-_DEGREE = math.pi / 180.0
+_RAD_PER_DEG = math.pi / 180.0
 
 # TOML key: (field of Aircraft, factor to SI).
 _FIELD_BY_KEY = {
@@ -36,12 +36,12 @@ _FIELD_BY_KEY = {
     "airspeed_min_mps": ("airspeed_min", 1.0),
     "airspeed_max_mps": ("airspeed_max", 1.0),
     "stall_speed_mps": ("stall_speed", 1.0),
-    "max_bank_deg": ("max_bank", _DEGREE),
-    "max_pitch_deg": ("max_pitch", _DEGREE),
-    "max_elevator_deg": ("max_elevator", _DEGREE),
-    "max_aileron_deg": ("max_aileron", _DEGREE),
-    "max_rudder_deg": ("max_rudder", _DEGREE),
-    "surface_rate_deg_s": ("surface_rate", _DEGREE),
+    "max_bank_deg": ("max_bank", _RAD_PER_DEG),
+    "max_pitch_deg": ("max_pitch", _RAD_PER_DEG),
+    "max_elevator_deg": ("max_elevator", _RAD_PER_DEG),
+    "max_aileron_deg": ("max_aileron", _RAD_PER_DEG),
+    "max_rudder_deg": ("max_rudder", _RAD_PER_DEG),
+    "surface_rate_deg_s": ("surface_rate", _RAD_PER_DEG),
     "surface_lag_s": ("surface_lag", 1.0),
     "motor_lag_s": ("motor_lag", 1.0),
 }

@@ -23,7 +23,7 @@ from world.arrays import Floats
 # Landing gear of an aircraft whose model has no contacts.
 Gear = Literal["belly", "wheels"]
 # Meters in each unit of a model.
-_METERS_PER_UNIT = {"M": 1.0, "FT": 0.3048, "IN": 0.0254}
+_METRES_PER_UNIT = {"M": 1.0, "FT": 0.3048, "IN": 0.0254}
 # Kilograms in each unit of a model.
 _KILOGRAMS_PER_UNIT = {"KG": 1.0, "LBS": 0.45359237}
 # Smallest depth of the points that a model without wheels stands on, as a ratio to the deepest point.
@@ -194,5 +194,5 @@ def _location(location: ElementTree.Element | None) -> Floats | None:
     """Return a location of a model, m, (3,), or None if it has none."""
     if location is None:
         return None
-    unit = _METERS_PER_UNIT.get(location.get("unit", "IN"), 1.0)
+    unit = _METRES_PER_UNIT.get(location.get("unit", "IN"), 1.0)
     return unit * np.array([float(location.findtext(axis, "0")) for axis in "xyz"])

@@ -33,9 +33,9 @@ FACTORS = {
 # Ratio of the stops of elevons and ruddervators to the larger stop of the two commands that they mix.
 MIXED_TRAVEL = 1.3
 # kg m^2 in one slug ft^2.
-_SLUG_FT2 = 1.3558179483314004
+_KG_M2_PER_SLUG_FT2 = 1.3558179483314004
 # Kilograms in one pound.
-_POUND = 0.45359237
+_KG_PER_POUND = 0.45359237
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,7 @@ def model_xml(name: str, numbers: ModelNumbers) -> str:
 
     It has no ``<input>`` and ``<output>`` channels, and the properties of `aircraft.jsbsim_model.DEFAULT_MODEL`.
     """
-    jx, jy, jz, jxz = (value / _SLUG_FT2 for value in numbers.inertia)
+    jx, jy, jz, jxz = (value / _KG_M2_PER_SLUG_FT2 for value in numbers.inertia)
     return f"""<?xml version="1.0"?>
 <!-- {_comment_text(numbers.title)}
      {_comment_text(numbers.source)}
@@ -148,7 +148,7 @@ def model_xml(name: str, numbers: ModelNumbers) -> str:
     <iyy unit="SLUG*FT2"> {number(jy)} </iyy>
     <izz unit="SLUG*FT2"> {number(jz)} </izz>
     <ixz unit="SLUG*FT2"> {number(jxz)} </ixz>
-    <emptywt unit="LBS"> {number(numbers.mass / _POUND)} </emptywt>
+    <emptywt unit="LBS"> {number(numbers.mass / _KG_PER_POUND)} </emptywt>
     <location name="CG" unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>
     <pointmass name="payload">
       <weight unit="LBS"> 0 </weight>
@@ -280,7 +280,7 @@ def _external_reactions(numbers: ModelNumbers) -> str:
 # Forces and moments. In the stability frame JSBSim takes X aft and Z up as positive: drag and lift.
 
 # Element of dynamic pressure times wing area.
-_Q = "<p> aero/qbar-area </p>"
+_DYNAMIC_FORCE = "<p> aero/qbar-area </p>"
 # Property of the angle of attack.
 _ALPHA = "aero/alpha-rad"
 # Property of the sideslip.
@@ -303,12 +303,12 @@ def _aerodynamics(numbers: ModelNumbers) -> str:
     drag_factor = "<p> aero/drag-factor </p>"
     axes = "\n".join(
         [
-            _axis("X", "force/drag", product(_Q, drag_factor, forces[0]), ' frame="STABILITY"'),
-            _axis("Z", "force/lift", product(_Q, forces[1]), ' frame="STABILITY"'),
-            _axis("Y", "force/side", product(_Q, forces[2]), ' frame="STABILITY"'),
-            _axis("ROLL", "moment/roll", product(_Q, span, moments[0])),
-            _axis("PITCH", "moment/pitch", product(_Q, chord, moments[1])),
-            _axis("YAW", "moment/yaw", product(_Q, span, moments[2])),
+            _axis("X", "force/drag", product(_DYNAMIC_FORCE, drag_factor, forces[0]), ' frame="STABILITY"'),
+            _axis("Z", "force/lift", product(_DYNAMIC_FORCE, forces[1]), ' frame="STABILITY"'),
+            _axis("Y", "force/side", product(_DYNAMIC_FORCE, forces[2]), ' frame="STABILITY"'),
+            _axis("ROLL", "moment/roll", product(_DYNAMIC_FORCE, span, moments[0])),
+            _axis("PITCH", "moment/pitch", product(_DYNAMIC_FORCE, chord, moments[1])),
+            _axis("YAW", "moment/yaw", product(_DYNAMIC_FORCE, span, moments[2])),
         ]
     )
     return f"""  <aerodynamics>

@@ -40,7 +40,7 @@ from world.terrain import Terrain
 # Largest number of pixels of a window, or of a file that is read as one array; more raise an error.
 MAX_PIXELS = 120_000_000
 # Folder of the embedded elevation files.
-_OWN_FILES = Path(__file__).parent / "elevation"
+_EMBEDDED_FOLDER = Path(__file__).parent / "elevation"
 # Errors that zipfile raises for a damaged file, among others.
 _UNZIP_ERRORS = (zipfile.BadZipFile, zlib.error, lzma.LZMAError)
 
@@ -174,7 +174,7 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
     (344, 403)
     """
     if path in EMBEDDED:
-        raster = open_npz(_OWN_FILES / EMBEDDED[path], path)
+        raster = open_npz(_EMBEDDED_FOLDER / EMBEDDED[path], path)
         return replace(raster, datum=_datum_of(raster, datum))
     if path.startswith("/vsi") or "://" in path:
         allowed = "only local files are read, not URLs or virtual file systems"

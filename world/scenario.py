@@ -14,7 +14,7 @@ from world.airfield import AskedReturns, LandingStrip, Launch, make_home, make_l
 from world.airspace.zone_files import FileZones, read_zone_files
 from world.airspace.zone_times import is_active, parse_span
 from world.airspace.zones import Zone
-from world.airspace.zones_on_map import FAR, check_ends, make_zones, near_zones
+from world.airspace.zones_on_map import MAX_ZONE_DISTANCE, check_ends, make_zones, near_zones
 from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import ScenarioError, TerrainError
@@ -285,7 +285,8 @@ def _with_file_zones(
     notes = [*(spec.zone_notes or ()), *file_zones.notes]
     if far_count := len(file_zones.zones) - len(zones_nearby):
         notes.append(
-            f"{source}: {far_count:,} of {len(file_zones.zones):,} zones lie more than {FAR / 1000.0:g} km from the"
+            f"{source}: {far_count:,} of {len(file_zones.zones):,} zones lie more than"
+            f" {MAX_ZONE_DISTANCE / 1000.0:g} km from the"
             " area: left out"
         )
     changes = {"zones": [*(spec.zones or ()), *zones_nearby] or None, "zone_notes": notes or None}

@@ -29,7 +29,7 @@ MAX_SAMPLES = 20
 # Shortest length that is charged, m.
 MIN_CHARGED_LENGTH = 1.0
 # Bound on the height above unknown ground, m.
-UNKNOWN = 9000.0
+UNKNOWN_HEIGHT = 9000.0
 
 
 class AltitudeBand(NamedTuple):
@@ -138,7 +138,7 @@ def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_d
 def altitude_band(begin_altitude: float, end_altitude: float, below: float, above: float) -> AltitudeBand:
     """Return the vertical range of a straight line over unknown ground; below, above: tracking error, m."""
     lowest, highest = min(begin_altitude, end_altitude) - below, max(begin_altitude, end_altitude) + above
-    return AltitudeBand(lowest, highest, -UNKNOWN, UNKNOWN)
+    return AltitudeBand(lowest, highest, -UNKNOWN_HEIGHT, UNKNOWN_HEIGHT)
 
 
 @inner
@@ -191,7 +191,7 @@ def vertical_distance(zone: Record, band: AltitudeBand) -> float:
 # --- Margins to zones, for the certificate ---
 
 # Length of pieces near a zone, m: short enough for the heights to apply to the positions.
-CUT = 25.0
+MAX_PIECE_LENGTH = 25.0
 # Margin of a piece of a path. nearest: smallest distance outside an exclusion or inside an inclusion, horizontal or
 # vertical, m; negative if a zone is violated. satisfied: True if every zone's margin is satisfied. zone: the nearest
 # zone, with preference for a violated margin; -1 without a zone.
@@ -238,7 +238,7 @@ def measure_zone_margin(
         )
         if _distance_to_violation(zone, horizontal, vertical) >= search_distance:
             continue
-        pieces = max(1, math.ceil(run / CUT))
+        pieces = max(1, math.ceil(run / MAX_PIECE_LENGTH))
         for k in range(pieces):
             for axis in range(3):
                 piece_begin[axis] = a[axis] + (b[axis] - a[axis]) * k / pieces

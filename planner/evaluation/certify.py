@@ -59,7 +59,7 @@ def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
 # A fault: its margin to the limit (negative beyond it), its place and its description.
 _Fault = tuple[float, str, str]
 # Number of places that are named in addition to the worst.
-_NAMED = 6
+_MAX_NAMED_PLACES = 6
 
 
 def _summarise_faults(faults: list[_Fault]) -> list[str]:
@@ -67,8 +67,8 @@ def _summarise_faults(faults: list[_Fault]) -> list[str]:
     if not faults:
         return []
     (_, place, problem), *others = sorted(faults, key=lambda fault: fault[0])
-    other_places = ", ".join(name for _, name, _ in others[:_NAMED])
-    remainder = f", {len(others) - _NAMED} more" if len(others) > _NAMED else ""
+    other_places = ", ".join(name for _, name, _ in others[:_MAX_NAMED_PLACES])
+    remainder = f", {len(others) - _MAX_NAMED_PLACES} more" if len(others) > _MAX_NAMED_PLACES else ""
     return [f"{place}: {problem}" + (f" (also {other_places}{remainder})" if others else "")]
 
 

@@ -26,7 +26,7 @@ from world.by_reference import by_reference
 
 
 # A piece of a route shorter than this (m) takes the course of the piece before it.
-_SHORTEST_LEG = 1.0
+_MIN_PIECE_LENGTH = 1.0
 
 
 class WaypointFrames(NamedTuple):
@@ -76,10 +76,10 @@ def frames_along(route: Floats) -> WaypointFrames:
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     edges = np.concatenate([[0.0], np.cumsum(lengths)])
     angles = np.arctan2(steps[:, 1], steps[:, 0])
-    rows_with_course = np.flatnonzero(lengths >= _SHORTEST_LEG)
+    rows_with_course = np.flatnonzero(lengths >= _MIN_PIECE_LENGTH)
     if rows_with_course.size:
         source_rows = np.maximum.accumulate(
-            np.where(lengths >= _SHORTEST_LEG, np.arange(len(lengths)), rows_with_course[0])
+            np.where(lengths >= _MIN_PIECE_LENGTH, np.arange(len(lengths)), rows_with_course[0])
         )
         angles = angles[source_rows]
     cosine, sine = np.cos(angles), np.sin(angles)
@@ -110,7 +110,7 @@ def sample_route(route: Floats, count: int) -> tuple[Floats, Floats]:
 # --- Encodings ---
 
 # Shortest polar step, as a fraction of the mean leg, because a step of 0 has no direction.
-_SHORTEST = 0.05
+_MIN_POLAR_STEP = 0.05
 # Half-width of the box along a route, in lengths of its pieces.
 HALF_WIDTH = 2.0
 
@@ -325,7 +325,7 @@ def _step_encoding(name: str, space: Space, waypoints: int, max_angle: float, *,
     frame = rotated_frame(space.start, space.destination)
     mean_leg = frame.length / (waypoints - 1)
     lower, upper = (
-        np.array([_SHORTEST * mean_leg, -max_angle, space.up[0]]),
+        np.array([_MIN_POLAR_STEP * mean_leg, -max_angle, space.up[0]]),
         np.array([2.0 * mean_leg, max_angle, space.up[1]]),
     )
 

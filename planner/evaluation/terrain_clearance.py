@@ -94,7 +94,7 @@ Pixels = tuple[float, float, float, float]
 # Below this height above the required clearance (m) samples are spaced by the pitch; corners rely on it.
 NEAR_GROUND = 10.0
 # Violation of a sample where the ground is unknown, m.
-UNKNOWN = 1000.0
+UNKNOWN_GROUND_DEPTH = 1000.0
 # State of sampling a leg.
 TERRAIN_LEG = np.dtype(
     [
@@ -139,7 +139,7 @@ def _take_sample(
     line, m. pitch: spacing of samples near the ground, as a fraction.
     """
     ground = pixel_height(heights, column, row)
-    gap = up - ground - required_height if ground == ground else -UNKNOWN
+    gap = up - ground - required_height if ground == ground else -UNKNOWN_GROUND_DEPTH
     i, j = min(max(int(row) // TILE, 0), tiles.shape[0] - 1), min(max(int(column) // TILE, 0), tiles.shape[1] - 1)
     # Fastest loss of height above ground, m per length of the line.
     max_fall = (tiles[np.uintp(i), np.uintp(j)] + growth) * run + abs(rise) + 1e-9

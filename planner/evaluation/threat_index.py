@@ -27,9 +27,9 @@ CELL_SIDE = 0.2
 # Maximum number of cells.
 MAX_THREAT_CELLS = 300_000
 # Largest height (m) that a cell stores.
-HIGHEST_METRE = 2_000_000_000
+MAX_CELL_HEIGHT = 2_000_000_000
 # Extension of the grid beyond the map, as a fraction of the map's sides.
-BEYOND = 0.1
+GRID_EXTENSION = 0.1
 # A cell: first entry and number of its units in the list, and the lowest and highest heights (m) that any of them
 # reaches.
 THREAT_CELL = np.dtype(
@@ -63,8 +63,8 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
     """
     min_corner, max_corner = bounds[:, 0], bounds[:, 1]
     min_corner, max_corner = (
-        min_corner - BEYOND * (max_corner - min_corner),
-        max_corner + BEYOND * (max_corner - min_corner),
+        min_corner - GRID_EXTENSION * (max_corner - min_corner),
+        max_corner + GRID_EXTENSION * (max_corner - min_corner),
     )
     size = max_corner - min_corner
     side = math.sqrt(float(size[0] * size[1]) / MAX_THREAT_CELLS)
@@ -76,8 +76,8 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
         np.ascontiguousarray(position), radius, float(min_corner[0]), float(min_corner[1]), side, columns, rows
     )
     # Whole metres, widened against rounding.
-    lowest = np.clip(np.floor(position[:, 2] - radius) - 1.0, -HIGHEST_METRE, HIGHEST_METRE).astype(np.int32)
-    highest = np.clip(np.ceil(position[:, 2] + radius) + 1.0, -HIGHEST_METRE, HIGHEST_METRE).astype(np.int32)
+    lowest = np.clip(np.floor(position[:, 2] - radius) - 1.0, -MAX_CELL_HEIGHT, MAX_CELL_HEIGHT).astype(np.int32)
+    highest = np.clip(np.ceil(position[:, 2] + radius) + 1.0, -MAX_CELL_HEIGHT, MAX_CELL_HEIGHT).astype(np.int32)
     cells = np.zeros(first.size - 1, dtype=THREAT_CELL)
     _fill_cells(first, units, lowest, highest, cells)
     for array in (cells, units):
@@ -143,7 +143,7 @@ def _lists(
 # Maximum number of classes by radius.
 MAX_CLASSES = 8
 # Mean number of missiles per cell.
-MISSILES_A_CELL = 2.0
+MISSILES_PER_CELL = 2.0
 # A missile: its position, kill radius and scale, m.
 MISSILE = np.dtype([(name, np.float64) for name in ("east", "north", "up", "radius", "scale")])
 # Missiles of similar radius, with a grid of their own: its west and south (m), cells per metre, columns and rows, first
@@ -178,7 +178,7 @@ class MissileIndex(NamedTuple):
 def make_missile_index(threats: Records, side: float | None = None) -> MissileIndex:
     """Return the index of the missiles of records with fields east, north, up, kill_radius and kill_scale (m).
 
-    side: side of a cell, m; None for `MISSILES_A_CELL` missiles per cell.
+    side: side of a cell, m; None for `MISSILES_PER_CELL` missiles per cell.
     """
     armed_threats = threats[threats["kill_radius"] > 0.0]
     missiles = np.zeros(len(armed_threats), dtype=MISSILE)
@@ -194,7 +194,7 @@ def make_missile_index(threats: Records, side: float | None = None) -> MissileIn
         positions = np.stack([class_missiles["east"], class_missiles["north"]], axis=1)
         min_corner, max_corner = positions.min(axis=0), positions.max(axis=0)
         area = float(np.prod(np.maximum(max_corner - min_corner, 1.0)))
-        per_metre = 1.0 / (math.sqrt(MISSILES_A_CELL * area / len(class_missiles)) if side is None else side)
+        per_metre = 1.0 / (math.sqrt(MISSILES_PER_CELL * area / len(class_missiles)) if side is None else side)
         columns, rows = (int(size * per_metre) + 1 for size in max_corner - min_corner)
         steps = ((positions - min_corner) * per_metre).astype(np.int64)
         cell = np.minimum(steps[:, 1], rows - 1) * columns + np.minimum(steps[:, 0], columns - 1)

@@ -29,9 +29,9 @@ HEIGHT_STEP = 2.0
 # Ground speed assumed on a leg that is not flyable, as a fraction of the airspeed, so that a search avoids it.
 UNFLYABLE_SHARE = 0.01
 # Fractions of a leg for Simpson's rule.
-_SHARES = (0.0, 0.5, 1.0)
+_SIMPSON_FRACTIONS = (0.0, 0.5, 1.0)
 # Weights of Simpson's rule.
-_WEIGHTS = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+_SIMPSON_WEIGHTS = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 
 
 @by_reference
@@ -210,10 +210,10 @@ def leg_cost(travel: TravelCost, table: PerformanceTable, a: NDArray[np.float64]
     if travel.time == 0.0 and travel.energy == 0.0:
         return total
     for k in range(3):
-        cost, is_flyable = _timed_cost(travel, table, dx, dy, dz, a[2] + _SHARES[k] * dz)
+        cost, is_flyable = _timed_cost(travel, table, dx, dy, dz, a[2] + _SIMPSON_FRACTIONS[k] * dz)
         if not is_flyable:
             return math.inf
-        total += _WEIGHTS[k] * cost
+        total += _SIMPSON_WEIGHTS[k] * cost
     return total
 
 
@@ -266,7 +266,7 @@ def model_leg(travel: TravelCost, table: PerformanceTable, a: Floats, b: Floats,
     if travel.time == 0.0 and travel.energy == 0.0:
         return total
     for k in range(3):
-        fraction, weight = _SHARES[k], _WEIGHTS[k]
+        fraction, weight = _SIMPSON_FRACTIONS[k], _SIMPSON_WEIGHTS[k]
         amsl = a[2] + fraction * dz
         conditions = _at_height(travel, table, amsl)
         time = leg_time(dx, dy, dz, conditions.wind * wx, conditions.wind * wy, conditions.airspeed)

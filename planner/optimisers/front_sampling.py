@@ -28,9 +28,9 @@ from world.arrays import Floats, Ints
 # Number of solutions nearest to a mean that give its covariance.
 NEIGHBOURS = 6
 # Factor on their differences from the mean.
-REACH = 0.7
+DIFFERENCE_FACTOR = 0.7
 # Largest step of a block, as a fraction of the difference to the other solution.
-FURTHEST = 1.2
+MAX_BLOCK_STEP = 1.2
 # Fraction of the samples that take the whole step, and of the coordinates of a block's points that move.
 HALF = 0.5
 # Initial scale of the noise, as a fraction of each direction's length.
@@ -39,18 +39,18 @@ FIRST_SCALE = 0.1
 MIN_SCALE = 1e-4
 # Largest scale of the noise.
 MAX_SCALE = 0.5
-# Factor on the scale after a generation with more successes than `SUCCESS`.
-GROW = 1.15
+# Factor on the scale after a generation with more successes than `TARGET_SUCCESS`.
+GROWTH_FACTOR = 1.15
 # Factor on the scale after a generation with fewer successes.
-SHRINK = 0.9
+SHRINK_FACTOR = 0.9
 # Fraction of successful samples above which the scale grows.
-SUCCESS = 0.02
+TARGET_SUCCESS = 0.02
 # Maximum number of directions in the noise of a sample.
 USED_DIRECTIONS = 4
 # Exponent of 2 in the smallest factor of a sample on the common scale.
-LOW = -3
+MIN_EXPONENT = -3
 # Exponent of 2 in the largest factor of a sample on the common scale.
-HIGH = 2
+MAX_EXPONENT = 2
 
 
 class Kind(IntEnum):
@@ -119,7 +119,11 @@ class FrontSampling:
         # Summed over the first axis: in sequence, with the same rounding on every machine.
         distances2 = ((scaled[:, means, None] - scaled[:, None, :]) ** 2).sum(axis=0)
         nearest = np.argsort(distances2, axis=1, kind="stable")[:, 1 : neighbour_count + 1]
-        weights = REACH * self._rng.standard_normal((len(means), neighbour_count)) / np.sqrt(max(1, neighbour_count))
+        weights = (
+            DIFFERENCE_FACTOR
+            * self._rng.standard_normal((len(means), neighbour_count))
+            / np.sqrt(max(1, neighbour_count))
+        )
         for k in range(neighbour_count):
             departures += weights[:, k, None] * (self.vectors[nearest[:, k]] - self.vectors[means])
         return departures
@@ -134,7 +138,7 @@ class FrontSampling:
         is_in_block = (places >= begins[:, None]) & (places < (begins + lengths)[:, None])
         is_taken = rng.random((count, 1, self._axes)) < HALF
         is_taken |= ~is_taken.any(axis=2, keepdims=True)
-        fractions = np.where(rng.random((count, 1)) < HALF, 1.0, rng.uniform(0.0, FURTHEST, (count, 1)))
+        fractions = np.where(rng.random((count, 1)) < HALF, 1.0, rng.uniform(0.0, MAX_BLOCK_STEP, (count, 1)))
         is_moved = (is_in_block[:, :, None] & is_taken).reshape(count, -1)
         return np.asarray(fractions * is_moved * (self.vectors[others] - self.vectors[means]))
 
@@ -143,7 +147,7 @@ class FrontSampling:
         rng, count, direction_count = self._rng, len(scales), len(self._directions)
         used_count = min(USED_DIRECTIONS, direction_count)
         picked = rng.integers(direction_count, size=(count, used_count))
-        factors = np.ldexp(rng.uniform(1.0, 2.0, (count, 1)), rng.integers(LOW, HIGH, (count, 1)))
+        factors = np.ldexp(rng.uniform(1.0, 2.0, (count, 1)), rng.integers(MIN_EXPONENT, MAX_EXPONENT, (count, 1)))
         sizes = scales * factors * rng.standard_normal((count, used_count))
         sizes[:, 1:] *= rng.random((count, used_count - 1)) < HALF
         noise = np.zeros((count, self._lower.size))
@@ -165,8 +169,10 @@ class FrontSampling:
             )
         kinds, self._kinds = self._kinds, np.empty(0, dtype=np.int64)
         for kind in np.unique(kinds):
-            should_grow = has_joined[kinds == kind].mean() > SUCCESS
-            self._scales[kind] = np.clip(self._scales[kind] * (GROW if should_grow else SHRINK), MIN_SCALE, MAX_SCALE)
+            should_grow = has_joined[kinds == kind].mean() > TARGET_SUCCESS
+            self._scales[kind] = np.clip(
+                self._scales[kind] * (GROWTH_FACTOR if should_grow else SHRINK_FACTOR), MIN_SCALE, MAX_SCALE
+            )
 
     def _archive_rows(self, values: Floats) -> Ints:
         """Return the distinct non-dominated rows of objectives (n, m) that cover most of the hypervolume."""

@@ -40,7 +40,7 @@ NARROWING = 0.9
 # Standard deviation at which a search has converged, as a fraction of the box.
 CONVERGED = 1e-10
 # Ratio of the largest to the smallest standard deviation at which a search has converged.
-LONGEST = 1e7
+MAX_DEVIATION_RATIO = 1e7
 
 
 class Gaussian:
@@ -111,7 +111,7 @@ class Gaussian:
         max_deviation = self.deviation * math.sqrt(float(np.diag(self._matrix).max()))
         self.done = (
             max_deviation < CONVERGED
-            or float(spread.max()) > LONGEST * float(spread.min())
+            or float(spread.max()) > MAX_DEVIATION_RATIO * float(spread.min())
             or self._stalled_generations > patience
         )
 

@@ -29,9 +29,9 @@ from world.scenario import Scenario
 
 
 # Number of cells along the map's longer side.
-CELLS = 150
+CELL_COUNT = 150
 # Number of heights from the lowest to the highest allowed.
-HEIGHTS = 5
+HEIGHT_COUNT = 5
 # State of an open cell; the state of a cell closed by a zone is the index of the zone.
 _OPEN_CELL = -1
 # State of a cell closed by the ground.
@@ -61,14 +61,14 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
     terrain = scenario.terrain
     if terrain is None or not scenario.zones:
         return None
-    pitch = float(np.ptp(scenario.bounds, axis=1).max()) / CELLS
+    pitch = float(np.ptp(scenario.bounds, axis=1).max()) / CELL_COUNT
     east, north = (np.arange(min_heights + 0.5 * pitch, high, pitch) for min_heights, high in scenario.bounds)
     ground = terrain.height(east[None, :], north[:, None])
     min_heights = np.maximum(ground + scenario.limits.min_clearance_m, scenario.floor)
     max_heights = np.full(ground.shape, scenario.ceiling)
     if scenario.limits.max_height_m is not None:
         max_heights = np.minimum(max_heights, ground + scenario.limits.max_height_m)
-    cells = np.full((HEIGHTS, *ground.shape), _OPEN_CELL, dtype=np.int64)
+    cells = np.full((HEIGHT_COUNT, *ground.shape), _OPEN_CELL, dtype=np.int64)
     cells[:, ~(min_heights <= max_heights)] = _GROUND_CELL
     ends = [_cell_of(scenario, end, pitch, min_heights, max_heights) for end in (scenario.start, scenario.destination)]
     if not _are_connected(cells, ends):
@@ -96,7 +96,7 @@ def _cell_of(
     fraction = (end[2] - min_heights[row, column]) / max(
         float(max_heights[row, column] - min_heights[row, column]), 1e-6
     )
-    return int(np.clip(round(fraction * (HEIGHTS - 1)), 0, HEIGHTS - 1)), row, column
+    return int(np.clip(round(fraction * (HEIGHT_COUNT - 1)), 0, HEIGHT_COUNT - 1)), row, column
 
 
 def _are_connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
@@ -212,9 +212,9 @@ def max_altitude(problem: Problem) -> tuple[float, str]:
 # --- Lines for the user ---
 
 # Number of points along the direct line.
-ALONG = 200
+POINTS_ALONG = 200
 # Number of points across the direct line.
-ACROSS = 400
+POINTS_ACROSS = 400
 # Maximum number of zones that are named.
 MAX_NAMES = 4
 # Maximum number of missiles that are named.
@@ -302,9 +302,9 @@ def _lines_across(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
     """Yield lines across the map between the ends, each as its distance from the start, m, and points (n, 2)."""
     frame = rotated_frame(scenario.start, scenario.destination)
     half_width = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
-    across = np.linspace(-half_width, half_width, ACROSS)
-    for along in np.linspace(0.0, frame.length, ALONG)[1:-1]:
-        points = frame.restore(np.column_stack([np.full(ACROSS, along), across, np.zeros(ACROSS)]))[:, :2]
+    across = np.linspace(-half_width, half_width, POINTS_ACROSS)
+    for along in np.linspace(0.0, frame.length, POINTS_ALONG)[1:-1]:
+        points = frame.restore(np.column_stack([np.full(POINTS_ACROSS, along), across, np.zeros(POINTS_ACROSS)]))[:, :2]
         is_on_map = ((points >= scenario.bounds[:, 0]) & (points <= scenario.bounds[:, 1])).all(axis=1)
         if is_on_map.any():
             yield float(along), points[is_on_map]

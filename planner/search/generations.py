@@ -156,7 +156,7 @@ FIRST_BOUNDS = (1.15, 1.3, 1.6, 2.5, math.inf)
 # Number of best candidates per interval whose paths are evaluated as a whole.
 BEST_PER_INTERVAL = 3
 # Every n-th interval is used for these paths.
-EVERY = 3
+INTERVAL_STEP = 3
 # Maximum evaluations of a pattern search on a generation's best path while no path is feasible.
 REPAIR_EVALUATIONS = 100
 
@@ -277,7 +277,7 @@ def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointCha
 def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None:
     """Evaluate whole paths through some of the best candidates, and repair one path as long as no path is feasible."""
     chosen = set()
-    for i in range(1, len(chains.cost) - 1, EVERY):
+    for i in range(1, len(chains.cost) - 1, INTERVAL_STEP):
         for k in np.argsort(chains.cost[i], kind="stable")[:BEST_PER_INTERVAL]:
             if chains.cost[i, k] < math.inf:
                 chosen.add(tuple(chains.path_through(i, int(k))[1:-1].tolist()))

@@ -21,18 +21,18 @@ from world.kernels import compiled, inner
 from world.wind import mean_wind_speed
 
 # Number of columns along the map's longer side.
-COLUMNS = 500
+COLUMN_COUNT = 500
 # Smallest side of a column, m.
 MIN_SIDE = 10.0
 # Maximum number of closed altitude ranges of a column; further ranges stay open.
-STRETCHES = 6
+MAX_RANGES = 6
 # Added to the altitude of the highest level flight, m: more than the error of its interpolation.
 ROUNDING = 1e-6
 
 
 def column_side(data: ProblemArrays) -> float:
     """Return the side of the columns, m; closed areas narrower than about this may be treated as open."""
-    return max(MIN_SIDE, max(data.east - data.west, data.north - data.south) / COLUMNS)
+    return max(MIN_SIDE, max(data.east - data.west, data.north - data.south) / COLUMN_COUNT)
 
 
 def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float = 0.0) -> bool:
@@ -122,7 +122,7 @@ def _is_closed(data: ProblemArrays, missiles: Flags, side: float, margin: float)
         max(1, math.ceil((data.north - data.south) / side)),
     )
     # Closed altitude ranges of each column, ascending and disjoint: lower ends, upper ends, and their number.
-    range_bottoms, range_tops = np.empty((columns, rows, STRETCHES)), np.empty((columns, rows, STRETCHES))
+    range_bottoms, range_tops = np.empty((columns, rows, MAX_RANGES)), np.empty((columns, rows, MAX_RANGES))
     range_counts = np.zeros((columns, rows), dtype=np.int64)
     for i in range(columns):
         for j in range(rows):

@@ -57,25 +57,25 @@ SLACK = 1.25
 # Fractions of the search margins beyond the certificate's margins, tried in this order.
 MARGINS = (0.5, 0.1, 0.0)
 # Minimum number of solutions that the search keeps.
-ARCHIVE = 100
+MIN_ARCHIVE_SIZE = 100
 # Number of solutions that the search keeps per requested plan.
-KEPT = 2
+SOLUTIONS_PER_PLAN = 2
 # Samples per generation.
 POPULATION = 120
 # Number of generations.
 GENERATIONS = 400
 # Largest deviation of the noise along, as a fraction of an interval.
-ALONG = 0.3
+NOISE_ALONG = 0.3
 # Largest deviation of the noise across, as a fraction of the straight line.
-ACROSS = 0.1
+NOISE_ACROSS = 0.1
 # Largest deviation of the noise up, as a fraction of the height range.
-UP = 0.3
+NOISE_UP = 0.3
 # Reference point: length and time or energy relative to the default plan.
-MOST_LENGTH = 1.5
+MAX_LENGTH_RATIO = 1.5
 # Reference point: exposure relative to the default plan.
-MOST_EXPOSURE = 1.5
+MAX_EXPOSURE_RATIO = 1.5
 # Exposure used in place of the default plan's exposure if that is lower, s.
-LEAST_EXPOSURE = 1.0
+MIN_EXPOSURE = 1.0
 # Noticeable gains: a plan that gains no more than these amounts over another plan in any objective is not a separate
 # choice. With these amounts fronts of 20 plans cover as much as without (`benchmarks.planning.fronts`); with twice the
 # amounts there were 17 plans for `jacksboro`.
@@ -171,7 +171,7 @@ def plan_front(
     if not default.safe or len(path) == 2:
         # A path of two waypoints has no inner waypoint to move.
         return Front((first,) if default.safe else (), count, task.fourth, first, reference, 0)
-    size = max(ARCHIVE, KEPT * count)
+    size = max(MIN_ARCHIVE_SIZE, SOLUTIONS_PER_PLAN * count)
     search = make_sampling(task, len(path), reference, size, stream(seed, PLANNER))
     evaluations = _search(task, search, path, progress, stop, generations)
     chosen, refused = _certify_distinct(task, search, count, first, replace(default, evaluations=evaluations), finish)
@@ -270,9 +270,9 @@ def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
     It is 1.5 times the default plan's length, exposure and time or energy, and the required clearance.
     """
     length, exposure, _, fourth = _objective_row(default, task.fourth)
-    max_exposure = max(LEAST_EXPOSURE, MOST_EXPOSURE * exposure)
+    max_exposure = max(MIN_EXPOSURE, MAX_EXPOSURE_RATIO * exposure)
     negated_clearance = -task.problem.certified.clearance
-    return np.array([MOST_LENGTH * length, max_exposure, negated_clearance, MOST_LENGTH * fourth])
+    return np.array([MAX_LENGTH_RATIO * length, max_exposure, negated_clearance, MAX_LENGTH_RATIO * fourth])
 
 
 def _with_values(task: FrontTask, plan: Plan) -> FrontPlan:
@@ -367,7 +367,9 @@ def make_sampling(
     rotated = frame.rotate(corners)
     low = np.array([rotated[:, 0].min(), rotated[:, 1].min(), data.floor])
     high = np.array([rotated[:, 0].max(), rotated[:, 1].max(), data.ceiling])
-    scales = np.array([ALONG * frame.length / (inner_count + 1), ACROSS * frame.length, UP * (high[2] - low[2])])
+    scales = np.array(
+        [NOISE_ALONG * frame.length / (inner_count + 1), NOISE_ACROSS * frame.length, NOISE_UP * (high[2] - low[2])]
+    )
     return FrontSampling(
         np.tile(low, inner_count),
         np.tile(high, inner_count),
@@ -402,7 +404,7 @@ def directions(inner_count: int, scales: Floats) -> Floats:
 def noticed_amounts(default: FrontPlan, fourth: str) -> Floats:
     """Return the noticeable gains (4,) of the objectives relative to a default plan."""
     length, exposure, _, fourth_value = _objective_row(default, fourth)
-    exposure_gain = NOTICED_EXPOSURE * max(LEAST_EXPOSURE, exposure)
+    exposure_gain = NOTICED_EXPOSURE * max(MIN_EXPOSURE, exposure)
     return np.array([NOTICED * length, exposure_gain, NOTICED_CLEARANCE, NOTICED * fourth_value])
 
 

@@ -144,14 +144,14 @@ GRIDS = ((50, 0.2, 2.0 / 3.0), (50, 0.5, 2.0 / 3.0))
 # gain.
 FINER_GRIDS = ((80, 0.3, 0.5), (80, 0.7, 1.0))
 # Excess over the straight line above which a path is long, as a fraction.
-LONG_WAY = 0.06
+LONG_PATH_EXCESS = 0.06
 # Steps of routes at the altitude of the ceiling, m; they are tried together with the finer grids, as they may turn
 # back.
 CEILING_STEPS = (250.0, 150.0, 100.0)
 # Depths to which routes at the ceiling may enter missiles' spheres, m.
-CEILING_CLOSER = (15.0, 40.0)
+CEILING_DEPTHS = (15.0, 40.0)
 # Average distance from an earlier path below which a path is not tried again, m.
-SAME_PATH = 20.0
+SAME_PATH_DISTANCE = 20.0
 # Maximum number of routes per grid.
 MAX_ROUTES = 8
 # Maximum cost of a route relative to the best path. With few courses, grid routes are some percent too long.
@@ -177,7 +177,7 @@ def search_other_sides(search: Search) -> None:
     if is_limited(search.problem.search.airspace) or length < 1.0 + MIN_DETOUR:
         return
     tried_paths = _try_grids(search, GRIDS)
-    if not search.has_safe() or search.length_ratio() > 1.0 + LONG_WAY:
+    if not search.has_safe() or search.length_ratio() > 1.0 + LONG_PATH_EXCESS:
         tried_paths += _try_grids(search, FINER_GRIDS) + _try_ceiling(search)
     if not search.has_safe():
         _try_narrow_margins(search, tried_paths)
@@ -205,14 +205,16 @@ def _try_ceiling(search: Search) -> list[Floats]:
     data, space = search.problem.search, search.problem.space
     frame = rotated_frame(space.start, space.destination)
     tried_paths: list[Floats] = []
-    for step, depth in itertools.product(CEILING_STEPS, CEILING_CLOSER):
+    for step, depth in itertools.product(CEILING_STEPS, CEILING_DEPTHS):
         if search.must_end():
             break
         route = ceiling_route(data, frame, step, depth, search.pause)
         if not len(route):
             continue
         path = resample(route, search.encoding.waypoints)
-        if all(np.sqrt(((path - tried_path) ** 2).sum(axis=1)).mean() > SAME_PATH for tried_path in tried_paths):
+        if all(
+            np.sqrt(((path - tried_path) ** 2).sum(axis=1)).mean() > SAME_PATH_DISTANCE for tried_path in tried_paths
+        ):
             tried_paths.append(path)
             search.shorten(path)
     return tried_paths

@@ -17,7 +17,7 @@ from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import ProblemArrays, clearance_at, required_clearance, required_headroom
 from planner.seeding.grids import (
-    EXPECTED,
+    EXPECTED_COST_RATIO,
     KILL_COST,
     LAYERS_PER_STEP,
     SIDEWAYS,
@@ -389,10 +389,10 @@ def _nearest_layer(grid: AirspaceGrid, column: Record, height: float) -> int:
 # --- Grids and routes ---
 
 # Factor on the number of stages of a grid without zones: hills and gaps need short steps.
-FINER = 2
+STAGE_FACTOR = 2
 # Bound on the cost of a first route, relative to the first route on the previous grid. A route on a finer grid may cost
 # a little more, as it is freer to turn; the bound saves work and does not change the route.
-FINER_COST = 1.05
+FINER_COST_RATIO = 1.05
 # Minimum number of layers of a band of heights above ground.
 MIN_LAYERS = 8
 # Maximum number of layers of a band of heights above ground.
@@ -443,15 +443,15 @@ def airspace_routes(
     *,
     finer_only: bool = False,
 ) -> Iterator[GridRoute]:
-    """Yield routes for each grid (stages, number of different routes), with `FINER` times its stages.
+    """Yield routes for each grid (stages, number of different routes), with `STAGE_FACTOR` times its stages.
 
     Routes of gentle grids are easier to fly. The first grid is also searched without that restriction, because narrow
     gaps can require steep or curved routes. pause: as in `cheapest_airspace_route`.
     finer_only: True to skip grids that `MAX_CELLS` makes no finer than an earlier grid.
     """
-    expected_cost, max_stages = EXPECTED * math.dist(data.start, data.destination), 0
+    expected_cost, max_stages = EXPECTED_COST_RATIO * math.dist(data.start, data.destination), 0
     for index, (stages, route_count) in enumerate(grids):
-        grid = airspace_grid(data, frame, span, FINER * stages)
+        grid = airspace_grid(data, frame, span, STAGE_FACTOR * stages)
         if finer_only and grid.stages <= max_stages:
             continue
         max_stages = max(max_stages, grid.stages)
@@ -462,7 +462,12 @@ def airspace_routes(
         earlier_routes: tuple[GridRoute, ...] = ()
         for _ in range(route_count):
             route = _find_route(
-                data, frame, grid, earlier_routes, math.inf if earlier_routes else FINER_COST * expected_cost, pause
+                data,
+                frame,
+                grid,
+                earlier_routes,
+                math.inf if earlier_routes else FINER_COST_RATIO * expected_cost,
+                pause,
             )
             if route is None:
                 break

@@ -37,7 +37,7 @@ GROUND_STEP = 8.0
 # Half-step of finite differences of the place of a sample, m.
 CORNER_STEP = 0.5
 # Slope of an arc, as a fraction of the slope limit, below which it is not constrained.
-STEEP = 0.8
+STEEP_FRACTION = 0.8
 # Length of an arc in addition to the length for its climb or descent, m.
 ARC_MARGIN = 1.0
 # The same as a fraction of the additional margin.
@@ -131,7 +131,7 @@ def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown:
         radius = corners[i].radius
         arc = radius * min(MAX_TURN, 2.0 * math.atan(corners[i].tangent / radius))
         for sign, max_slope in ((1.0, climb), (-1.0, dive)):
-            if arc_room(path[i - 1], path[i], path[i + 1], radius, sign, max_slope) < (1.0 - STEEP) * arc:
+            if arc_room(path[i - 1], path[i], path[i + 1], radius, sign, max_slope) < (1.0 - STEEP_FRACTION) * arc:
                 flown.steep_radii[i] = radius
 
 

@@ -482,17 +482,17 @@ def trace_back(parents: Codes, layer: int, across: int) -> Records:
 # Layers that the gentler slope limit climbs per step along; the limits of the pitch below apply.
 LAYERS_PER_STEP = 2.5
 # Smallest pitch of the layers, as a fraction of the step along.
-LOW_LAYER = 0.05
+MIN_LAYER_PITCH = 0.05
 # Largest pitch of the layers, as a fraction of the step along.
-HIGH_LAYER = 0.12
+MAX_LAYER_PITCH = 0.12
 # Maximum number of cells of a grid: stages x across x layers.
 MAX_CELLS = 1_200_000
 # Expected cost of the first route over the straight line; with few courses, grid routes are too long by about this.
-EXPECTED = 1.12
+EXPECTED_COST_RATIO = 1.12
 # Distance from an earlier route within which a route costs up to twice as much, m.
-APART = 800.0
+ROUTE_SPACING = 800.0
 # The same in steps, if that is larger.
-APART_STEPS = 3.0
+ROUTE_SPACING_STEPS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -511,7 +511,7 @@ def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float
     lowest, highest = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
     level = np.array([*data.destination[:2], data.start[2]])
     gentler_slope = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level))))
-    pitch_ratio = min(HIGH_LAYER, max(LOW_LAYER, gentler_slope / LAYERS_PER_STEP))
+    pitch_ratio = min(MAX_LAYER_PITCH, max(MIN_LAYER_PITCH, gentler_slope / LAYERS_PER_STEP))
     while True:
         step = frame.length / stages
         layer_pitch = pitch_ratio * step
@@ -560,7 +560,7 @@ def grid_route(
 def proximity_cost(along: Floats, across: Floats, earlier_routes: tuple[GridRoute, ...]) -> Floats:
     """Return the additional cost per m near earlier routes, at positions along (s,) and across (y,), m, as (s, y)."""
     extra = np.zeros((along.size, across.size))
-    width = max(APART, APART_STEPS * along[-1] / (along.size - 1))
+    width = max(ROUTE_SPACING, ROUTE_SPACING_STEPS * along[-1] / (along.size - 1))
     for route in earlier_routes:
         stage_across = np.interp(along, route.points[:, 0], route.points[:, 1])
         extra += np.maximum(0.0, 1.0 - np.abs(across[None, :] - stage_across[:, None]) / width)
@@ -575,7 +575,7 @@ def grid_routes(
     pause: Callable[[], None] = lambda: None,
 ) -> Iterator[GridRoute]:
     """Yield routes for each grid (stages, number of different routes). pause: as in `cheapest_route`."""
-    expected_cost = EXPECTED * math.dist(data.start, data.destination)
+    expected_cost = EXPECTED_COST_RATIO * math.dist(data.start, data.destination)
     for stages, route_count in grids:
         grid = make_grid(data, frame, span, stages)
         earlier_routes: tuple[GridRoute, ...] = ()

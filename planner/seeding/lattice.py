@@ -39,11 +39,11 @@ _STEPS = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], 
 # best.
 TURN_COST = 0.1
 # A step is closed if its cost exceeds its length by this factor.
-CLOSED = 1.05
+MAX_COST_RATIO = 1.05
 # Status of a step.
 _UNKNOWN = 0
 _FREE = 1
-_SHUT = 2
+_CLOSED = 2
 # Parent of a state of the start.
 _FIRST = -1
 # A point of a route: steps along and across from the start, and its layer.
@@ -150,8 +150,11 @@ def _expand_state(
             # The feasibility of a step does not depend on the course before it.
             step_index = (cell * 8 + next_course) * width + next_layer - layer + max_descent
             if table.steps[step_index] == _UNKNOWN:
-                is_free = _is_inside(data, b) and leg_cost(data, limits, a, b, CLOSED * length) <= CLOSED * length
-                table.steps[step_index] = _FREE if is_free else _SHUT
+                is_free = (
+                    _is_inside(data, b)
+                    and leg_cost(data, limits, a, b, MAX_COST_RATIO * length) <= MAX_COST_RATIO * length
+                )
+                table.steps[step_index] = _FREE if is_free else _CLOSED
             if table.steps[step_index] == _FREE:
                 table.cost[next_state], table.parents[next_state] = total, state + 1
                 goal_distance = math.sqrt((b[0] - goal[0]) ** 2 + (b[1] - goal[1]) ** 2 + (b[2] - goal[2]) ** 2)
@@ -285,7 +288,7 @@ def simplify_route(data: ProblemArrays, points: Floats) -> Floats:
         for k in range(last_point, current + 1, -1):
             a, b = points[current], points[k]
             length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-            if leg_cost(data, limits, a, b, CLOSED * length) <= CLOSED * length:
+            if leg_cost(data, limits, a, b, MAX_COST_RATIO * length) <= MAX_COST_RATIO * length:
                 next_point = k
                 break
         current = next_point

@@ -38,7 +38,7 @@ BOUNDS_PRICE = 1.0
 # Price of exposure, length ratio per unit of exposure.
 EXPOSURE_PRICE = 5.0
 # Price of any exposure at all: a sphere that is barely entered has almost none.
-EXPOSED = 0.002
+ANY_EXPOSURE_PRICE = 0.002
 # Initial step along, as a fraction of the interval between waypoints.
 FIRST_ALONG = 0.2
 # Initial step across, as a fraction of the interval between waypoints.
@@ -132,7 +132,9 @@ def merits(scores: Floats) -> Floats:
     count = len(prices)
     length_ratio, exposure = scores[:, count + Objective.LENGTH_RATIO], scores[:, count + Objective.KILL_EXPOSURE]
     violation_price = (scores[:, :count] * prices).sum(axis=1)
-    return np.asarray(length_ratio + violation_price + EXPOSURE_PRICE * exposure + EXPOSED * (exposure > 0.0))
+    return np.asarray(
+        length_ratio + violation_price + EXPOSURE_PRICE * exposure + ANY_EXPOSURE_PRICE * (exposure > 0.0)
+    )
 
 
 @cache
@@ -207,7 +209,7 @@ def _evaluate_merit(
 def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, bool]:
     price, is_feasible = EXPOSURE_PRICE * objectives.kill_exposure, True
     if objectives.kill_exposure > 0.0:
-        price += EXPOSED
+        price += ANY_EXPOSURE_PRICE
         is_feasible = False
     price += TURN_PRICE * violations.turn
     price += SLOPE_PRICE * violations.slope

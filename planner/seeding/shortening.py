@@ -45,7 +45,7 @@ STEPS = 5
 # Number of halvings per step.
 HALVINGS = 5
 # A round ends after a step that moves no waypoint further than this, m.
-STILL = 0.05
+MIN_MOVE = 0.05
 
 
 @inner
@@ -178,7 +178,7 @@ def _descend(
         merit = trial_merit
         for row in range(path.shape[0]):
             copy_into(path[row], trial[row])
-        if step_fraction * max_move < STILL:
+        if step_fraction * max_move < MIN_MOVE:
             break
     lagrangian(data, limits, active, path, multipliers, values, penalty, model)
     return models + 1

@@ -53,7 +53,7 @@ from world.terrain import pixel_height
 
 
 # A sphere constrains the legs that come within this distance of its surface, m.
-NEAR = 250.0
+NEARBY_DISTANCE = 250.0
 # Smallest turn, rad; smaller turns are measured at it.
 MIN_TURN = 0.2
 # Largest turn whose tangent of half the turn is taken, rad.
@@ -167,7 +167,7 @@ def _find_near_missiles(
             length2 = max(1e-6, dx * dx + dy * dy + dz * dz)
             fraction = min(1.0, max(0.0, -(ax * dx + ay * dy + az * dz) / length2))
             distance = math.sqrt((ax + fraction * dx) ** 2 + (ay + fraction * dy) ** 2 + (az + fraction * dz) ** 2)
-            if distance > missile.radius + data.kill_margin + NEAR:
+            if distance > missile.radius + data.kill_margin + NEARBY_DISTANCE:
                 continue
             length = math.sqrt(length2)
             excursion = 0.0

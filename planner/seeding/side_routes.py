@@ -269,7 +269,7 @@ def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Reco
 # --- Routes of different sides ---
 
 # Routes with a mean lateral distance below this are the same route, m.
-SAME_WAY = 100.0
+SAME_ROUTE_DISTANCE = 100.0
 
 
 def sides_passed(points: Floats, obstacles: Records) -> Ints:
@@ -325,7 +325,7 @@ def side_routes(
         if sides in known_sides:
             continue
         known_sides.add(sides)
-        if any(np.abs(points[:, 1] - route.points[:, 1]).mean() < SAME_WAY for route in routes):
+        if any(np.abs(points[:, 1] - route.points[:, 1]).mean() < SAME_ROUTE_DISTANCE for route in routes):
             continue
         routes.append(GridRoute(points, float(passing["cost"])))
         if len(routes) == max_routes:

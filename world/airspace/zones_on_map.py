@@ -97,13 +97,13 @@ def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, grou
 
 
 # Distance from the area beyond which zones are left out, m; a flight within its area comes nowhere near them.
-FAR = 20_000.0
+MAX_ZONE_DISTANCE = 20_000.0
 # Length of a degree of latitude, m.
 _DEGREE_LENGTH_M = 111_000.0
 
 
 def near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
-    """Return the zones of a file that a flight may meet: inclusions, and exclusions within `FAR` of the area.
+    """Return zones of a file that a flight may meet: inclusions, and exclusions within `MAX_ZONE_DISTANCE` of the area.
 
     source: name of the file in messages.  bounds: (2, 2) m, west and east, south and north of the area.
     Raises ScenarioError for an invalid shape among the omitted zones; `make_zones` checks the others.
@@ -134,9 +134,9 @@ def _check_rings(table: ZoneTable) -> None:
 
 
 def _is_near(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
-    reach, corners = FAR, table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
+    reach, corners = MAX_ZONE_DISTANCE, table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
     if table.lat_deg is not None and table.lon_deg is not None:
-        reach, corners = FAR + (table.radius_m or 0.0), [[[table.lat_deg, table.lon_deg]]]
+        reach, corners = MAX_ZONE_DISTANCE + (table.radius_m or 0.0), [[[table.lat_deg, table.lon_deg]]]
     positions = np.array([corner for ring in corners or [] for corner in ring], dtype=np.float64)
     if not len(positions):
         return True

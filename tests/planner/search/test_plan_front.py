@@ -133,7 +133,7 @@ def test_a_path_that_breaks_a_constraint_has_no_objectives(scenario: Scenario, l
 def test_the_search_keeps_more_solutions_than_plans_are_asked_for(
     scenario: Scenario, limits: Limits, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fronts, "ARCHIVE", 1)
+    monkeypatch.setattr(fronts, "MIN_ARCHIVE_SIZE", 1)
     assert len(plan_front(scenario, limits, 6, seed=3, generations=2).plans) > 2
 
 
