@@ -20,7 +20,7 @@ from world.arrays import Floats, Ints
 from world.errors import MissionError
 from world.files import read_small_file
 from world.html_table import html_table
-from world.scenario import Scenario, fixed_ends, from_spec
+from world.scenario import Scenario, from_spec, with_absolute_ends
 from world.scenario_file import first_fault
 from world.terrain import Terrain
 
@@ -268,7 +268,7 @@ def parse_plan(
     waypoints = np.array(plan_file.waypoints_east_north_amsl_m)
     # With another terrain the ends keep their planned altitudes.
     scenario_spec = (
-        plan_file.scenario if terrain is None else fixed_ends(plan_file.scenario, waypoints[0], waypoints[-1])
+        plan_file.scenario if terrain is None else with_absolute_ends(plan_file.scenario, waypoints[0], waypoints[-1])
     )
     scenario = from_spec(scenario_spec, source, base=base, terrain=terrain, ground=ground)
     saved_certificate = plan_file.certificate

@@ -143,7 +143,7 @@ def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[f
 
 
 @dataclass(frozen=True, slots=True)
-class AskedReturns:
+class ReturnRequirements:
     """Requirements on returns, and the return settings of a planned mission.
 
     require: contains "rtl" if every return to launch must be safe, "glide" if the engine may fail anywhere, "go_around"
@@ -210,7 +210,7 @@ def make_landing(
 
 def make_returns(
     table: ReturnsTable | None, source: str, origin: GeoOrigin, ground: Terrain | None
-) -> AskedReturns | None:
+) -> ReturnRequirements | None:
     """Return the requirements and settings of returns that a table states, or None without a table.
 
     Raises ScenarioError for a rally point that is not above the ground, and for a height above ground where the ground
@@ -223,7 +223,7 @@ def make_returns(
         key = f"returns.rally[{k}]"
         points.append(map_position(rally_table, key, source, origin, ground))
         check_above_ground(key, points[-1], source, ground)
-    return AskedReturns(tuple(table.require or ()), table.rtl_altitude_m, np.array(points), table.rtl_autoland)
+    return ReturnRequirements(tuple(table.require or ()), table.rtl_altitude_m, np.array(points), table.rtl_autoland)
 
 
 def _place_on_ground(

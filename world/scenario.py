@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from world.airfield import AskedReturns, LandingStrip, Launch, make_home, make_landing, make_launch, make_returns
+from world.airfield import LandingStrip, Launch, ReturnRequirements, make_home, make_landing, make_launch, make_returns
 from world.airspace.zone_files import FileZones, read_zone_files
 from world.airspace.zone_times import is_active, parse_span
 from world.airspace.zones import Zone
@@ -91,7 +91,7 @@ class Scenario:
     home: Floats | None = None
     launch: Launch | None = None
     landing: LandingStrip | None = None
-    returns: AskedReturns | None = None
+    returns: ReturnRequirements | None = None
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
@@ -408,17 +408,17 @@ def over_terrain(scenario: Scenario, terrain: str) -> Scenario:
     >>> over_terrain(load_scenario("jacksboro"), "jacksboro").terrain.source
     'jacksboro'
     """
-    spec = fixed_ends(scenario.to_json(), scenario.start, scenario.destination)
+    spec = with_absolute_ends(scenario.to_json(), scenario.start, scenario.destination)
     return from_spec(spec, scenario.name, terrain=terrain, external=scenario.external)
 
 
-def fixed_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
+def with_absolute_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
     """Return a scenario's JSON data with its ends at the altitudes of these points (m AMSL).
 
     start, destination: (3,).  The altitude replaces a height above ground (`height_m`).
 
     >>> data = {"start": {"east_m": 0.0, "north_m": 0.0, "height_m": 50.0}, "destination": {"amsl_m": 300.0}}
-    >>> fixed_ends(data, np.array([0.0, 0.0, 250.0]), np.array([900.0, 0.0, 300.0]))["start"]
+    >>> with_absolute_ends(data, np.array([0.0, 0.0, 250.0]), np.array([900.0, 0.0, 300.0]))["start"]
     {'east_m': 0.0, 'north_m': 0.0, 'amsl_m': 250.0}
     """
     changed = dict(spec)

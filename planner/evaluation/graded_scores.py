@@ -119,7 +119,7 @@ def score_legs(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Evaluate the first part: the legs and turns, without ground, missiles and zones. Add their violations.
+    """Score the legs and turns, the first part, and add their violations; ground, missiles and zones follow.
 
     objectives: the length ratio is filled; the kill exposure is 0 until `score_missiles`.
     """
@@ -143,7 +143,7 @@ def score_legs(
 def score_ground(
     data: ProblemArrays, limits: PrecomputedLimits, scratch: PathScratch, path: Floats, violations: Record
 ) -> None:
-    """Evaluate the second part: the ground below the legs."""
+    """Score the ground below the legs, the second part."""
     legs, terrain_legs = scratch.legs, scratch.terrain_legs
     sample_terrain(
         data.heights,
@@ -170,7 +170,7 @@ def score_missiles(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Evaluate the third part: missiles, and the ground below corners as flown."""
+    """Score missiles, and the ground below corners as flown, the third part."""
     # Take arrays out of the data once, because passing the data on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
     bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
@@ -227,7 +227,7 @@ def score_missiles(
 
 @inner
 def score_airspace(data: ProblemArrays, scratch: PathScratch, path: Floats, violations: Record) -> None:
-    """Evaluate the last part: zones and the maximum height above ground."""
+    """Score zones and the maximum height above ground, the last part."""
     if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
         add_airspace_violations(data, path, scratch.legs, scratch.corners, scratch.flown, scratch.lags, violations)
 

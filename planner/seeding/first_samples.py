@@ -21,8 +21,8 @@ MAX_SPREAD = 0.3
 def bridge_modes(inner: int) -> tuple[Floats, Floats]:
     """Return eigenvectors (inner, inner) and deviations (inner,) of the kernel min(s, t) - s t at equal steps.
 
-    In closed form: the inverse of the kernel is the second difference, so the eigenvectors are sines. Deviations are
-    relative to the deviation of the first mode.
+    They have a closed form: the inverse of the kernel is the second difference, so the eigenvectors are sines.
+    Deviations are relative to the deviation of the first mode.
     """
     k = np.arange(1, inner + 1)
     modes = np.sqrt(2.0 / (inner + 1)) * np.sin(np.pi * np.outer(k, k) / (inner + 1))

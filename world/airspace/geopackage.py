@@ -91,7 +91,7 @@ def _read_shape(blob: Any, code: str, source: str) -> dict[str, Any]:
 def _with_lists(geometry: dict[str, Any]) -> dict[str, Any]:
     """Replace the tuples in a mapping of shapely by lists, as in JSON."""
 
-    def lists(value: Any) -> Any:
-        return [lists(item) for item in value] if isinstance(value, tuple | list) else value
+    def to_lists(value: Any) -> Any:
+        return [to_lists(element) for element in value] if isinstance(value, tuple | list) else value
 
-    return {"type": geometry["type"], "coordinates": lists(geometry.get("coordinates", []))}
+    return {"type": geometry["type"], "coordinates": to_lists(geometry.get("coordinates", []))}
